@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ephs.mechanics.elements.beam import beam_element as beam_element
+    from ephs.mechanics.elements.beam import thermoelastic as thermoelastic
     from ephs.mechanics.elements.bodies import body_pattern as body_pattern
     from ephs.mechanics.elements.bodies import rigid_body as rigid_body
     from ephs.mechanics.elements.cylinder import gas_spring as gas_spring
@@ -37,6 +38,7 @@ _HOME = {
     "joint_pattern": "ephs.mechanics.elements.joints",
     "mbs_pattern": "ephs.mechanics.elements.joints",
     "spring_damper": "ephs.mechanics.elements.joints",
+    "thermoelastic": "ephs.mechanics.elements.beam",
     "stabilised": "ephs.mechanics.rewrite.stabilised",
     "universal_joint": "ephs.mechanics.elements.joints",
 }

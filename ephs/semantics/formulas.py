@@ -54,6 +54,11 @@ def thermal_node_slope(s: Any, capacity: Any, temperature: Any) -> Any:
     return [temperature * np.exp(s / capacity)]
 
 
+def thermoelastic(e: Any, s: Any, capacity: Any, temperature: Any, pull: Any, reference: Any) -> Any:
+    """E = κ θ₀ e + C θ₁ (exp((s − κ e)/C) − 1)."""
+    return pull * reference * e + capacity * temperature * np.expm1((s - pull * e) / capacity)
+
+
 def ideal_gas(s: Any, v: Any, c1: Any, c2: Any, v0: Any, c: Any) -> Any:
     """E = c1 exp(s/c2) (v0/v)^(1/c)."""
     return c1 * np.exp(s / c2) * (v0 / v) ** (1 / c)

@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.operad import Path
+from ephs.operad import Path, quantity
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.kept import once
@@ -179,7 +179,7 @@ def _compiled(d: Descriptor, reference: Reference, given: Mapping[Path, Input], 
     n = d.numbering
     n_rate, n_effort, n_lam = d.rate_size, d.effort_size, d.multiplier_size
     size = d.unknowns(given)
-    each = [entry_of(one, reference, reversible=matrix or _reads_numbers(one)) for one in n.primitives]
+    each = [entry_of(one, reference, reversible=matrix or _may_be_attached(one)) for one in n.primitives]
     counts = np.array([entry.counts for entry in each], dtype=np.int64).reshape(-1, 5)[n.primitive]
     kinds, numbers, reads = counts[:, 0], counts[:, 1], counts[:, 4]
     junction_dims, state_dims, state_sizes = n.dims(n.junctions), n.dims(n.states), n.sizes(n.states)
@@ -247,8 +247,9 @@ def _compiled(d: Descriptor, reference: Reference, given: Mapping[Path, Input], 
     return replace(model, tables=laid_out(table, n.primitive, each, reference))
 
 
-def _reads_numbers(primitive: Primitive) -> bool:
-    return bool(primitive.reads) and all(primitive.interface[port].quantity.space.size == 1 for port in primitive.reads)
+def _may_be_attached(primitive: Primitive) -> bool:
+    """Whether a component reads states, and may be attached to a mechanism: it does not act on bodies."""
+    return bool(primitive.reads) and all(of != quantity.body_momentum for _, _, of in primitive.bundle.items())
 
 
 def _blocks(d: Descriptor, given: Mapping[Path, Input]) -> tuple[Index, Index]:

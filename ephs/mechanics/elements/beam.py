@@ -5,24 +5,27 @@ An element of length L between the frames H₁ and H₂ has the mean strain ξ =
 then stretch (1 where there is none) and two shears, in axes whose first one is the tangent. `strain` has its energy.
 Kelvin–Voigt damping resists ξ̇ = T⁻¹ u_r / L with τ times the stiffness, T⁻¹ the derivative of the logarithm.
 Everything else is a joint's. Geometrically exact, unchanged by rigid motions, free of locking.
+
+An element that expands with heat has its heat and part of its energy in a storage of its lengthening e and its entropy
+s, `thermoelastic`: where θ is its temperature, its axial force is EA (ξ₄ − 1) − κ (θ − θ₀), κ = EA α.
 """
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ephs.mechanics.elements import components, notation
 from ephs.mechanics.elements.joints import between_frames
-from ephs.mechanics.elements.strain import ORDERS, strain_energy, strain_resistance
+from ephs.mechanics.elements.strain import ORDERS, strain_energy, strain_resistance, stretching
 from ephs.operad import Directory, Path, PortType, quantity
-from ephs.semantics import structures
+from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
 from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import stored
-from ephs.semantics.primitives import Irreversible, Storage, power_ports
+from ephs.semantics.forms import coupled, stored
+from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.system import System
 from ephs.semantics.verdict import proved
@@ -30,7 +33,7 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["beam_damper", "beam_element", "beam_spring", "elastic"]
+__all__ = ["beam_damper", "beam_element", "beam_spring", "beam_stretch", "elastic", "thermoelastic"]
 
 RELATIVE = quantity.relative_pose("free")
 
@@ -45,6 +48,7 @@ def beam_element(
     damping: float = 0.0,
     heat: bool = False,
     order: int = 2,
+    expands: bool = False,
 ) -> System:
     """A geometrically exact beam element between two bodies: a free joint with the energy of a strain.
 
@@ -64,6 +68,8 @@ def beam_element(
         As of a `joint`.
     order
         2, or 4: the energy of `strain` by which rest converges with shorter elements.
+    expands
+        Its lengthening leaves through the port e, for a `thermoelastic` storage that takes its heat, too.
 
     Raises
     ------
@@ -73,7 +79,8 @@ def beam_element(
     k, zero = np.asarray(stiffness, dtype=float), np.asarray(rest, dtype=float)
     one, two = (SE3.identity() if frame is None else np.asarray(frame, dtype=float) for frame in (frame1, frame2))
     parts = elastic(length, k, zero, damping, order)
-    return between_frames(SE3.compose(one, SE3.exp(length * zero)), two, *parts, heat=heat)
+    stretch = beam_stretch(float(length), tuple(zero.tolist())) if expands else None
+    return between_frames(SE3.compose(one, SE3.exp(length * zero)), two, *parts, heat=heat, stretch=stretch)
 
 
 def elastic(
@@ -155,6 +162,68 @@ def beam_damper(length: float, stiffness: Array, rest: Array, damping: float, or
         trusted=True,
     )
     return replace(made, notation=notation.friction)
+
+
+@lru_cache(maxsize=1024)
+def beam_stretch(length: float, rest: tuple[float, ...]) -> Reversible:
+    """Lengthening of an element at the rate L ξ̇₄ = w·u_r: e.f = −w p_r.e, p_r.f = w e.e; reads q_r as `beam_spring`.
+
+    Parameters
+    ----------
+    length, rest
+        L in m, (6,) ξ₀, as of a `beam_spring`.
+    """
+    zero = np.array(rest)
+
+    def structure(q_r: Any) -> Any:
+        row = stretching(q_r, length, zero)
+        return [*([0.0] * 6 + [w] for w in row), [*(-w for w in row), 0.0]], None
+
+    ports = Directory(
+        {
+            "p_r": PortType(quantity.joint_momentum("free"), True),
+            "e": PortType(quantity.displacement, True),
+            "q_r": PortType(RELATIVE, False),
+        }
+    )
+    return coupled(
+        "beam_stretch",
+        ports,
+        structure,
+        parameters=(("length", length), ("rest", rest)),
+        proof=lambda: proved(
+            "L = [[0, w], [−wᵀ, 0]], w even in q_r, which reads q and −q alike", *STATEMENTS["reversible"]
+        ),
+        trusted=True,
+    )
+
+
+def thermoelastic(capacity: float, temperature: float, pull: float, reference: float) -> Storage:
+    """Heat of a solid that expands: E = κ θ₀ e + C θ₁ (exp((s − κ e)/C) − 1), so e.e = κ (θ₀ − θ); ports e, s.
+
+    Parameters
+    ----------
+    capacity
+        C in J/K at constant length.
+    temperature
+        θ₁ in K at e = 0, s = 0.
+    pull
+        κ in N/K: modulus × section × coefficient of expansion.
+    reference
+        θ₀ in K, at which it exerts no force.
+
+    Raises
+    ------
+    StructureError
+        A number is not finite, or one but the pull not positive.
+    """
+    numbers = {"capacity": capacity, "temperature": temperature, "pull": pull, "reference": reference}
+    for key, found in numbers.items():
+        if not (np.isfinite(found) and (key == "pull" or found > 0.0)):
+            expected = "a finite number" if key == "pull" else "a number > 0"
+            raise StructureError("parameter", "thermoelastic", key=key, found=found, expected=expected)
+    ports = power_ports(e=quantity.displacement, s=quantity.entropy)
+    return stored("thermoelastic", ports, formulas.thermoelastic, {key: float(x) for key, x in numbers.items()})
 
 
 def _numbers(length: float, stiffness: Array, rest: Array, order: int) -> tuple[tuple[str, object], ...]:

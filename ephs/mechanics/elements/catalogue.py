@@ -78,9 +78,14 @@ def _beam_spring(_ports: Interface, n: Numbers) -> Primitive:
     return beam.beam_spring(n["length"], n["stiffness"], n["rest"], n.get("order", 2))
 
 
+def _thermoelastic(_ports: Interface, n: Numbers) -> Primitive:
+    return beam.thermoelastic(n["capacity"], n["temperature"], n["pull"], n["reference"])
+
+
 PARTS: tuple[Part, ...] = (
     Part("beam_damper", "beam_damper", _beam_damper),
     Part("beam_spring", "beam_spring", _beam_spring),
+    Part("beam_stretch", "beam_stretch", lambda _, n: beam.beam_stretch(n["length"], tuple(n["rest"]))),
     Part("closing", "closing", _closing),
     Part("frame_change", "frame_change", _frame_change),
     Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
@@ -100,4 +105,5 @@ PARTS: tuple[Part, ...] = (
         lambda ports, _: components.holonomic(_pair(ports, "q_r"), on_group=False),
     ),
     Part("thermal_node", "thermal_node", lambda _, n: components.thermal_node(n["capacity"], n["temperature"])),
+    Part("thermoelastic", "thermoelastic", _thermoelastic),
 )

@@ -15,7 +15,7 @@ from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.system import System
 
@@ -31,7 +31,9 @@ Friction = Callable[[Array, Array, float], Array]
 
 
 @cache
-def joint_pattern(of: Pair, *, reading: bool = False, heat: bool = False, driven: bool = False) -> Pattern:
+def joint_pattern(
+    of: Pair, *, reading: bool = False, heat: bool = False, driven: bool = False, stretching: bool = False
+) -> Pattern:
     """The joint of a pair: offsets o1, o2, the holonomic relation hc, energy pe with its coupling pkc, friction mf.
 
     Parameters
@@ -42,6 +44,8 @@ def joint_pattern(of: Pair, *, reading: bool = False, heat: bool = False, driven
         The friction heat leaves through the port s, in place of the box env.
     driven
         The momentum p_r is exposed.
+    stretching
+        A box st makes a length of the relative pose's rate; it leaves through the port e.
     """
     parameters = dict(of.parameters)
     momentum = quantity.body_momentum
@@ -57,8 +61,11 @@ def joint_pattern(of: Pair, *, reading: bool = False, heat: bool = False, driven
     }
     if not heat:
         boxes["env"] = {"s": "s"}
+    if stretching:
+        boxes["st"] = {"p_r": "p_r", "e": "e", "q_r": "~q_r"}
     return Pattern(
-        junctions={
+        junctions=({"e": junction(quantity.displacement, exposed=True)} if stretching else {})
+        | {
             "p1": junction(momentum, exposed=True),
             "p2": junction(momentum, exposed=True),
             "p_j1": junction(momentum),
@@ -181,7 +188,15 @@ def spring_damper(
     return between_frames(one, two, springs.point_spring(stiffness, length), damper, heat=heat)
 
 
-def between_frames(frame1: Array, frame2: Array, energy: Storage, loss: Irreversible, *, heat: bool = False) -> System:
+def between_frames(
+    frame1: Array,
+    frame2: Array,
+    energy: Storage,
+    loss: Irreversible,
+    *,
+    heat: bool = False,
+    stretch: Reversible | None = None,
+) -> System:
     """Energy and loss of the relative pose of two frames: a free joint with this storage and this friction.
 
     Parameters
@@ -190,8 +205,10 @@ def between_frames(frame1: Array, frame2: Array, energy: Storage, loss: Irrevers
         (7,) poses in bodies 1 and 2.
     energy, loss
         Ports q_r, and p_r, s and perhaps q_r, of the free pair.
+    stretch
+        Ports p_r, e and state port q_r: of a length that leaves through the port e.
     """
-    return _joint(pair("free"), frame1, frame2, energy, loss, heat, False)
+    return _joint(pair("free"), frame1, frame2, energy, loss, heat, False, stretch)
 
 
 def universal_joint(
@@ -254,7 +271,14 @@ def universal_joint(
 
 
 def _joint(
-    of: Pair, frame1: Array, frame2: Array, energy: Storage, friction: Irreversible, heat: bool, driven: bool
+    of: Pair,
+    frame1: Array,
+    frame2: Array,
+    energy: Storage,
+    friction: Irreversible,
+    heat: bool,
+    driven: bool,
+    stretch: Reversible | None = None,
 ) -> System:
     q_r, p_r = components.relative(of), components.joint_momentum(of)
     parts: dict[str, Any] = {
@@ -267,7 +291,10 @@ def _joint(
     }
     if not heat:
         parts["env"] = library.environment()
-    return System.of(joint_pattern(of, reading=bool(friction.reads), heat=heat, driven=driven), parts)
+    if stretch is not None:
+        parts["st"] = stretch
+    pattern = joint_pattern(of, reading=bool(friction.reads), heat=heat, driven=driven, stretching=stretch is not None)
+    return System.of(pattern, parts)
 
 
 def _frame(given: Any) -> Array:

@@ -21,7 +21,7 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import squared_turn, turn_curve, turn_curve_slope, turn_ratio
 
-__all__ = ["ORDERS", "displacement", "logarithm", "mean_stress", "strain_energy", "strain_resistance"]
+__all__ = ["ORDERS", "displacement", "logarithm", "mean_stress", "strain_energy", "strain_resistance", "stretching"]
 
 ORDERS = (2, 4)
 """Orders in the length of the elements that rest converges by."""
@@ -53,6 +53,11 @@ def strain_resistance(pose: Any, length: float, stiffness: Array, rest: Array, d
         [scale * _sum(a * b / pivot for a, b, pivot in zip(one, other, pivots, strict=True)) for other in columns]
         for one in columns
     ]
+
+
+def stretching(pose: Any, length: float, rest: Array) -> list[Any]:
+    """(6,) row of T⁻¹: w with L ξ̇₄ = w·u, an element's rate of lengthening by the twist u of its relative pose."""
+    return logarithm_rate(moved(pose, length * rest))[3]
 
 
 def mean_stress(pose: Any, length: float, stiffness: Array, rest: Array, order: int = 2) -> list[Any]:

@@ -26,7 +26,8 @@ class BeamMotion:
     strain
         (n, elements, 6) beyond that without force: torsion and bending about 2, 3 in 1/m; stretch, shear along 2, 3.
     force
-        (n, elements, 3) in N: axial, shear along 2, 3; elastic, and of rods without stretch what holds the pieces.
+        (n, elements, 3) in N: axial, shear along 2, 3; elastic and thermal, and of rods without stretch what holds the
+        pieces.
     moment
         (n, elements, 3) elastic, in N m: torsion, bending about 2, 3.
     energy
@@ -46,8 +47,12 @@ def beam_motion(
     poses: Callable[[str], Array],
     relative: Callable[[str], Array],
     wrench: Callable[[str], Array],
+    temperature: Callable[[str], Array],
 ) -> BeamMotion:
-    """Read a beam's motion from its bodies' poses (n, 7), its joints' relative poses, and their wrenches (n, 6)."""
+    """Read a beam's motion from its bodies' poses (n, 7), its joints' relative poses, their wrenches (n, 6), and the
+    temperatures (n,) of thermal nodes.
+    """
+    nodes = dict(scene.all_thermal())
     position = np.stack([poses(node)[:, 4:] for node in beam.nodes], axis=1)
     strains, stresses = list[Array](), list[Array]()
     if beam.lengths:
@@ -66,6 +71,10 @@ def beam_motion(
     strain, stress = np.stack(strains, axis=1), np.stack(stresses, axis=1)
     lengths = beam.lengths or tuple(s.length for s in (scene.joint(name).strain for name in beam.joints) if s)
     energy = 0.5 * np.array(lengths) * np.sum(strain * stress, axis=2)
+    for i, name in enumerate(beam.joints):
+        node = nodes.get(scene.joint(name).heat)
+        if node is not None and node.pull:
+            stress[:, i, 3] -= node.pull * (temperature(node.name) - node.reference)
     return BeamMotion(position, strain, stress[..., 3:], stress[..., :3], energy)
 
 

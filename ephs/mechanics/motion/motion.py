@@ -180,8 +180,8 @@ class SceneMotion:
         if name not in nodes:
             raise KeyError(f"{name}: no such thermal node; the nodes are {', '.join(nodes) or 'none'}")
         node = nodes[name]
-        s = self._solution[component_path("thermal", name) / "s"]
-        return ThermalMotion(node.temperature * np.exp(s / node.capacity), s)
+        at = component_path("thermal", name)
+        return ThermalMotion(node.temperature_of(lambda state: self._solution[at / state]), self._solution[at / "s"])
 
     def pressed(self, contact: str, point: int) -> Array:
         """(n, 3) force of a point of a hard contact on the second body in N and world axes."""
@@ -199,7 +199,11 @@ class SceneMotion:
         beams = dict(self._scene.all_beams())
         if name not in beams:
             raise KeyError(f"{name}: no such beam; the beams are {', '.join(beams) or 'none'}")
-        return beam_motion(self._scene, beams[name], self.poses, self.inclusion, self.wrench)
+
+        def warmth(node: str) -> Array:
+            return self.thermal(node).temperature
+
+        return beam_motion(self._scene, beams[name], self.poses, self.inclusion, self.wrench, warmth)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker."""

@@ -262,8 +262,9 @@ class StateView(Mapping[Path, Array]):
         return MarkerState(*self._body(marker.body).point(marker.at))
 
     def _node(self, name: str) -> ThermalState:
-        node, s = self._names.nodes[name], float(self._states[component_path("thermal", name) / "s"][0])
-        return ThermalState(node.temperature * float(np.exp(s / node.capacity)), s)
+        at, states = component_path("thermal", name), self._states
+        theta = self._names.nodes[name].temperature_of(lambda state: float(states[at / state][0]))
+        return ThermalState(float(theta), float(states[at / "s"][0]))
 
     @cached_property
     def _twists(self) -> Array:

@@ -1,7 +1,7 @@
 """Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators; stores of heat, conduction."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, final
 
@@ -365,11 +365,22 @@ ATTACHED: Mapping[str, type[Attachment]] = {
 @final
 @dataclass(frozen=True, slots=True)
 class ThermalNode:
-    """A body of uniform temperature: capacity in J/K, initial temperature in K."""
+    """A body of uniform temperature: capacity in J/K, initial temperature in K.
+
+    One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the
+    ``reference`` in K.
+    """
 
     name: str
     capacity: float
     temperature: float
+    pull: float = 0.0
+    reference: float = 0.0
+
+    def temperature_of(self, states: Callable[[str], Any]) -> Any:
+        """θ = θ₁ exp((s − κ e)/C) in K, of its states by name: numbers or arrays."""
+        s = states("s") - self.pull * states("e") if self.pull else states("s")
+        return self.temperature * np.exp(s / self.capacity)
 
 
 @final

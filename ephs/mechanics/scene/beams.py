@@ -110,16 +110,21 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
         name, n, (ends[0], ends[1]), section.outline, tuple(lengths.tolist()) if entry.rod != "reissner" else ()
     )
     nodes = _nodes(name, entry, section, frames, lengths, world)
-    return BeamDraft(beam, nodes, tuple(joints), *_warmth(beam, entry, lengths), entry.surface)
+    return BeamDraft(
+        beam, nodes, tuple(joints), *_warmth(beam, entry, lengths, float(section.stiffness[3])), entry.surface
+    )
 
 
-def _warmth(beam: Beam, entry: Any, lengths: Array) -> tuple[dict[str, ThermalNode], dict[str, Conduction]]:
-    """A store of heat for each element, and conduction between the middles of neighbours."""
+def _warmth(
+    beam: Beam, entry: Any, lengths: Array, axial: float
+) -> tuple[dict[str, ThermalNode], dict[str, Conduction]]:
+    """A store of heat for each element, and conduction between the middles of neighbours; ``axial``: EA in N."""
     given = entry.thermal
     if given is None:
         return {}, {}
     of = dict(zip(beam.joints, lengths.tolist(), strict=True))
-    nodes = {name: ThermalNode(name, given.capacity * length, given.temperature) for name, length in of.items()}
+    kept = given.temperature, axial * given.expansion, given.reference or given.temperature
+    nodes = {name: ThermalNode(name, given.capacity * length, *kept) for name, length in of.items()}
     ways = {
         one: Conduction(one, (one, other), given.conduction / (0.5 * (of[one] + of[other])))
         for one, other in pairwise(beam.joints)
@@ -130,8 +135,10 @@ def _warmth(beam: Beam, entry: Any, lengths: Array) -> tuple[dict[str, ThermalNo
 def _check_kind(table: Checked[Any], key: str, faults: list[Fault]) -> None:
     """Rigid pieces have strain energy of torsion and bending, those of strings none; order 2."""
     entry = table.entry
-    if not table.sound("rod", "order", "strain", "damping") or entry.rod == "reissner":
+    if not table.sound("rod", "order", "strain", "damping", "thermal") or entry.rod == "reissner":
         return
+    if entry.thermal is not None and entry.thermal.expansion:
+        faults.append(fault("rod expansion", f"{key}.thermal.expansion", entry.thermal.expansion, rod=entry.rod))
     strain = np.array(entry.strain or np.zeros(6))
     if entry.order != 2:
         faults.append(fault("rod order", f"{key}.order", entry.order, rod=entry.rod))

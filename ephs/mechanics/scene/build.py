@@ -1,9 +1,10 @@
 """Scenes as hierarchical systems.
 
 Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``contacts.NAME``, ``thermal.NAME``, ``conduction.NAME``,
-``parts.NAME``, ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY`` and ``entropies.NODE``. A
-driven joint's momentum is the outer port ``drives.JOINT``. What a part exposes is joined at ``momenta.PART.BODY`` and
-so on; a part's name is not taken by anything else of its level, so these never clash.
+``parts.NAME``, ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY``, ``entropies.NODE``, and
+``lengthenings.NODE`` of nodes that expand. A driven joint's momentum is the outer port ``drives.JOINT``. What a part
+exposes is joined at ``momenta.PART.BODY`` and so on; a part's name is not taken by anything else of its level, so these
+never clash.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,9 +14,10 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.elements import components
+from ephs.mechanics.elements.beam import thermoelastic
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
-from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.attached import Actuator, ThermalNode
 from ephs.mechanics.scene.attaching import SUPPLIED, starts_of, supplies, supplies_of, system_of
 from ephs.mechanics.scene.made import Made, spring_system
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
@@ -25,6 +27,7 @@ from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
+from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import SE3
 from ephs.semantics.system import Filling, System
 from ephs.solve.problem import Signal
@@ -116,8 +119,8 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         out[at / "pe" / "q_r"] = SE3.normalise(SE3.compose(SE3.inverse(first), second))
         if heat == ENVIRONMENT:
             out[at / "env" / "s"] = np.zeros(1)
-    for name, _ in scene.all_thermal():
-        out[component_path("thermal", name) / "s"] = np.zeros(1)
+    for name, node in scene.all_thermal():
+        out |= {component_path("thermal", name) / state: np.zeros(1) for state in ("s", *["e"] * (node.pull > 0.0))}
     for prefix, part in _levels(scene):
         if _needs_environment(part):
             out[prefix / "environment" / "s"] = np.zeros(1)
@@ -219,6 +222,12 @@ class _Builder:
         self.junctions[path] = junction(quantity.entropy, exposed=node in self.demands.nodes)
         return str(path)
 
+    def lengthening(self, node: str) -> str:
+        """The junction of the lengthening of what expands with a thermal node."""
+        path = _at("lengthenings", node)
+        self.junctions[path] = junction(quantity.displacement)
+        return str(path)
+
     def drive(self, name: str, path: Path, of: Quantity) -> str:
         """The junction of a driven joint, exposed at the request of the level above."""
         self.junctions[path] = junction(of, exposed=name in self.demands.joints)
@@ -247,8 +256,10 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         ports = {"p1": b.momentum(j.body1), "p2": b.momentum(j.body2)}
         if j.heat != ENVIRONMENT:
             ports["s"] = b.entropy(j.heat)
-        driven = name in inner.joints
-        system = b.made.joint(j, driven=driven)
+        driven, expands = name in inner.joints, _expands(scene, j)
+        if expands:
+            ports["e"] = b.lengthening(j.heat)
+        system = b.made.joint(j, driven=driven, expands=expands)
         if driven:
             names = ("p_r",) if j.middle is None else ("p_r1", "p_r2")
             for port, (path, _) in zip(names, drive_ports(j), strict=True):
@@ -269,8 +280,8 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
             ports["s"] = b.entropy(c.heat)
         b.add(Path(["contacts", name]), contact(points, c.law, heat=c.heat != ENVIRONMENT), ports)
     for name, node in scene.thermal.items():
-        filling = components.thermal_node(node.capacity, node.temperature)
-        b.add(Path(["thermal", name]), filling, {"s": b.entropy(name)})
+        ports = {"s": b.entropy(name)} | ({"e": b.lengthening(name)} if node.pull else {})
+        b.add(Path(["thermal", name]), _storing(node), ports)
     for name, c in scene.conduction.items():
         ports = {"s1": b.entropy(c.between[0]), "s2": b.entropy(c.between[1])}
         b.add(Path(["conduction", name]), library.heat_transfer(h=c.conductance), ports)
@@ -293,6 +304,18 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
     if grounded and top:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
+
+
+def _expands(scene: Scene, joint: Joint) -> bool:
+    """Whether a joint is an element of a beam that expands with its heat."""
+    node = scene.thermal.get(joint.heat)
+    return joint.strain is not None and node is not None and node.pull > 0.0
+
+
+def _storing(node: ThermalNode) -> Storage:
+    if node.pull:
+        return thermoelastic(node.capacity, node.temperature, node.pull, node.reference)
+    return components.thermal_node(node.capacity, node.temperature)
 
 
 def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:

@@ -232,6 +232,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "beam elements": ("a multiple of the {segments} segments, at most {most}", "there is a node at every point"),
     "beam heat": ("no heat beside thermal, where each element warms itself", "take one of them out"),
     "rod radius": ("a radius, for the section is no circle and no tube", "say how thick the rod is where it touches"),
+    "rod expansion": ("0 for {rod}, which does not stretch", "take reissner"),
     "rod order": ("2 for {rod}", "elements of order 4 stretch and shear"),
     "rod strain": ("0 where {rod} takes no strain", "kirchhoff takes torsion and bending, a string takes none"),
     "string damping": ("0 for a string, which does not resist bending", "take kirchhoff"),

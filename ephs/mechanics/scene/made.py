@@ -9,7 +9,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.elements.beam import elastic
+from ephs.mechanics.elements.beam import beam_stretch, elastic
 from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
 from ephs.mechanics.scene.flexible import Strain
@@ -40,12 +40,12 @@ class Made:
             self.systems[key] = rigid_body(of.mass, of.inertia, gravity, strict=False)
         return self.systems[key]
 
-    def joint(self, of: Joint, *, driven: bool) -> System:
-        """A joint's system; ``driven`` exposes its momentum."""
+    def joint(self, of: Joint, *, driven: bool, expands: bool = False) -> System:
+        """A joint's system; ``driven`` exposes its momentum, ``expands`` the lengthening of a beam's element."""
         names = (each.name for each in fields(of) if each.name not in NOT_OF_SYSTEM)
-        key = driven, of.heat != ENVIRONMENT, *(_hashable(getattr(of, name)) for name in names)
+        key = driven, expands, of.heat != ENVIRONMENT, *(_hashable(getattr(of, name)) for name in names)
         if key not in self.systems:
-            self.systems[key] = _joint(of, driven=driven)
+            self.systems[key] = _joint(of, driven=driven, expands=expands)
         return self.systems[key]
 
 
@@ -55,14 +55,15 @@ def _hashable(value: Any) -> Hashable:
     return tuple(_hashable(getattr(value, each.name)) for each in fields(value)) if isinstance(value, Strain) else value
 
 
-def _joint(j: Joint, *, driven: bool) -> System:
+def _joint(j: Joint, *, driven: bool, expands: bool) -> System:
     heat = j.heat != ENVIRONMENT
     if j.middle is not None:
         return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
     if j.strain is not None:
         of = j.strain
         parts = elastic(of.length, of.stiffness, of.rest, of.damping, of.order)
-        return between_frames(j.frame1, j.frame2, *parts, heat=heat)
+        stretch = beam_stretch(float(of.length), tuple(of.rest.tolist())) if expands else None
+        return between_frames(j.frame1, j.frame2, *parts, heat=heat, stretch=stretch)
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
         limits=j.limits, stop=j.stop, dry=j.dry,

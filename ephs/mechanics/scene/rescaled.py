@@ -91,7 +91,10 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
         bodies={name: body(b) for name, b in scene.bodies.items()},
         joints={name: joint(j) for name, j in scene.joints.items()},
         springs={name: spring(s) for name, s in scene.springs.items()},
-        thermal={name: replace(n, capacity=n.capacity * energy) for name, n in scene.thermal.items()},
+        thermal={
+            name: replace(n, capacity=n.capacity * energy, pull=n.pull * energy / length)
+            for name, n in scene.thermal.items()
+        },
         conduction={
             name: replace(c, conductance=c.conductance * energy / time) for name, c in scene.conduction.items()
         },

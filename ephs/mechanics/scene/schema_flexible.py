@@ -41,6 +41,10 @@ class RodHeatEntry(Entry):
     capacity: Positive = Field(description="per length, J/(m K)")
     conduction: NonNegative = Field(default=0.0, description="conductivity times area, W m/K")
     temperature: Positive = Field(description="at t = 0, K")
+    expansion: NonNegative = Field(default=0.0, description="coefficient of linear thermal expansion, 1/K")
+    reference: Positive | None = Field(
+        default=None, description="temperature without thermal stress, K; default: temperature"
+    )
 
 
 class RodSurfaceEntry(ContactLawEntry):

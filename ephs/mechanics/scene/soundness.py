@@ -104,7 +104,7 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         numbers = {"stiffness": s.stiffness, "length": s.length, "damping": s.damping}
         yield name, {"at1": (s.at1, (3,)), "at2": (s.at2, (3,))} | {key: (x, ()) for key, x in numbers.items()}
     for name, node in scene.all_thermal():
-        yield name, {"capacity": (node.capacity, ()), "temperature": (node.temperature, ())}
+        yield name, {key: (getattr(node, key), ()) for key in ("capacity", "temperature", "pull", "reference")}
     for name, conduction in scene.all_conduction():
         yield name, {"conductance": (conduction.conductance, ())}
     for name, marker in scene.all_markers():

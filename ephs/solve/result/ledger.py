@@ -47,6 +47,8 @@ class Ledgers:
         Exergy of each storage in J, by path.
     temperature
         θ₀ of the reference environment, in K.
+    engines
+        Whether heat makes work: a storage has entropy beside other states.
     """
 
     kinetic: Array
@@ -68,6 +70,7 @@ class Ledgers:
     momenta: Mapping[Path, Array]
     exergies: Mapping[Path, Array]
     temperature: float
+    engines: bool = False
 
     @property
     def energy(self) -> Array:
@@ -95,13 +98,13 @@ class Ledgers:
     def defect(self, mechanical: bool) -> Array:
         """Relative defect of the energy balance since the first row, (n,); ``mechanical``: of K + V + heat − work, too.
 
-        That holds where no gas makes work of heat.
+        That holds where nothing makes work of heat.
         """
         if not self.heat.size:
             return np.zeros(0)
         work, heat = self.work - self.work[0], self.heat - self.heat[0]
         defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - work]
-        if mechanical and not self.volumes:
+        if mechanical and not self.volumes and not self.engines:
             defects.append(self._change(self.kinetic, self.potential) + heat - work)
         return np.max(np.abs(defects), axis=0) / self.scale
 
@@ -121,6 +124,7 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
     entropies: dict[Path, Array] = {}
     amounts: dict[str, dict[Path, Array]] = {"entropy": entropies, "volume": {}, "momentum": {}}
     exergies: dict[Path, Array] = {}
+    engines = False
     for number, slot in enumerate(problem.descriptor.components):
         primitive = slot.primitive
         if isinstance(primitive, Irreversible):
@@ -148,8 +152,9 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
         energy = storages[slot.path] = record.energies[:, number]
         exergies[slot.path] = energy if exchanged is None else energy - exchanged
         exergy = exergy + exergies[slot.path]
-        if any({ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads):
-            thermal = thermal + energy
+        charged = [{ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads]
+        if any(charged):
+            thermal, engines = thermal + energy, engines or len(charged) > 1
         elif any(state.quantity.parity < 0 for state in slot.reads):
             kinetic = kinetic + energy
         else:
@@ -158,4 +163,5 @@ def ledgers(problem: Problem, record: Record) -> Ledgers:
     return Ledgers(
         kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
         storages, makers, workers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
+        engines,
     )  # fmt: skip

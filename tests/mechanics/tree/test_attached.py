@@ -9,7 +9,7 @@ import ephs
 from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics import joint, rigid_body
+from ephs.mechanics import beam_element, joint, rigid_body, thermoelastic
 from ephs.mechanics.elements import components
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.equations.tangent import Linearised
@@ -88,19 +88,38 @@ def test_a_gas_spring_and_hot_oil_on_a_slider_crank_do_as_equations_by_hand_say(
 # ---- derivatives ----------------------------------------------------------------------------------------------------
 
 
-def test_derivatives_of_what_is_attached_are_those_of_the_equations():
-    eq = equations_of(*motor())
+def warm_beam():
+    """A body between two elements that expand, which close a loop over the ground."""
+    beam = beam_element(length=0.5, stiffness=[2.0, 3.0, 4.0, 50.0, 40.0, 30.0], damping=0.1, heat=True, expands=True)
+    far = beam_element(frame2=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], length=0.5, stiffness=np.arange(1.0, 7.0), order=4,
+                       rest=[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], heat=True, expands=True)  # fmt: skip
+    body, momentum = rigid_body(1.0, [0.3, 0.4, 0.5]), junction(Q.body_momentum)
+    boxes = {"ground": {"p": "g"}, "body": {"p": "p"}, "wall": {"s1": "s1", "s2": "s2"}}
+    boxes |= {"first": {"p1": "g", "p2": "p", "e": "e1", "s": "s1"}, "one": {"e": "e1", "s": "s1"}}
+    boxes |= {"second": {"p1": "p", "p2": "g", "e": "e2", "s": "s2"}, "two": {"e": "e2", "s": "s2"}}
+    store = thermoelastic(capacity=5.0, temperature=310.0, pull=0.4, reference=300.0)
+    fillings = {"ground": components.ground(), "body": body, "wall": lib.heat_transfer(h=2.0), "first": beam,
+                "second": far, "one": store, "two": store}  # fmt: skip
+    junctions = {"g": momentum, "p": momentum, "e1": junction(Q.displacement), "e2": junction(Q.displacement)}
+    junctions |= {"s1": junction(Q.entropy), "s2": junction(Q.entropy)}
+    return ephs.System.of(Pattern(junctions=junctions, boxes=boxes), fillings), {"body.pe.q": [1, 0, 0, 0, 0.5, 0, 0]}
+
+
+@pytest.mark.parametrize("machine", [motor, warm_beam])
+def test_derivatives_of_what_is_attached_are_those_of_the_equations(machine):
+    eq = equations_of(*machine())
     state = eq.start(0.0)
     linear, rng = Linearised(eq), np.random.default_rng(3)
     r, s = rng.standard_normal(eq.n), eq.heats.entropies(state.heats) + 0.1 * rng.standard_normal(eq.ns)
-    r = eq.closed(type(state)(0.0, state.q, r, state.heats, state.totals)).r
+    bent = eq.moved(state.q, 0.2 * rng.standard_normal(eq.n))
+    q, r = (at := eq.closed(type(state)(0.0, bent, r, state.heats, state.totals))).q, at.r
 
     def rates(z):
         v, r, s = np.split(z, [eq.nv, eq.nv + eq.n])
-        linear.forward(eq.advance(state.q, v), r, s)
+        linear.forward(eq.advance(q, v), r, s)
         return np.concatenate([eq.dense.rate, linear.cut_rates, linear.entropy_rates])
 
-    linear.forward(state.q, r, s)
+    linear.forward(q, r, s)
     exact, middle = linear.columns(solve=True, fit=False), np.concatenate([np.zeros(eq.nv), r, s])
     for j, column in enumerate(exact.T):
         step = 1e-5 * np.eye(middle.size)[j]
@@ -108,8 +127,9 @@ def test_derivatives_of_what_is_attached_are_those_of_the_equations():
         assert np.allclose(column, near, rtol=0.0, atol=1e-5 * max(1.0, np.abs(near).max()))
 
 
-def test_both_evaluations_are_one():
-    eq = equations_of(*motor())
+@pytest.mark.parametrize("machine", [motor, warm_beam])
+def test_both_evaluations_are_one(machine):
+    eq = equations_of(*machine())
     state = eq.start(0.0)
     y = eq.vector(state)
     fast, slow = eq.rates(0.0, state.q, y), np.zeros(eq.size)

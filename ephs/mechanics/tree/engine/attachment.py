@@ -43,15 +43,16 @@ def attachment_of(reduced: "Reduced", address: Index) -> Attachment:
     size, nodes = net.skew.shape[0], len(reduced.entropies) - len(net.states)
     rows: list[tuple[Index, Array]] = []
     places: list[int] = []
-    called, reads, kept = list[list[int]](), list[int](), 0
+    called, reads, varies, kept = list[list[int]](), list[int](), list[int](), 0
     stores: list[list[int]] = []
     for component, first in net.storages:
         n = int(t.dims[component, 0])
         stores.append([*_head(reduced, address, component), first, net.state_at + first, kept])
         kept += n * n
-    for one, read, flows in zip(net.attached, there.reads, there.flows, strict=True):
-        called.append([*_head(reduced, address, one.component), len(rows), len(reads), kept])
+    for one, read, vary, flows in zip(net.attached, there.reads, there.varies, there.flows, strict=True):
+        called.append([*_head(reduced, address, one.component), len(rows), len(reads), len(varies), kept])
         reads += read.tolist()
+        varies += vary.tolist()
         n, k, nv, _ = t.dims[one.component].tolist()
         kept += (n + k) * (n + k + nv)
         made = {effort: int(flow) for (effort, _), flow in zip(one.heated, flows, strict=True)}
@@ -68,14 +69,15 @@ def attachment_of(reduced: "Reduced", address: Index) -> Attachment:
         "head": [len(net.rates), len(net.nodes), len(net.inputs), len(net.states), net.unknown, nodes, named],
         "store": stores, "called": called,
         "row": [[at[i], where.size, place] for i, ((where, _), place) in enumerate(zip(rows, places, strict=True))],
-        "term": [place for where, _ in rows for place in where], "read": reads, "bent": there.bent,
+        "term": [place for where, _ in rows for place in where], "read": reads, "vary": varies,
+        "bent": there.bent,
         "temperature": net.nodes, "pivot": [0] * net.unknown, "fault": [0],
     }  # fmt: skip
     integers = {name: np.array(values, dtype=np.int64).ravel() for name, values in lists.items()}
     sizes = {
         "effort": size, "flow": size, "gross": size, "kept": kept, "x": nx + 8, "v": max(nv, 6) + 1, "e": n + k + 1,
         "f": n * n + n + k + 8, "work": 4096, "matrix": net.unknown**2, "step": net.unknown, "turned": size,
-        "changed": size, "moved": len(reads), "power": 2,
+        "changed": size, "moved": len(varies), "power": 2,
     }  # fmt: skip
     reals = {"weight": np.concatenate([by for _, by in rows]) if rows else np.zeros(0)}
     reals |= {name: np.zeros(count) for name, count in sizes.items()} | {"outer": there.outer}

@@ -23,7 +23,7 @@ class Attached:
         Whether there is one.
     tie, tied
         As `ephs.mechanics.tree.sweeps.residuals` reads them: rates, temperatures, prescribed efforts and states, then
-        elements of joints.
+        increments of joints.
     """
 
     def __init__(self, reduced: Reduced, scal: Array, supply: Array) -> None:
@@ -34,7 +34,7 @@ class Attached:
             *((1, place) for place in net.nodes),
             *((2, 0) for _ in net.inputs),
             *((3, nodes + k) for k in range(len(net.states))),
-            *((4, place) for place in there.bent[:, 0].tolist()),
+            *((4, freedom) for freedom in there.bent.tolist()),
         ]
         self.there = bool(net.skew.size)
         self.tie = np.array(places, dtype=np.int64).ravel()
@@ -44,7 +44,7 @@ class Attached:
             attachment_of(reduced, reduced.tables.address),
             float(scal[1]),
         )
-        self._ports, self._nodes, self._states, self._bent = there.ports, list(net.nodes), nodes, there.bent[:, 0]
+        self._ports, self._nodes, self._states = there.ports, list(net.nodes), nodes
         self._slopes = np.zeros((net.known, len(places)))
         self._first = net.state_at
         self._q, self._s = np.zeros(reduced.coordinates), np.zeros(len(reduced.entropies))
@@ -66,7 +66,7 @@ class Attached:
 
     def about(self, q: Array, rates: Array, s: Array, warmth: Array, laws: Laws) -> tuple[int, int]:
         """Evaluate all of it; what it makes goes to the laws; (status, component)."""
-        known, _ = self._count
+        known, bent = self._count
         effort, flow = self._net.part("effort"), self._net.part("flow")
         effort[: self._ports.size] = rates[self._ports]
         self._q[:], self._s[:], self._warmth[:], self._made[:] = q, s, warmth, 0.0
@@ -75,7 +75,7 @@ class Attached:
             return status, int(self._net.whole("fault")[0])
         laws.made[:] += self._made
         self.tied[:known, 0], self.tied[:known, 2:] = flow[:known], self._slopes
-        point = [rates[self._ports], warmth[self._nodes], np.zeros(known), s[self._states :], q[self._bent]]
+        point = [rates[self._ports], warmth[self._nodes], np.zeros(known), s[self._states :], np.zeros(bent)]
         point[2] = point[2][: known - sum(part.size for part in point[:2]) - point[3].size]
         self.tied[:, 1] = np.concatenate(point)
         first = self._ports.size

@@ -43,12 +43,13 @@ class Attaching:
     ----------
     ports
         (rates,) degrees of freedom of joints.
-    reads
-        Of each component that is called: places in s of the states that it reads; −1 − place of a joint's element.
+    reads, varies
+        Of each component that is called: places in s of the states that it reads, −1 − place of a joint's element; and
+        of what changes them, −1 − degree of freedom of a joint.
     flows
         Of each component that is called: the places of the entropies that its ports make.
     bent
-        (elements that are read, 2): their places, and those of their freedoms.
+        Degrees of freedom of the joints that are read.
     edges
         First degrees of freedom of the joints at which something is attached.
     outer
@@ -60,6 +61,7 @@ class Attaching:
     network: Network
     ports: Index
     reads: tuple[Index, ...]
+    varies: tuple[Index, ...]
     flows: tuple[Index, ...]
     bent: Index
     edges: frozenset[int]
@@ -104,20 +106,22 @@ def attaching_of(
     """
     network, moving = parts.network, [i for i in range(len(edges)) if tables.kind[i] != SPRING]
     at = {id(edges[i]): int(tables.r_at[i]) for i in moving}
-    known = {path: k for k, path in enumerate(stored)}
-    freedom: dict[int, int] = {}
+    known = {path: ([k], [k]) for k, path in enumerate(stored)}
     for i in moving:
         edge = edges[i]
-        if edge.path is not None and edge.state is not None and (edge.pair.code, edge.pair.dim) == (VECTOR, 1):
-            known[edge.state] = -1 - int(tables.q_at[i])
-            freedom[int(tables.q_at[i])] = int(tables.r_at[i])
-    reads: list[Index] = []
+        if edge.path is not None and edge.state is not None:
+            q, r = int(tables.q_at[i]), int(tables.r_at[i])
+            known[edge.state] = (
+                [-1 - place for place in range(q, q + edge.pair.size)],
+                [-1 - freedom for freedom in range(r, r + edge.pair.dim)],
+            )
+    reads, varies = list[Index](), list[Index]()
     for one in network.attached:
         for path in one.reads:
             if path not in known:
-                reason = f"reads {path}, which is neither attached nor the single coordinate of a joint"
-                raise Unplaced(components[one.component].path, reason)
-        reads.append(np.array([known[path] for path in one.reads], dtype=np.int64))
+                raise Unplaced(components[one.component].path, f"reads {path}, which is neither attached nor a joint's")
+        for k, out in enumerate((reads, varies)):
+            out.append(np.array([place for path in one.reads for place in known[path][k]], dtype=np.int64))
     number = {id(edge): i for i, edge in enumerate(edges)}
     ties: list[Gear] = []
     for tie in network.ties:
@@ -126,13 +130,14 @@ def attaching_of(
         if any(parts.attached[junction].pair.code != VECTOR for junction, _, _ in terms):
             raise Unplaced(path, "ties the rate of a joint whose degrees of freedom do not commute")
         ties.append(Gear(path, tuple((number[id(parts.attached[at])], k, ratio) for at, k, ratio in terms)))
-    bent = sorted({-1 - int(read) for places in reads for read in places if read < 0})
+    bent = sorted({-1 - int(place) for places in varies for place in places if place < 0})
     return Attaching(
         network,
         np.array([at[id(parts.attached[junction])] + k for junction, k in network.rates], dtype=np.int64),
         tuple(reads),
+        tuple(varies),
         flows,
-        np.array([[place, freedom[place]] for place in bent], dtype=np.int64).reshape(-1, 2),
+        np.array(bent, dtype=np.int64),
         frozenset(at[id(edge)] for edge in parts.attached.values()),
         _outer(components, network, reference),
         tuple(ties),

@@ -153,7 +153,7 @@ def _still(on: Evaluator, net: Net) -> None:
 def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
     """Write the derivatives (known, known + bent) of flows, where `solve` has been; return a status.
 
-    By rates, temperatures, prescribed efforts and states, then by elements of joints that components read.
+    By rates, temperatures, prescribed efforts and states, then by degrees of freedom of joints that are read.
     """
     known, unknown, status = net.known, net.head[4], on.counter(0)
     on.when(unknown > 0, lambda: _factorise(on, net, status))
@@ -163,7 +163,7 @@ def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
         at = k - net.first_state
         on.when(at < 0, lambda: _put(net.turned, k, 1.0))
         on.when(on.both(at >= 0, k < known), lambda: _by_state(on, net, at))
-        on.when(k >= known, lambda: _by_read(on, net, -1 - net.bent[2 * on.select(k < known, 0, k - known)]))
+        on.when(k >= known, lambda: _by_read(on, net, -1 - net.bent[on.select(k < known, 0, k - known)]))
         net.tangent(on)
 
         def follow() -> None:
@@ -188,9 +188,9 @@ def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
 
 def _by_read(on: Evaluator, net: Net, place: Integer) -> None:
     def one(j: Integer) -> None:
-        on.when(on.same(net.read[j], place), lambda: _put(net.moved, j, 1.0))
+        on.when(on.same(net.vary[j], place), lambda: _put(net.moved, j, 1.0))
 
-    on.loop(net.read.size, one)
+    on.loop(net.vary.size, one)
 
 
 def _by_state(on: Evaluator, net: Net, at: Integer) -> None:

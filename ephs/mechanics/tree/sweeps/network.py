@@ -49,8 +49,8 @@ class Called(Record):
     ----------
     entry
         Its first row among the rows of N: efforts, then multipliers.
-    read
-        Its first place in the list of what is read.
+    read, vary
+        Its first places in the lists of what is read, and of what changes it.
     kept
         Where its derivatives are kept.
     """
@@ -61,10 +61,11 @@ class Called(Record):
     component = integer()
     entry = integer()
     read = integer()
+    vary = integer()
     kept = integer()
 
 
-INTEGERS: Final = ("head", "store", "called", "row", "term", "read", "bent", "temperature", "pivot", "fault")
+INTEGERS: Final = ("head", "store", "called", "row", "term", "read", "vary", "bent", "temperature", "pivot", "fault")
 REALS: Final = (
     "weight", "effort", "flow", "gross", "kept", "x", "v", "e", "f", "work", "matrix", "step", "turned",
     "changed", "moved", "power", "outer",
@@ -89,8 +90,10 @@ class Net:
         Places in z, and factors.
     read
         Places in s of what components read; −1 − place of elements of joints.
+    vary
+        Places in s of what components read; −1 − degree of freedom of joints that they read.
     bent
-        (elements of joints that are read, 2): their places, and those of their freedoms.
+        Degrees of freedom of the joints that are read.
     temperature
         (temperatures,) entropies whose they are.
     given
@@ -104,7 +107,7 @@ class Net:
     matrix, pivot, step
         Of what is unknown.
     turned, changed, moved
-        (z,), (z,) and (reads,): changes of efforts, of flows, and of what is read.
+        (z,), (z,) and (vary,): changes of efforts, of flows, and of what is read.
     power
         (2,): what is given, in W; what is stored, in J.
     outer
@@ -120,6 +123,7 @@ class Net:
     term: Integers
     weight: Vector
     read: Integers
+    vary: Integers
     bent: Integers
     temperature: Integers
     given: Vector
@@ -351,7 +355,7 @@ class Net:
                     total.value = total.value + self.kept[first + k] * self.e[k]
 
                 def by_state(k: Integer) -> None:
-                    total.value = total.value + 2.0 * self.kept[first + (rows + k)] * self.moved[it.read + k]
+                    total.value = total.value + 2.0 * self.kept[first + (rows + k)] * self.moved[it.vary + k]
 
                 on.loop(rows, by_effort)
                 on.loop(reads, by_state)

@@ -198,8 +198,8 @@ class Residuals:
         def acted(
             on: Evaluator, tree: Tree, closing: Closures, acting: Edges, body: Integers, body_frame: Matrix,
             warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix, q: Vector, r: Vector,
-            s: Vector, drive: Vector, wrench: Matrix, warmth: Vector, beyond: Vector, pulls: Vector, force: Vector,
-            heat: Vector, cut: Vector,
+            v: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector, beyond: Vector, pulls: Vector,
+            force: Vector, heat: Vector, cut: Vector,
         ) -> None:  # fmt: skip
             """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ; cut: rates."""
             on.loop(force.size, lambda k: _put(force, k))
@@ -228,7 +228,7 @@ class Residuals:
 
             on.loop(warmth.size, warm)
             on.loop(body.size, push)
-            _attach(on, tie, tied, (q, r, cut, s, warmth, drive), beyond, pulls, heat)
+            _attach(on, tie, tied, (v, r, cut, s, warmth, drive), beyond, pulls, heat)
             acting.act(on, tree, q, r, warmth, pulls, force, heat)
             on.loop(flow.rows, pass_on)
 
@@ -252,7 +252,7 @@ class Residuals:
             closing.along(on, rates, out.part(n + m + c, c), n)
             acted(
                 on, tree, closing, edges(edge, edge_numbers, law, places), body, body_frame, warming, passage, flow,
-                tie, tied, q, r, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
+                tie, tied, q, r, v, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
             )  # fmt: skip
             closing.push(on, tree, multiplier)
             needed_forces(on, tree, q, force)
@@ -285,7 +285,7 @@ class Residuals:
             closing.along(on, rates, out.part(2 * n + c, c), n)
             acted(
                 on, tree, closing, edges(edge, edge_numbers, law, places), body, body_frame, warming, passage, flow,
-                tie, tied, q, r, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
+                tie, tied, q, r, v, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
             )  # fmt: skip
             action(on, tree, q, r, momentum, force)
 
@@ -312,15 +312,15 @@ def _attach(
     Parameters
     ----------
     tie
-        (ties, 2): what each depends on, a rate, a temperature, nothing that changes, a state, an element; its place.
+        (ties, 2): what each depends on, a rate, a temperature, nothing that changes, a state, an increment; its place.
     tied
         (ties, 2 + ties): the flow about a point, what it depended on there, its derivatives.
     point
-        Elements, rates of the tree and of cut joints, states, temperatures, forces that are given.
+        Increments from the point, rates of the tree and of cut joints, states, temperatures, forces that are given.
     beyond
         Memory: by how much what they depend on is off the point.
     """
-    q, r, cut, s, warmth, drive = point
+    v, r, cut, s, warmth, drive = point
 
     def start(j: Integer) -> None:
         pulls[j] = drive[j]
@@ -342,7 +342,7 @@ def _attach(
         def still(_: Integer) -> None:
             beyond[k] = 0.0
 
-        visit(k, rate, lambda j: off(warmth[j]), still, lambda j: off(s[j]), lambda j: off(q[j]))
+        visit(k, rate, lambda j: off(warmth[j]), still, lambda j: off(s[j]), lambda j: off(v[j]))
 
     def leave(k: Integer) -> None:
         flow = on.variable(tied[k, 0])
