@@ -191,6 +191,7 @@ def beam_stretch(length: float, rest: tuple[float, ...]) -> Reversible:
         ports,
         structure,
         parameters=(("length", length), ("rest", rest)),
+        notation=notation.lengthening,
         proof=lambda: proved(
             "L = [[0, w], [−wᵀ, 0]], w even in q_r, which reads q and −q alike", *STATEMENTS["reversible"]
         ),

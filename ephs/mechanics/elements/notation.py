@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # SymPy is loaded when equations are asked for
     from ephs.semantics.symbols.voices import Voice
 
-__all__ = ["frame_change", "friction", "holonomic", "idle", "kinetic", "lie_poisson", "nothing"]
+__all__ = ["frame_change", "friction", "holonomic", "idle", "kinetic", "lengthening", "lie_poisson", "nothing"]
 
 Relations = tuple[dict[str, Any], tuple[Any, ...]]
 
@@ -52,6 +52,12 @@ def holonomic(w: "Voice") -> Relations:
     }
     carried = w.operator("Ad", relative) * w.e["p_j1"]
     return flows, (carried - w.e["p_j2"] + w.operator("include", w.label) * w.e["p_r"],)
+
+
+def lengthening(w: "Voice") -> Relations:
+    """p_r.f = w* e.e, e.f = −w p_r.e, with the row w of `ephs.mechanics.elements.strain.stretching` at q_r."""
+    flows = {"p_r": w.operator("lengthen*", w.label) * w.e["e"], "e": -w.operator("lengthen", w.label) * w.e["p_r"]}
+    return flows, ()
 
 
 def friction(w: "Voice") -> Relations:
