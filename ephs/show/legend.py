@@ -28,6 +28,7 @@ SYMBOLS: Mapping[str, str] = MappingProxyType(
         "hc": "holonomic constraint",
         "o": "offset from the centre of mass to the joint",
         "mf": "mechanical friction",
+        "st": "stretch, the lengthening that a rate makes",
         "tc": "thermal capacity",
         "ht": "heat transfer",
         "env": "environment",
