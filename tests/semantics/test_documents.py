@@ -167,8 +167,13 @@ MECHANICS = [
     rigid_body(2.0, [0.1, 0.2, 0.25], gravity=[0, 0, 0], group="SO3xR3"),
     spring_damper([0, 0, 0], [0, 0, 1.0], 3.0, 1.0, 0.2),
     beam_element(
-        length=2.0, stiffness=[5.0, 4.0, 6.0, 1e2, 8e1, 9e1], rest=[0.1, 0.0, 0.2, 1.0, 0.0, 0.1], damping=0.1
+        length=2.0,
+        stiffness=[5.0, 4.0, 6.0, 1e2, 8e1, 9e1],
+        rest=[0.1, 0.0, 0.2, 1.0, 0.0, 0.1],
+        damping=0.1,
+        expands=True,
     ),
+    alone(ephs.mechanics.thermoelastic(capacity=3.0, temperature=310.0, pull=0.4, reference=300.0)),
     stabilised(mbs_pattern()(body1=ROUND, body2=ROUND, joint=joint("revolute"))),
     alone(ephs.mechanics.elements.components.ground()),
     alone(ephs.mechanics.elements.components.thermal_node(3.0, 300.0)),
