@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.operad import Path, quantity
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.derive.relations import compiled
 from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.kept import once
 from ephs.semantics.kernel_table import Callback
@@ -102,6 +103,16 @@ class Model:
             "kind", "address", "dims", "parameter_at", "e_at", "multiplier_at", "read_x_at", "read_w_at", "jacobian_at"
         )  # fmt: skip
         return replace(self, tables=replace(t, **{key: getattr(t, key)[chosen] for key in keys}))
+
+    def resting(self, chosen: Index) -> Index:
+        """(components,) addresses; those of the chosen ones are of relations at rest, without derivatives, where they
+        are compiled."""
+        n, found = self.descriptor.numbering, self.tables.address.copy()
+        for number in np.unique(n.primitive[chosen]).tolist():
+            kernel = n.primitives[number].kernel
+            if kernel is not None:
+                found[chosen[n.primitive[chosen] == number]] = compiled(kernel.relation, rest=True).address
+        return found
 
     def path_of(self, component: int) -> Path:
         """The path of a component by its number."""

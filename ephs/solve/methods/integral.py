@@ -6,6 +6,7 @@ are called. Both are compiled, several stages a call.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 from typing import Any, final
@@ -209,7 +210,8 @@ class Integral:
         self._owner[t.read_w[spans(t.read_w_at[stored], t.dims[stored, 2])]] = np.repeat(stored, t.dims[stored, 2])
         kinds = t.kind == STORING
         self._calls = [np.flatnonzero(~constant & chosen) for chosen in (kinds, ~kinds)]
-        self._tables = parts_of(t), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
+        resting = replace(t, address=model.resting(np.concatenate(self._calls)))
+        self._tables = parts_of(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
         self._bound: dict[int, Any] = {}
         self._sums, self._given = np.zeros(4 + t.kind.size), model.input_values()
         self._account = natural_program().compiled()["account"].bind(

@@ -5,13 +5,11 @@ equations g(x, ẋ, e, λ) = 0: the unknowns of a stage are its rates, efforts a
 nor a choice of causality is needed, and what is algebraic in them is met at the end of the step, which is a stage.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
-from scipy.sparse.linalg import splu
 
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -21,6 +19,7 @@ from ephs.solve.methods.continuous import Continuous, Matrices
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
+from ephs.solve.methods.solvers import Solver, Solvers
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.result.record import Record, record_of
@@ -34,9 +33,9 @@ PROBE = 1e-7
 
 _S6 = 6.0**0.5
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
-DENSE = 48
-"""Unknowns up to which factorising without regard to zeros is faster."""
 ITERATIONS = 10
+ROUNDING = 10.0 * np.finfo(float).eps
+"""Part of the terms of an equation by which rounding changes their sum."""
 FARTHEST = 2.0
 """Extrapolation, in lengths of the former step, beyond which the last value is the better guess."""
 
@@ -124,7 +123,8 @@ class Radau:
         self._rates = int(self.model.tables.counts[0])
         self._makers = self.model.tables.kind == IRREVERSIBLE
         self._matrices: Matrices | None = None
-        self._solvers: tuple[float, Any, Any] | None = None
+        self._family = Solvers(self.model.unknown_name, self.equations.pivots)
+        self._solvers: tuple[float, Solver, Solver] | None = None
         self._current: RadauState | None = None
         self._last: tuple[RadauState, Array, Array] | None = None
 
@@ -295,14 +295,13 @@ class Radau:
         self._current = state
         self._solvers = None
 
-    def _solve(self, h: float) -> tuple[Any, Any]:
+    def _solve(self, h: float) -> tuple[Solver, Solver]:
         """Solvers with ∂g/∂z + h·μ·∂g/∂x for the real and the complex eigenvalue μ."""
         if self._solvers is None or self._solvers[0] != h:
             m = self._matrices
             assert m is not None
             shifts = h * GAMMA, h * complex(VALUES[1])
-            name, pivots = self.model.unknown_name, self.equations.pivots
-            real, rest = (_solver(m.unknowns + shift * m.states, name, pivots) for shift in shifts)
+            real, rest = (self._family.of(m.unknowns + shift * m.states) for shift in shifts)
             self._solvers = h, real, rest
             self.factorisations += 1
         return self._solvers[1], self._solvers[2]
@@ -325,14 +324,27 @@ class Radau:
             moved = float(np.max(parts, initial=0.0))
             if not np.isfinite(moved):
                 break
-            # Rounding stops the iteration where the tolerances are beyond it.
-            if moved <= 1e-3 or (iteration > 2 and moved > 0.3 * before and moved <= 1e-1):
+            stalls = iteration > 2 and moved > 0.3 * before
+            if moved <= 1e-3 or (stalls and (moved <= 1e-1 or self._rounded(state, h, stages, change))):
                 return stages, iteration
             if iteration > 2 and moved > 2.0 * before:
                 break
             before = moved
         entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
         raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
+
+    def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
+        """Whether rounding, of the equations' terms and of the states' sums, alone changes the stages' rates so much.
+
+        A factor of 10 covers what the signs of the terms may cancel here.
+        """
+        m, real = self._matrices, self._solve(h)[0]
+        assert m is not None
+        rates, largest = self._rates, np.abs(stages).max(axis=0)
+        summed = np.abs(state.x) + abs(h) * np.abs(COEFFICIENTS[-1]).sum() * largest[:rates]
+        terms = abs(m.unknowns) @ largest + abs(m.states)[:, :rates] @ summed
+        allowed = ROUNDING * np.abs(real(terms)[:rates])
+        return bool(np.all(np.abs(change[:, :rates]) <= allowed))
 
     def _path(self, entry: int) -> str:
         """The state that an entry of x belongs to."""
@@ -354,17 +366,3 @@ class Radau:
     def _size(self, difference: Array, x: Array) -> float:
         """Largest entry relative to its tolerance."""
         return float(np.max(np.abs(difference) / (self.atol + self.rtol * np.abs(x)), initial=0.0))
-
-
-def _solver(matrix: Any, name: Callable[[int], str], pivots: Mapping[str, Any]) -> Callable[[Array], Array]:
-    if matrix.shape[0] <= DENSE:
-        whole = matrix.toarray()
-        factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
-        factors, pivots, info = factorise(whole, overwrite_a=True)
-        if info > 0 or not np.isfinite(factors).all():
-            raise SolveError(Outcome.SINGULAR, "", name(info - 1) if info > 0 else "")
-        return lambda right: solve(factors, pivots, right)[0]
-    try:
-        return splu(matrix.tocsc(), **pivots).solve
-    except RuntimeError as error:  # SuperLU's message for a singular matrix
-        raise SolveError(Outcome.SINGULAR, "", "") from error

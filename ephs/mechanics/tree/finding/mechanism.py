@@ -1,6 +1,5 @@
 """From a flat system to the tables of its reduced form: a spanning tree of joints, the rest cut."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
 
@@ -17,8 +16,6 @@ from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ABOVE, BEYOND, Node
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.derive.relations import compiled
-from ephs.semantics.descriptor import ComponentSlot
 from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.stage import Table
@@ -236,6 +233,7 @@ def _tables(
     for called, mine in zip(parts.network.attached, flows, strict=True):
         sinks += [[int(flow), taken, int(mine[0])] for flow, (_, taken) in zip(mine, called.heated, strict=True)]
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
+    acting = np.unique([*spring, *friction, *_called(parts.network)])
     return Mechanism(
         parent=np.array(parents, dtype=np.int64),
         inertia=np.array([parts.links[body].inertia for body in order]).reshape(links, 6, 6),
@@ -270,7 +268,7 @@ def _tables(
         conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
         sink=np.array(sinks, dtype=np.int64).reshape(-1, 3),
         address=t.address,
-        resting=_resting(components, t.address, np.unique([*spring, *friction, *_called(parts.network)])),
+        resting=model.resting(acting[acting >= 0]),
         dims=t.dims,
         parameters=t.parameters,
         parameter_at=t.parameter_at,
@@ -282,16 +280,6 @@ def _called(network: Network) -> list[int]:
     """Components whose derivatives the network's flows do not need."""
     every = [number for number, _ in network.storages] + [one.component for one in network.attached]
     return [] if network.unknown else every
-
-
-def _resting(components: Sequence[ComponentSlot], address: Index, acting: Index) -> Index:
-    """Addresses, of what acts those of its relation at rest, where it is not called back in Python."""
-    found = address.copy()
-    for number in acting[acting >= 0].tolist():
-        kernel = components[number].primitive.kernel
-        if kernel is not None:
-            found[number] = compiled(kernel.relation, rest=True).address
-    return found
 
 
 def _support(model: Model, parts: list[int]) -> tuple[int, float]:

@@ -1,0 +1,119 @@
+"""Solutions of the linear systems of implicit steps: dense, banded, or sparse, by the pattern of the matrix.
+
+Chains, ladders and rods have narrow bands once their unknowns are ordered along them (reverse Cuthill–McKee); there
+LAPACK's banded factorisation takes a quarter of the time of SuperLU's, which plane grids and what is wider are left to.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias, final
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs
+from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.numbering import Index
+from ephs.solve.errors import Outcome, SolveError
+
+__all__ = ["Solver", "Solvers"]
+
+DENSE = 48
+"""Unknowns up to which factorising without regard to zeros is faster."""
+NARROW = 16
+"""Diagonals beside the main one, both sides together, up to which a band is faster than SuperLU."""
+
+Solver: TypeAlias = Callable[[Array], Array]
+
+
+@final
+class _Band:
+    """Order of unknowns, and how many diagonals below and above the main one it leaves."""
+
+    __slots__ = ("_indices", "_starts", "above", "below", "order", "place")
+
+    def __init__(self, matrix: csc_array) -> None:
+        self._starts, self._indices = matrix.indptr, matrix.indices
+        self.order: Index = reverse_cuthill_mckee(csr_array(matrix), symmetric_mode=False)
+        self.place = np.empty(self.order.size, dtype=np.int64)
+        self.place[self.order] = np.arange(self.order.size)
+        found = coo_array(matrix)
+        apart = self.place[found.row] - self.place[found.col]
+        self.below, self.above = int(apart.max(initial=0)), int(-apart.min(initial=0))
+
+    @property
+    def narrow(self) -> bool:
+        """Whether a banded factorisation pays."""
+        return self.below + self.above <= NARROW
+
+    def orders(self, matrix: csc_array) -> bool:
+        """Whether a matrix has the pattern that the order was made for."""
+        return np.array_equal(self._starts, matrix.indptr) and np.array_equal(self._indices, matrix.indices)
+
+    def solver(self, matrix: csc_array, fail: Callable[[int], SolveError]) -> Solver:
+        """The factorised matrix."""
+        found, below, above = coo_array(matrix), self.below, self.above
+        row, column = self.place[found.row], self.place[found.col]
+        band = np.zeros((2 * below + above + 1, self.order.size), dtype=matrix.dtype, order="F")
+        band[below + above + row - column, column] = found.data
+        factorise, solve = get_lapack_funcs(("gbtrf", "gbtrs"), (band,))
+        factors, pivots, info = factorise(band, below, above, overwrite_ab=True)
+        if info > 0 or not np.isfinite(factors).all():
+            raise fail(int(self.order[info - 1]) if info > 0 else -1)
+
+        def solved(right: Array) -> Array:
+            out = np.empty_like(right, dtype=band.dtype)
+            out[self.order] = solve(factors, below, above, right[self.order], pivots)[0]
+            return out
+
+        return solved
+
+
+@final
+class Solvers:
+    """Solvers of one family of matrices; the order of a band is found once for each pattern.
+
+    Parameters
+    ----------
+    name
+        Of an unknown by its number, for messages.
+    pivots
+        How SuperLU is to choose pivots, options of `scipy.sparse.linalg.splu`.
+    """
+
+    __slots__ = ("_band", "_name", "_pivots")
+
+    def __init__(self, name: Callable[[int], str], pivots: Mapping[str, Any]) -> None:
+        self._name, self._pivots = name, pivots
+        self._band: _Band | None = None
+
+    def of(self, matrix: csc_array) -> Solver:
+        """Solve with a matrix, factorised once.
+
+        Raises
+        ------
+        SolveError
+            The matrix is singular, or holds numbers that are not finite.
+        """
+        rows = matrix.indptr.size - 1
+        if rows <= DENSE:
+            return self._dense(matrix.toarray())
+        if self._band is None or not self._band.orders(matrix):
+            self._band = _Band(matrix)
+        if self._band.narrow:
+            return self._band.solver(matrix, self._singular)
+        try:
+            return splu(matrix, **self._pivots).solve
+        except RuntimeError as error:  # SuperLU's message for a singular matrix
+            raise self._singular(-1) from error
+
+    def _dense(self, whole: Array) -> Solver:
+        factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
+        factors, pivots, info = factorise(whole, overwrite_a=True)
+        if info > 0 or not np.isfinite(factors).all():
+            raise self._singular(info - 1)
+        return lambda right: solve(factors, pivots, right)[0]
+
+    def _singular(self, unknown: int) -> SolveError:
+        return SolveError(Outcome.SINGULAR, "", self._name(unknown) if unknown >= 0 else "")

@@ -1,0 +1,83 @@
+"""Linear systems of implicit steps: one solution whatever the shape; singular ones are refused by name."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csc_array
+
+from ephs.solve.errors import SolveError
+from ephs.solve.methods import solvers
+from ephs.solve.methods.solvers import DENSE, NARROW, Solvers
+
+
+def made():
+    return Solvers(lambda unknown: f"unknown {unknown}", {})
+
+
+@st.composite
+def matrices(draw):
+    """Diagonally dominant matrices of some diagonals in a hidden order, real or complex; and how many there are."""
+    n = draw(st.integers(1, 3 * DENSE))
+    below, above = (draw(st.integers(0, min(n - 1, NARROW))) for _ in range(2))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    i, j = np.indices((n, n))
+    dense = np.where((i - j <= below) & (j - i <= above), rng.uniform(-1.0, 1.0, (n, n)), 0.0)
+    dense = dense + np.diag(np.full(n, 2.0 + below + above))
+    if draw(st.booleans()):
+        dense = dense * (1.0 + 0.5j)
+    hidden = rng.permutation(n)
+    return dense[hidden][:, hidden]
+
+
+@given(matrices(), st.integers(0, 2**32 - 1))
+@settings(max_examples=50)
+def test_all_shapes_solve_as_a_dense_solver(dense, seed):
+    rng = np.random.default_rng(seed)
+    family = made()
+    for part in (dense, 2.0 * dense):  # the second one meets the order that the first one made
+        right = rng.standard_normal(len(dense)).astype(dense.dtype)
+        x = family.of(csc_array(part))(right)
+        scale = np.abs(part) @ np.abs(x) + np.abs(right)
+        assert np.all(np.abs(part @ x - right) <= 8 * (2 * NARROW + 1) * np.finfo(float).eps * scale.max())
+
+
+def chain(n, open_at=None):
+    """A chain of conductances in a drawn order, singular where an unknown is in no equation."""
+    dense = np.diag(np.full(n, 3.0)) - np.eye(n, k=1) - np.eye(n, k=-1)
+    hidden = np.random.default_rng(1).permutation(n)
+    dense = dense[hidden][:, hidden]
+    if open_at is not None:
+        dense[:, open_at] = 0.0
+    return csc_array(dense)
+
+
+@pytest.mark.parametrize("n", [DENSE, 4 * DENSE])
+def test_singular_matrices_are_refused_by_the_name_of_an_unknown(n):
+    with pytest.raises(SolveError) as caught:
+        made().of(chain(n, open_at=7))
+    assert caught.value.equation.startswith("unknown ")
+
+
+def test_numbers_that_are_not_finite_are_refused():
+    broken = chain(4 * DENSE)
+    broken.data[5] = np.nan
+    with pytest.raises(SolveError):
+        made().of(broken)
+
+
+def test_a_chain_is_banded_and_a_plate_is_left_to_superlu(monkeypatch):
+    """Each shape takes its own way: the other one, spoiled, is not called."""
+
+    def refuse(*_args, **_options):
+        raise AssertionError("the other way was taken")
+
+    side = 20
+    chained = np.kron(np.eye(side), np.eye(side, k=1) + np.eye(side, k=-1))
+    plate = csc_array(4.5 * np.eye(side**2) - chained - np.kron(np.eye(side, k=1) + np.eye(side, k=-1), np.eye(side)))
+    with monkeypatch.context() as patch:
+        patch.setattr(solvers._Band, "solver", refuse)
+        made().of(plate)
+    with monkeypatch.context() as patch:
+        patch.setattr(solvers, "splu", refuse)
+        made().of(chain(4 * DENSE))
