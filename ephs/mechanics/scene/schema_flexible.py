@@ -11,13 +11,13 @@ from ephs.mechanics.scene.schema_touching import ContactLawEntry
 class SectionEntry(Entry):
     """``section``: numbers, or a shape with E, nu and rho."""
 
-    EA: Positive | None = Field(default=None, description="stiffness against stretch, N")
+    EA: Positive | None = Field(default=None, description="axial stiffness, N")
     GA: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="against shear along axes 2 and 3, N"
+        default=None, description="shear stiffness along axes 2 and 3, N"
     )
-    GJ: Positive | None = Field(default=None, description="against torsion, N m²")
+    GJ: Positive | None = Field(default=None, description="torsional stiffness, N m²")
     EI: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="against bending about axes 2 and 3, N m²"
+        default=None, description="bending stiffness about axes 2 and 3, N m²"
     )
     rhoA: Positive | None = Field(default=None, description="mass per length, kg/m")
     rhoI: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
@@ -36,11 +36,11 @@ class SectionEntry(Entry):
 
 
 class RodHeatEntry(Entry):
-    """``thermal`` of a beam: a store of heat for each element, and conduction from one to the next."""
+    """``thermal`` of a beam: a store of heat for each element, and heat conduction between neighbours."""
 
-    capacity: Positive = Field(description="per length, J/(m K)")
+    capacity: Positive = Field(description="heat capacity per length, J/(m K)")
     conduction: NonNegative = Field(default=0.0, description="conductivity times area, W m/K")
-    temperature: Positive = Field(description="at t = 0, K")
+    temperature: Positive = Field(description="initial temperature, K")
     expansion: NonNegative = Field(default=0.0, description="coefficient of linear thermal expansion, 1/K")
     reference: Positive | None = Field(
         default=None, description="temperature without thermal stress, K; default: temperature"
@@ -50,7 +50,9 @@ class RodHeatEntry(Entry):
 class RodSurfaceEntry(ContactLawEntry):
     """``surface`` of a beam: a capsule along each node's piece, which meets others and the pieces further on."""
 
-    radius: Positive | None = Field(default=None, description="that of a circle or tube unless given, m")
+    radius: Positive | None = Field(
+        default=None, description="radius of the surface, m; default: that of a circle or tube"
+    )
 
 
 _Vector: TypeAlias = Vector | None
@@ -58,11 +60,11 @@ _Points: TypeAlias = Annotated[list[Vector], Field(min_length=2)] | None
 _Count: TypeAlias = Annotated[int, Field(strict=True, ge=1)] | None
 _Strain: TypeAlias = Annotated[list[Number], Field(min_length=6, max_length=6)] | None
 _BEAM: dict[str, Any] = {
-    "from": (_Vector, Field(default=None, description="where it starts, world coordinates, m")),
-    "to": (_Vector, Field(default=None, description="where it ends, likewise")),
+    "from": (_Vector, Field(default=None, description="start point, world coordinates, m")),
+    "to": (_Vector, Field(default=None, description="end point, world coordinates, m")),
     "points": (
         _Points,
-        Field(default=None, description="instead of from and to: points on a curve, with a node at each, m"),
+        Field(default=None, description="points on a curve, instead of from and to, with a node at each, m"),
     ),
     "up": (
         _Vector,
@@ -70,39 +72,54 @@ _BEAM: dict[str, Any] = {
     ),
     "elements": (
         _Count,
-        Field(default=None, description="how many, the same number between any two points; 1 there unless given"),
+        Field(
+            default=None,
+            description="number of elements, the same between any two points; 1 there unless given",
+        ),
     ),
     "order": (
         Literal[2, 4],
-        Field(default=2, description="by which rest converges with shorter elements, and motion of thin beams"),
+        Field(
+            default=2,
+            description="order of convergence in the element length, for statics and for the motion of thin beams",
+        ),
     ),
     "rod": (
         Literal["reissner", "kirchhoff", "string"],
         Field(
-            default="reissner", description="kirchhoff: no stretch and no shear; string: no bending and torsion either"
+            default="reissner",
+            description="kirchhoff: inextensible and without shear; string: also without bending and torsion",
         ),
     ),
     "section": (SectionEntry, Field(description="stiffness and inertia per length")),
     "strain": (
         _Strain,
-        Field(default=None, description="at t = 0: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3"),
+        Field(
+            default=None, description="initial strain: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3"
+        ),
     ),
-    "damping": (NonNegative, Field(default=0.0, description="Kelvin–Voigt time, s")),
+    "damping": (NonNegative, Field(default=0.0, description="Kelvin–Voigt damping time, s")),
     "heat": (Text, Field(default="environment", description="where the heat of damping goes: a thermal name")),
     "thermal": (
         RodHeatEntry | None,
-        Field(default=None, description="instead of heat: each element NAME-i stores its own, in a node of that name"),
+        Field(default=None, description="instead of heat: a thermal node NAME-i for each element"),
     ),
     "ends": (
         Annotated[list[Text], Field(max_length=2)],
-        Field(default=[], description='what the first and the last node are welded to: a body, "ground" or "free"'),
+        Field(
+            default=[],
+            description='supports of the first and last node: a body to which it is welded, "ground" or "free"',
+        ),
     ),
     "surface": (
         RodSurfaceEntry | None,
-        Field(default=None, description="round; the node NAME.i has the surface of that name"),
+        Field(default=None, description="round surface for contact; each node NAME.i has a surface of that name"),
     ),
-    "velocity": (_Vector, Field(default=None, description="of the first node, world basis, m/s")),
-    "angular_velocity": (_Vector, Field(default=None, description="of the whole, world basis, rad/s")),
+    "velocity": (_Vector, Field(default=None, description="velocity of the first node, world basis, m/s")),
+    "angular_velocity": (
+        _Vector,
+        Field(default=None, description="angular velocity of the whole beam, world basis, rad/s"),
+    ),
 }
 # a class cannot have `from` for a name
 BeamEntry: Any = create_model("BeamEntry", __base__=Entry, __doc__="``[beams.NAME]``", **_BEAM)
@@ -127,8 +144,8 @@ class TendonEntry(Entry):
 class LoadEntry(Entry):
     """``[loads.NAME]``"""
 
-    body: Text = Field(description="the body on whose centre of mass it acts")
-    force: Vector = Field(default=[0.0, 0.0, 0.0], description="world axes, N")
-    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="world axes, N m")
-    follower: Flag = Field(default=False, description="force and moment are in body axes, and turn with the body")
-    ramp: NonNegative = Field(default=0.0, description="time over which it grows in proportion from 0, s")
+    body: Text = Field(description="body; the load acts at its centre of mass")
+    force: Vector = Field(default=[0.0, 0.0, 0.0], description="force in world axes, N")
+    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="moment in world axes, N m")
+    follower: Flag = Field(default=False, description="force and moment are given in body axes and turn with the body")
+    ramp: NonNegative = Field(default=0.0, description="time over which the load grows linearly from 0, s")

@@ -28,24 +28,26 @@ class SurfaceShapeEntry(Entry):
 class ContactLawEntry(Entry):
     """Keys of a contact's law, on a surface or on a contact."""
 
-    stiffness: Positive | None = Field(default=None, description="k of the elastic force k dⁿ at overlap d, N/mⁿ")
-    exponent: Number | None = Field(default=None, ge=1.0, description="n; 1.5 is Hertz's (default 1)")
-    loss: NonNegative | None = Field(default=None, description="α of Hunt and Crossley, s/m (default 0)")
-    friction: NonNegative | None = Field(default=None, description="coefficient μ (default 0)")
+    stiffness: Positive | None = Field(
+        default=None, description="stiffness k of the elastic force k dⁿ at overlap d, N/mⁿ"
+    )
+    exponent: Number | None = Field(default=None, ge=1.0, description="exponent n; 1.5 is Hertz's (default 1)")
+    loss: NonNegative | None = Field(default=None, description="Hunt–Crossley loss α, s/m (default 0)")
+    friction: NonNegative | None = Field(default=None, description="coefficient of friction μ (default 0)")
     slip: Positive | None = Field(
         default=None, description="slip velocity below which friction is viscous, m/s (default 1e-3)"
     )
-    rolling: NonNegative | None = Field(default=None, description="arm of the moment against rolling, m (default 0)")
-    spinning: NonNegative | None = Field(default=None, description="arm of that against spinning, m (default 0)")
+    rolling: NonNegative | None = Field(default=None, description="lever arm of rolling friction, m (default 0)")
+    spinning: NonNegative | None = Field(default=None, description="lever arm of spinning friction, m (default 0)")
     restitution: NonNegative | None = Field(
         default=None,
         le=1.0,
-        description="coefficient of restitution: the surface is hard, where the other one has no stiffness",
+        description="coefficient of restitution; the contact is hard if the other surface has no stiffness",
     )
     tangential: NonNegative | None = Field(
-        default=None, le=1.0, description="that of the slip of hard surfaces (default restitution)"
+        default=None, le=1.0, description="tangential coefficient of restitution of hard surfaces (default restitution)"
     )
-    heat: Text | None = Field(default=None, description="where the heat goes: a thermal name")
+    heat: Text | None = Field(default=None, description="thermal node that takes up the heat")
 
 
 class SurfaceEntry(ContactLawEntry):
@@ -53,11 +55,11 @@ class SurfaceEntry(ContactLawEntry):
 
     body: Text = Field(description='the body that has it, or "ground"')
     shape: SurfaceShapeEntry = Field(description="sphere, capsule, cylinder, box, plane or mesh")
-    position: Vector | None = Field(default=None, description="in the centre-of-mass frame (ground: world), m")
-    rotation: Rotation | None = Field(default=None, description="likewise, [w, x, y, z] or a table")
+    position: Vector | None = Field(default=None, description="origin in the centre-of-mass frame (ground: world), m")
+    rotation: Rotation | None = Field(default=None, description="orientation there, [w, x, y, z] or a table")
 
 
 class ContactEntry(ContactLawEntry):
     """``[contacts.NAME]``"""
 
-    surfaces: Pair = Field(description="names of two surfaces; the keys below replace theirs")
+    surfaces: Pair = Field(description="names of two surfaces; the other keys of this table replace theirs")

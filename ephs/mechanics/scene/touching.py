@@ -215,8 +215,8 @@ def _add(
 
 
 def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> Law | Impact | None:
-    """The law of a pair: the contact's values, else stiffness of both surfaces in series, the lesser friction, and
-    the larger of their other numbers. Surfaces with a restitution are hard beside others without stiffness."""
+    """The law of a pair: the contact's values, else stiffness of both surfaces in series, the smaller friction, the
+    larger of other numbers, and one exponent. A surface with restitution is hard if the other has no stiffness."""
     *own, first, second = laws
     for each in laws:
         if each.restitution is not None and (soft := [name for name in SOFT if getattr(each, name) is not None]):
