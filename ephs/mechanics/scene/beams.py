@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.attached import Conduction, ThermalNode
+from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.entries import Checked, shown
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.flexible import FREE_END, Beam, Strain
+from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.placing import Place
