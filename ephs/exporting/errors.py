@@ -8,18 +8,18 @@ TEXTS: Final = {
     "method": "method {found!r} cannot be exported, expected {expected}",
     "input": "input {found!r}: expected a joint with a free coordinate, one of {expected}",
     "output": "output {found!r}: expected one of {expected}, or the beginning of such a name",
-    "function": "the input at {where} is a function of Python, expected a constant: name it as an input of the export",
+    "function": "the input at {where} is a Python function, expected a constant: name it as an input of the export",
     "python": "{where}: a component is evaluated by Python, expected staged functions",
     "suffix": "output file {found!r}: expected a name that ends in {expected}",
     "target": "target {found!r}: expected one of {expected}",
     "tool": "{what} needs {tool}, which is not installed: pip install {package}",
     "refused": "{tool} refuses the program: {found}",
-    "structure": "parameters {found}: they change what the mechanism is made of, expected numbers only",
-    "polynomial": "parameter {found}: the program's numbers are no polynomials of degree 2 in it, expected one such as "
+    "structure": "parameters {found}: they change the structure of the mechanism, expected numbers only",
+    "polynomial": "parameter {found}: the program's tables are not polynomials of degree 2 in it, expected one such as "
     "a mass, a stiffness, a friction or a force",
     "values": "numbers of shape {found}: expected {expected}, one for each parameter",
     "double": "{where}: numbers of {found}; expected float64",
-    "name": "name {found!r}: expected a name of C, of letters, digits and _",
+    "name": "name {found!r}: expected a C identifier of letters, digits and _",
 }
 
 

@@ -5,8 +5,8 @@ from typing import final
 __all__ = ["PatternError"]
 
 _TEXTS = {
-    "name": "the name {found!r} cannot stand in a path: {expected}; choose another name",
-    "path": "{found!r} is no path; expected {expected}",
+    "name": "invalid name {found!r} in a path: expected {expected}; choose another name",
+    "path": "invalid path {found!r}: expected {expected}",
     "prefix": "{what}: the paths {found} clash, as one is a prefix of the other; {expected}; rename one of them",
     "duplicate": "{what}: the path {found} is given twice; {expected}; rename one of them",
     "apart": "the {what} directory lacks {found}; {expected}",
@@ -14,7 +14,7 @@ _TEXTS = {
     " substitution could name two junctions alike; rename one of them",
     "root-box": "box .: a box at the root path clashes with the junctions of its own fillings; only"
     " Pattern.identity(interface) has one; give the box a name (found the boxes {found})",
-    "root-rename": "box .: an identity's box cannot be renamed, and its ports are named alike inside and outside;"
+    "root-rename": "box .: an identity's box cannot be renamed, and its ports have the same names inside and outside;"
     " found new names for {found}, expected {expected}; write the renaming pattern with a named box",
     "root-junction": "junction .: a junction at the root path is a prefix of every box; give it a name",
     "root-port": "box {box}, port {port}: a port at the root path could name no junction of a filling; give it a name",
@@ -23,7 +23,7 @@ _TEXTS = {
     "port-type": "box {box}, port {port}: found {found}, expected {expected}",
     "unknown-junction": "box {box}, port {port}: there is no junction {junction}; the junctions are {expected}",
     "no-inner-port": "junction {junction} ({found}) has no inner port; expected at least one port of a box on"
-    " it. Connect a port or remove the junction. To pass an outer port through, or to hand it out twice, fork"
+    " it. Connect a port or remove the junction. To pass an outer port through, or to expose it twice, fork"
     " outside: expose it once and connect both users where the pattern is used",
     "link-junction": "link {found}: there is no junction {junction}; the junctions are {expected}",
     "link-size": "link {found}: expected two junctions or more that share their state",
@@ -45,17 +45,17 @@ _TEXTS = {
     "pair-parameters": "relative pose {what}: found the parameters {found}, expected {expected}",
     "parity": "quantity {what}: the parity is {found!r}, expected +1 (even under time reversal) or -1 (odd)",
     "space": "space {what}: found dim {found}, expected whole numbers dim >= 0 and size >= dim",
-    "unit": "the unit {found!r} is no product of powers; expected words as in 'kg m²/s' or 'J/(mol K)'",
+    "unit": "the unit {found!r} is not a product of powers; expected a text as in 'kg m²/s' or 'J/(mol K)'",
     "domain": "quantity {what}: the domain is {found}, expected {expected}",
     "charges": "quantity {what}: found the charges {found}, expected {expected}",
     "json": "no {what} can be read: {where}: found {found}, expected {expected}",
     "text": "no pattern can be read: line {where}: found {found}, expected {expected}",
-    "rule": "the rule {what!r} is none: found {found}, expected {expected}",
+    "rule": "invalid rule {what!r}: found {found}, expected {expected}",
     "match": "the rule {what!r} does not match: found {found}, expected {expected}",
     "identification": "the rule {what!r} cannot be applied: found {found}, expected {expected}",
     "dangling": "the rule {what!r} cannot be applied: found that {found}; expected {expected}",
     "bare": "the rule {what!r} cannot be applied: found that {found}; expected {expected}",
-    "derivation": "the derivation is none: found {found}, expected {expected}",
+    "derivation": "invalid derivation: found {found}, expected {expected}",
     "parameter": "space {what}: the parameter {found} is not finite; expected a finite number",
 }
 

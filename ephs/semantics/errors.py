@@ -10,15 +10,15 @@ __all__ = ["AssemblyError", "SemanticsError", "StructureError", "listed", "neare
 
 _TEXTS = {
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
-    "interface": ("{path}: the filling's interface is {found}, the box wants {expected}; rename the filling's ports"),
+    "interface": ("{path}: the filling's interface is {found}, expected {expected}; rename the filling's ports"),
     "finite": "{path}: {what} is {found}, expected finite numbers (witness: {witness})",
     "undefined": "{path}: {key} is {found}, expected {expected}",
     "isotropy": ("{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness: {witness})"),
-    "gyrator-shape": "{path}: the matrix L is {found}, its ports want {expected}",
-    "constraint-shape": "{path}: the matrix C is {found}, its ports want {expected}",
+    "gyrator-shape": "{path}: the matrix L is {found}, expected {expected} for its ports",
+    "constraint-shape": "{path}: the matrix C is {found}, expected {expected} for its ports",
     "conservation": ("{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness: {witness})"),
     "parity": ("{path}: not invariant under time reversal: defect {found}, expected 0 (witness: {witness})"),
-    "onsager-shape": "{path}: the matrix M is {found}, its ports want {expected}",
+    "onsager-shape": "{path}: the matrix M is {found}, expected {expected} for its ports",
     "symmetry": ("{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness: {witness})"),
     "definite": ("{path}: M has the negative eigenvalue {found}; the second law expects none (witness: {witness})"),
     "energy": ("{path}: energy is not conserved: entry {entry} of M·eᴱ is {found}, expected 0 (witness: {witness})"),
@@ -27,9 +27,9 @@ _TEXTS = {
         "{path}: {what} the quaternions q and −q of port {port} apart, which are one rotation (witness: "
         "{witness}); use products of two of its entries, or a rotation matrix"
     ),
-    "gradient-shape": "{path}: the gradient is {found}, its ports want {expected}",
+    "gradient-shape": "{path}: the gradient is {found}, expected {expected} for its ports",
     "gradient": (
-        "{path}: the gradient's entry {entry} is {found}, differences of the energy say {expected} (witness: {witness})"
+        "{path}: the gradient's entry {entry} is {found}, expected {expected} by differences (witness: {witness})"
     ),
     "temperature": (
         "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function"
@@ -45,7 +45,7 @@ _TEXTS = {
     "parameter": "{path}: parameter {key} is {found}, expected {expected}",
     "two-storages": (
         "{path}: the state of junction {junction} is stored twice, by {found}; expected one storage for a "
-        "state. Join the two by a constraint component instead"
+        "state. Connect the two storages by a constraint component"
     ),
     "unread-state": (
         "{path}: port {port} reads the state of junction {junction}, which no storage provides; connect a "
@@ -63,7 +63,7 @@ _TEXTS = {
         "or scene.with_state(coordinates=…)"
     ),
     "off-joint": (
-        "{path}: the initial value contradicts the joints, it is off by {found:.1e}; give all states of one motion, or "
+        "{path}: the initial value contradicts the joints by {found:.1e}; give all states of one motion, or "
         "scene.with_state(rates=…)"
     ),
     "unknown-state": "{path}: no such state; the states are {expected}",
@@ -71,7 +71,7 @@ _TEXTS = {
     "references": (
         "{path}: the relation is relative to {found}, the others to {expected}; take relations to one reference"
     ),
-    "unknown-parameter": "{path}: no number of a component of the library; {hint}",
+    "unknown-parameter": "{path}: not a parameter of a library component; {hint}",
     "elements": (
         "{path}: {equation} does not conserve {element}: {found} of it in a reaction, expected 0; mend the equation or "
         "the elements of the species"
@@ -87,7 +87,7 @@ _TEXTS = {
         "{path}: {name} cannot be written: found {found}, expected a part of the library or a formula that can be "
         "traced"
     ),
-    "rewrite": "{path}: {rule} would change what the system means: {found}",
+    "rewrite": "{path}: {rule} would change the meaning of the system: {found}",
 }
 
 

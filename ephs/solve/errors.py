@@ -31,11 +31,11 @@ __all__ = [
 class Outcome(StrEnum):
     """Cause that ended a run, in words; `advice` is the remedy."""
 
-    DIVERGED = "the step's equations have no solution near by"
-    SINGULAR = "the step's equations stay singular"
+    DIVERGED = "the equations of the step have no solution near the state"
+    SINGULAR = "the equations of the step are singular"
     CONTRADICTION = "a constraint contradicts the others"
-    OPEN = "a loop that does not close near by"
-    SHAKY = "a mechanism that moves to first order only"
+    OPEN = "a loop that cannot be closed near the state"
+    SHAKY = "a mechanism that is movable to first order only"
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
     ENTROPY = "a component that destroys entropy"
@@ -45,16 +45,16 @@ class Outcome(StrEnum):
     RANGE = "a state beyond the range of numbers"
     PYTHON = "a Python function of the model raised an exception"
     INCONSISTENT = "an initial state that contradicts the constraints"
-    TINY = "a step below the least that is allowed"
+    TINY = "a step below the smallest allowed one"
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
     RESTLESS = "no state in which nothing moves"
     INPUT = "an input's function has no value"
     EVENT = "an event's function has no value"
     UNWRITTEN = "the journal cannot be written"
-    PROGRESS = "the function that is told of progress raised an exception"
+    PROGRESS = "the progress function raised an exception"
     UNLAWFUL = "the result does not pass its audit"
-    MEMORY = "more memory than there is"
+    MEMORY = "not enough memory"
     INTERRUPTED = "interrupted"
 
     @property
@@ -67,12 +67,12 @@ _ADVICE = {
     Outcome.DIVERGED: "take a smaller step",
     Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which omits redundant equations",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
-    Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
-    Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry nothing across their line",
+    Outcome.OPEN: "take a smaller step, or check prescribed motions: the mechanism may be at the end of its travel",
+    Outcome.SHAKY: "change its geometry or add springs: rigid joints transmit no force across their line",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
-    Outcome.ENTROPY: "mend the component's function there; if it is right, take a smaller step",
-    Outcome.LAWLESS: "take a smaller step, or natural; mend the component where that is refused, too",
+    Outcome.ENTROPY: "correct the component's function; if it is right, take a smaller step",
+    Outcome.LAWLESS: "take a smaller step, or natural; if that is refused too, correct the component",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",
@@ -80,15 +80,15 @@ _ADVICE = {
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
     Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
-    Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
-    Outcome.RESTLESS: "start nearer to one, or add what holds it: a spring, a stop of the drive, an environment",
-    Outcome.INPUT: "see the exception above this one, or give a function of as many finite numbers as are wanted",
-    Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
-    Outcome.UNWRITTEN: "make room on the disk, then let the run go on with the same journal",
+    Outcome.UNDETERMINED: "add a storage, friction or a constraint there, which determines it",
+    Outcome.RESTLESS: "start nearer to one, or add a spring, a stop of the drive or an environment",
+    Outcome.INPUT: "see the exception above this one, or return as many finite numbers as expected",
+    Outcome.EVENT: "see the exception above this one, or give a function that returns a number everywhere",
+    Outcome.UNWRITTEN: "free space on the disk, then resume the run with the same journal",
     Outcome.PROGRESS: "see the exception above this one",
     Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
     Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
-    Outcome.INTERRUPTED: "what was computed is in .partial",
+    Outcome.INTERRUPTED: "the solution up to there is in .partial",
 }
 LARGEST = 1e150
 """Bound of states: squares of larger ones overflow."""
@@ -184,7 +184,7 @@ class SolveError(Exception):
 
     def of_iteration(self) -> "SolveError":
         """The same for an iteration outside a domain that the motion does not leave."""
-        return SolveError(Outcome.DIVERGED, self.path, f"its iteration comes to {self.outcome.value}", self.cause)
+        return SolveError(Outcome.DIVERGED, self.path, f"its iteration reaches {self.outcome.value}", self.cause)
 
     @classmethod
     def undetermined(cls, model: "Model", unknown: int) -> "SolveError":

@@ -27,13 +27,13 @@ class Setting:
     Parameters
     ----------
     t0
-        The start in s.
+        Start time in s.
     control
         Tolerances and limits; without ``control.step`` the method has to choose its steps.
     options
-        The method's own, by name.
+        Options of the method, by name.
     equations
-        The reduced form of the problem, where it is there already.
+        The reduced form of the problem, if it was made before.
     method
         Name of the method, for messages.
     """
@@ -54,26 +54,26 @@ class Method:
     Parameters
     ----------
     order
-        With which power of the step its error falls.
+        Order of the error in the step size.
     adaptive, fixed
-        Whether it runs by rtol and atol, and with a constant step.
+        Whether the method chooses steps by rtol and atol; whether it takes constant steps.
     systems, scenes
-        Whether it solves any System; and mechanisms: scenes, and systems that have joint coordinates.
+        Whether the method solves any System; whether it solves mechanisms: scenes, and systems with joint coordinates.
     summary
-        In words.
+        Description in words.
     make
-        The method for a setting, and what chooses its steps: None where they are constant.
+        Constructor of the method and of its step control for a setting; the control is None for constant steps.
     options
-        Names of the options that it takes.
+        Names of the method's options.
     forms
-        Forms of the equations that it takes besides the least, which is what ``"reduced"`` asks for.
+        Forms of the equations that the method solves besides the smallest, ``"reduced"``.
     lawful
         Whether every step keeps the energy balance to rounding, whatever its length.
     undamped
-        Of a method that damps nothing at infinity: makes, for a compiled model, what estimates the error of its
-        constant steps; None of others.
+        For a method without damping at infinity: constructor, for a compiled model, of the method that estimates the
+        error of constant steps; None for other methods.
     impacts
-        Whether it takes hard contacts: its steps may begin and end anywhere.
+        Whether the method accepts hard contacts: its steps may begin and end at any time.
     """
 
     name: str

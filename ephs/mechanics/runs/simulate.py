@@ -99,49 +99,50 @@ def simulate(
     until, t0
         End and start in s. An end before the start runs backward in time, where nothing produces entropy.
     initial
-        Values of states by path; a system's others at the identity, a scene's as it says.
+        Values of states by path. Other states start at the identity in a system, and as the scene says in a scene.
     method
         One of `ephs.mechanics.methods.registry.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
-        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or ``"auto"``: natural with ``step``; without it explicit, and
-        radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
-        `Method` of one's own.
+        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"gauss4"``, ``"gauss6"``, ``"gauss8"``, ``"ida"``; a user's `Method`; or
+        ``"auto"``: with ``step`` natural, with hard contacts rk54; without it rk54 or rk87 for mechanisms, and radau
+        when stability limits the steps, radau for systems on vector spaces, natural4 for others.
     rtol, atol
-        Without ``step``: each state x is wanted to ``atol + rtol·|x|``, atol in the state's own unit, of the
-        mechanism's own length, mass and time where these are far from 1 m, 1 kg and 1 s. Either may be
-        a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
+        Tolerances without ``step``: the error of each state x should be at most ``atol + rtol·|x|``. The unit of atol
+        is that of the state; for a mechanism far from 1 m, 1 kg and 1 s it is made of the mechanism's own length, mass
+        and time. Either may be a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
     step
-        The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.
+        Constant steps in s: the grid is t₀ + k·step, and the last step ends at ``until``.
     max_step, min_step, max_steps
-        Limits for the steps in s that are chosen, and for their number.
+        Limits of chosen steps in s, and of the number of steps.
     save_at
-        Times to keep, met by dense output; every step where None.
+        Times at which to save the solution, each reached by a shorter step from the same start (radau on systems: by
+        its collocation polynomial); None saves every step.
     form
-        ``"paper"``: as flattened, what the natural methods solve; ``"folded"``: the same with transformers and the
-        junctions behind them taken out, for them too; ``"reduced"``, the default: the least that a method can use.
+        ``"paper"``: the flat system, for natural methods; ``"folded"``: the same without transformers and the
+        junctions behind them, for natural methods; ``"reduced"``, the default: the smallest form of the method.
     events
         `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
-        and end the run where they say so.
+        and end the run if they are terminal.
     options
-        The method's own: ``{"rho": 0.8}`` of alpha.
+        Options of the method, such as ``{"rho": 0.8}`` of alpha.
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
-        force in world axes; f a constant, f(t), f(t, state), or `ephs.Sampled`. A tuple of such names has the numbers
-        of all in a row. The state is read by path, that of a scene by name too: ``state.joints.pin.rate``; see
+        force in world axes; f is a constant, f(t), f(t, state), or `ephs.Sampled`. For a tuple of such names, f gives
+        the numbers of all in order. The state is read by path, in a scene also by name: ``state.joints.pin.rate``; see
         `ephs.mechanics.motion.views.StateView`.
     jumps
-        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and go on
-        from the other side. Functions are searched for others; see `ephs.solve.probe`.
+        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and restart
+        on the other side. Functions are searched for further jumps; see `ephs.solve.probe`.
     reference
         The reference environment of a system; a scene's world gives its own.
     progress
         Called as progress(t, until, stats) a few times a second.
     journal
-        A file that receives the run while it goes on. Whatever ends the run, the same call goes on from there, to the
-        very numbers of a run that nothing disturbed; `load_solution` reads what it holds.
+        A file that records the run while it is running. After an interruption the same call resumes the run, with the
+        same numbers as an uninterrupted run; `load_solution` reads the file.
     audit
-        What findings of the run's audit become: ``"fail"`` an `AuditError`, ``"warn"`` an `AuditWarning`, ``"off"``
-        nothing but the record in ``sol.audit`` and the summary.
+        Treatment of findings of the run's audit: ``"fail"`` raises an `AuditError`, ``"warn"`` gives an
+        `AuditWarning`, ``"off"`` only records them in ``sol.audit`` and the summary.
 
     Raises
     ------

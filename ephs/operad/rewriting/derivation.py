@@ -209,7 +209,7 @@ def _fresh(paths: list[Path], taken: set[str]) -> dict[Path, Path]:
 
 
 def _bare(rule: Rule, found: str) -> NoReturn:
-    raise PatternError("bare", what=rule.name, found=found, expected="ports on all that there is afterwards")
+    raise PatternError("bare", what=rule.name, found=found, expected="a port on each remaining junction and state")
 
 
 def _names(names: Renaming) -> dict[str, Any]:

@@ -23,7 +23,7 @@ def require_morphism(rule: Rule, match: Renaming, host: Elements) -> None:
     for path, junction in left.junctions.items():
         image = _image(rule, f"junction {path}", match.junctions.get(path), host.state_of)
         if path in rule.powered and image not in host.junctions:
-            _refuse(rule, f"junction {path} at {image}, which bears no power", "a junction that does")
+            _refuse(rule, f"junction {path} at {image}, which carries no power", "a junction with power")
         found = host.junctions[image][0] if path in rule.powered else host.states[host.state_of[image]].quantity
         if not found.matches(junction.quantity):
             _refuse(rule, f"junction {path} at {image}: {found}", str(junction.quantity))
@@ -102,7 +102,7 @@ def _require_apart(
         if other != name and not (name in kept and other in kept):
             found = f"{what} {other} and {what} {name} at one place"
             raise PatternError(
-                "identification", what=rule.name, found=found, expected="two places, as one of them goes"
+                "identification", what=rule.name, found=found, expected="two places, since one of them is removed"
             )
 
 
@@ -117,4 +117,4 @@ def _refuse(rule: Rule, found: str, expected: str) -> NoReturn:
 
 
 def _loose(rule: Rule, found: str) -> NoReturn:
-    raise PatternError("dangling", what=rule.name, found=found, expected="only what the left side names")
+    raise PatternError("dangling", what=rule.name, found=found, expected="only elements that the left side names")

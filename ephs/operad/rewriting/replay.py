@@ -76,11 +76,11 @@ def replay(rule: Rule, source: Pattern, target: Pattern, match: Renaming, comatc
     come = _own(rule, rule.right, comatch, places["right"], after)
     for own, facts, other in ((gone, before, after), (come, after, before)):
         if loose := [p for p in facts.ports.keys() - own.ports if p[0] in own.boxes or facts.ports[p] in own.junctions]:
-            _refuse(f"port {loose[0][0]}.{loose[0][1]} would hang loose", "no port on what goes or comes")
+            _refuse(f"port {loose[0][0]}.{loose[0][1]} would be dangling", "no port on removed or added elements")
         if again := own.boxes & other.boxes or own.junctions & other.junctions.keys():
-            _refuse(f"{min(again)} both before and after", "names of their own for what goes and for what comes")
+            _refuse(f"{min(again)} both before and after", "different names for removed and added elements")
         if outer := [path for path in own.junctions if facts.junctions[path][1] or ("outer", path) in _outer(facts)]:
-            _refuse(f"junction {outer[0]} is exposed", "interfaces left alone")
+            _refuse(f"junction {outer[0]} is exposed", "an unchanged interface")
     _require(before.boxes - gone.boxes, after.boxes - come.boxes, "the other boxes")
     _require(_without(before.ports, gone.ports), _without(after.ports, come.ports), "the other ports")
     _require(
@@ -127,7 +127,7 @@ def _own(
         mine = {key: image for key, image in images.items() if key not in same}
         theirs = [image for key, image in images.items() if key in same]
         if len({*mine.values()}) < len(mine) or any(image in theirs for image in mine.values()):
-            _refuse(f"one {what} for two of the rule", "two, as one is not kept")
+            _refuse(f"one {what} for two of the rule", "two, since one of them is not kept")
         own.append(frozenset(mine.values()))
     items = frozenset(
         {("junction", path, None) for path in own[2]} | {("port", *p) for p in own[1] if facts.ports[p] is None}
@@ -179,7 +179,7 @@ def _without(table: Mapping[Any, Any], keys: Iterable[Any]) -> dict[Any, Any]:
 
 def _require(before: object, after: object, what: str) -> None:
     if before != after:
-        _refuse(f"{what} changed", "what the rule does not name to stay as it is")
+        _refuse(f"{what} changed", "elements that the rule does not name to be unchanged")
 
 
 def _refuse(found: str, expected: str) -> NoReturn:

@@ -42,9 +42,9 @@ def test_a_unit_of_another_kind(springs, tmp_path, texts, fault):
     [
         ({"ports": {"end": {"effort": "forse", "flow": "speed"}}}, "variable", "did you mean 'force'"),
         ({"ports": {"end": {"effort": "force"}}}, "variable", "a variable named as its flow"),
-        ({"ports": {"end": {"effort": "force", "flow": "impulse"}}}, "causal", "'impulse' are of the unit's outputs"),
+        ({"ports": {"end": {"effort": "force", "flow": "impulse"}}}, "causal", "'impulse' are outputs of the unit"),
         ({"ports": {"end": {"effort": "impulse", "flow": "speed"}}}, "power", "impulse in N.s times speed in m/s"),
-        ({"ports": {"end": {**PORT, "integral": "force"}}}, "integral", "force in N is no integral"),
+        ({"ports": {"end": {**PORT, "integral": "force"}}}, "integral", "force in N is not an integral"),
         ({"ports": {"end": {"effort": "stiffness", "flow": "speed"}}}, "causality", "'stiffness' is parameter"),
         ({"start": {"stifness": 1.0}}, "variable", "did you mean 'stiffness'"),
         ({"start": {"force": 1.0}}, "causality", "'force' is output"),
