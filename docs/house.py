@@ -57,7 +57,7 @@ def picture() -> str:
 def rooms() -> str:
     """The rooms from the top, each with what its own first lines say, as a Markdown table."""
     said = {module_name(file): file for file in SOURCES if file.name == "__init__.py"}
-    table = "| room | what lives there |\n| --- | --- |\n"
+    table = "| room | contents |\n| --- | --- |\n"
     for room in sorted(PLACE, key=lambda room: (-PLACE[room][0], room)):
         words = ast.get_docstring(ast.parse(said[room].read_text(encoding="utf-8"))) or ""
         first = words.partition("\n\n")[0] if room != "ephs" else TOP
@@ -68,4 +68,4 @@ def rooms() -> str:
 def doors() -> str:
     """The ways up, as a Markdown table."""
     rows = (f"| `{module}` | `{room}` | {why} |\n" for (module, room), why in DOORS.items())
-    return "| module | looks up into | because |\n| --- | --- | --- |\n" + "".join(rows)
+    return "| module | imports | why |\n| --- | --- | --- |\n" + "".join(rows)

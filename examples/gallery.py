@@ -91,12 +91,12 @@ def _gas_engine(text: str) -> Entry:
 def entries() -> dict[str, Entry]:
     """All systems by name, the paper's four first."""
     return {
-        "oscillator": _oscillator("free_oscillator", "A spring and a mass exchange energy, and none is lost."),
+        "oscillator": _oscillator("free_oscillator", "A spring and a mass exchange energy without loss."),
         "damped oscillator": _oscillator(
             "damped_oscillator", "The same oscillator as one box of a larger pattern; friction heats the environment."
         ),
         "body": _scene(
-            "body", 2e-3, "A rigid body, thrown: four boxes; its centre of mass flies along a parabola as it tumbles."
+            "body", 2e-3, "A thrown rigid body, in four boxes: its centre of mass moves on a parabola while it tumbles."
         ),
         "two bodies and a joint": _scene(
             "mbs", 2e-3, "The multibody system of the paper: friction in a ball joint, until both bodies turn as one."
@@ -105,28 +105,30 @@ def entries() -> dict[str, Entry]:
             "dzhanibekov", 1e-3, "Spin about the middle axis of inertia is unstable: the wing nut flips over, and back."
         ),
         "heavy top": _scene(
-            "heavy-top", 4e-4, "A disc on a stick spins, dives, precesses and comes up again; its spin stays the same."
+            "heavy-top", 4e-4, "A disc on a stick spins, dives, precesses and rises again; its spin is constant."
         ),
-        "four-bar": _scene("four-bar", 2e-3, "A crank-rocker; three of its 24 constraint equations say nothing new."),
+        "four-bar": _scene("four-bar", 2e-3, "A crank-rocker; three of its 24 constraint equations are redundant."),
         "slider-crank": _scene("slider-crank", 1e-3, "A small engine on a starter; friction warms the housing."),
         "N-four-bar": _scene(
-            "n-four-bar", 1e-3, "Two four-bars of equal bars: when all lie in line, the constraints lose further ranks."
+            "n-four-bar",
+            1e-3,
+            "Two four-bars of equal bars. With all bars in line, the constraints lose further ranks.",
         ),
         "Bricard": _scene(
-            "bricard", 4e-3, "Six bars, six hinges: by Grübler's count it cannot move, and yet it does, half a turn."
+            "bricard",
+            4e-3,
+            "Six bars, six hinges. By Grübler's count it cannot move, but it turns, here by half a turn.",
         ),
-        "screw press": _scene("screw-press", 1e-3, "A small torque on a fine screw is a great force on the platen."),
+        "screw press": _scene("screw-press", 1e-3, "A small torque on a fine screw gives a large force on the platen."),
         "Cardan shaft": _scene(
-            "cardan-shaft", 1e-3, "Two hinges and a cross without mass; the driven shaft runs ahead and falls behind."
+            "cardan-shaft", 1e-3, "Two hinges and a massless cross; the driven shaft alternately leads and lags."
         ),
-        "robot arm": _arm("Six hinges, read from a URDF and let go: it falls through the friction of its gears."),
-        "biped": _scene(
-            "biped", 2e-3, "Two legs from one file, with a parallelogram each: three loops, three motions."
-        ),
+        "robot arm": _arm("Six hinges, read from a URDF and released: the arm falls against gear friction."),
+        "biped": _scene("biped", 2e-3, "Two legs from one file, with a parallelogram each: three loops, mobility 3."),
         "motor and crank": _motor_crank("A circuit, a magnet and a gear drive the slider-crank."),
         "gas engine": _gas_engine("Hot gas pushes a piston that turns a crank: gases, heat and bodies in one pattern."),
-        "two gases": _cylinder("A piston between two gases: volume and heat go to and fro, entropy only up."),
-        "hot brake": _scene("hot-brake", 2e-3, "Nine kilojoules of motion become heat, and the disc gets hot."),
+        "two gases": _cylinder("A piston between two gases: volume and heat oscillate, and entropy only increases."),
+        "hot brake": _scene("hot-brake", 2e-3, "Nine kilojoules of kinetic energy become heat and warm the disc."),
     }
 
 

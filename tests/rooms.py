@@ -40,16 +40,16 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
 )
 """From the ground up. Rooms that stand together know each other and all storeys below; no others."""
 DOORS = {
-    ("ephs.operad.pattern", "ephs.show"): "a pattern shows itself in notebooks",
-    ("ephs.operad.algebra", "ephs.semantics.algebra"): "the empty pattern that is called makes the empty system",
-    ("ephs.semantics.catalogue", "ephs.mechanics.elements"): "documents of systems name parts of mechanics",
-    ("ephs.semantics.library.units", "ephs.solve.exchange"): "a unit of FMI is a part of the library that runs sampled",
-    ("ephs.semantics.system", "ephs.show"): "so does a system",
-    ("ephs.mechanics.scene.words", "ephs.show"): "so does a scene",
-    ("ephs.solve.result.solution", "ephs.show"): "a solution plots and moves itself",
-    ("ephs.mechanics.dynamics.model", "ephs.show"): "dynamics show their mechanism in notebooks",
-    ("ephs.mechanics.linear.equilibrium", "ephs.show"): "so does an equilibrium",
-    ("ephs.mechanics.linear.statespace", "ephs.show"): "a linear system shows its eigenvalues",
+    ("ephs.operad.pattern", "ephs.show"): "patterns are displayed in notebooks",
+    ("ephs.operad.algebra", "ephs.semantics.algebra"): "calling the empty pattern gives the empty system",
+    ("ephs.semantics.catalogue", "ephs.mechanics.elements"): "documents of systems name components of mechanics",
+    ("ephs.semantics.library.units", "ephs.solve.exchange"): "an FMI unit in the library runs sampled",
+    ("ephs.semantics.system", "ephs.show"): "systems are displayed in notebooks",
+    ("ephs.mechanics.scene.words", "ephs.show"): "scenes are displayed in notebooks",
+    ("ephs.solve.result.solution", "ephs.show"): "solutions have plots and animations",
+    ("ephs.mechanics.dynamics.model", "ephs.show"): "mechanisms of dynamics are displayed in notebooks",
+    ("ephs.mechanics.linear.equilibrium", "ephs.show"): "equilibria are displayed in notebooks",
+    ("ephs.mechanics.linear.statespace", "ephs.show"): "eigenvalues of linear systems are displayed in notebooks",
 }
 """Module, room above it: why it may know that. What is above is loaded when it is asked for."""
 PLACE = {room: (level, flat) for level, storey in enumerate(STOREYS) for flat in storey for room in flat}

@@ -171,7 +171,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
         if found.size > bounds.accuracy:
             h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
             hint = ("" if h is None else f" of {h:.1g} s") + (
-                ", or radau, which damps what is too fast" if bounds.undamped else ""
+                ", or radau, which damps fast modes" if bounds.undamped else ""
             )
         yield Breach(found.size, 0.0, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
 
@@ -199,7 +199,7 @@ def _shorter(bounds: Bounds, found: GlobalError) -> str:
     if found.size <= MOTION or bounds.step is None:
         return ""
     if not found.resolved:
-        return f" of {0.25 * bounds.step:.2g} s or less: one of twice its length leads elsewhere"
+        return f" of {0.25 * bounds.step:.2g} s or less: a step twice as long gives another motion"
     return f" of {0.9 * bounds.step * (MOTION / found.size) ** (1.0 / bounds.order):.2g} s"
 
 
@@ -316,11 +316,11 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step, or natural, which keeps the balance", "lower rtol, or take natural, which keeps it"),
     ),
     "accuracy": Law(
-        "steps resolve what moves, and put bodies where they belong. Constant ones: the difference of a step and two "
-        "of half its length, and of the run from one with longer steps; chosen ones that keep the balance whatever "
-        "they leave out: the difference of a step and three of a third of its length; steps that are corrected to "
-        "keep it: the defect that they had before",
-        "what such steps move between storages; length of the mechanism, 1 rad; sizes of states; gross energies",
+        "steps resolve the motion, and the positions of bodies are accurate. Constant steps: the difference between a "
+        "step and two of half its length, and between the run and one with longer steps. Chosen steps of natural "
+        "methods: the difference between a step and three of a third of its length. Corrected steps: the defect of "
+        "energy before correction",
+        "energy that such steps exchange; length of the mechanism, 1 rad; sizes of states; gross energies",
         f"{COARSE:g}, and {MOTION:g} at the end, at constant steps; {MANY_TIMES:g} rtol at chosen ones",
         _accuracy,
         lambda bounds: bounds.accuracy,
@@ -328,7 +328,7 @@ LAWS: Mapping[str, Law] = {
     ),
     "entropy": Law(
         "no component, and no system without entropy from outside, loses entropy in a step",
-        "entropy made and exchanged",
+        "entropy produced and exchanged",
         f"{PRODUCTION:g}",
         _entropy,
         lambda _: PRODUCTION,
@@ -343,9 +343,9 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step, or check that the joints fit together", "lower rtol, or check that the joints fit"),
     ),
     "ledger": Law(
-        "stored entropy and volume change by production and supply; work of motions that leave no degree of freedom, "
-        "the gain of the energies and the heat, is the sum of their power",
-        "what was made and exchanged; gross energies",
+        "stored entropy and volume change by production and supply; where prescribed motions leave no degree of "
+        "freedom, their work, the gain of energies plus heat, is the integral of their power",
+        "amounts produced and exchanged; gross energies",
         f"{MANY_TIMES:g} rtol, at least {LEAST:g}; of work {COARSE:g}",
         _ledger,
         lambda bounds: bounds.ledger,
