@@ -206,7 +206,7 @@ class Problem:
     shaky
         Whether the mechanism has velocities, but no finite motion that belongs to them.
     document
-        The scene as text, for solution files.
+        Writes the scene as text, for solution files; empty where there is none.
     shown
         What was computed of this problem, as a record with statistics of the one that it was made from, which
         solutions are of; None where none was.
@@ -236,7 +236,7 @@ class Problem:
     reference: Reference
     motion: Callable[["Solution"], Motion] | None = None
     scene: Any = None
-    document: str = ""
+    document: Callable[[], str] = str
     dependences: Callable[[], str] | None = None
     shaky: Callable[[], bool] | None = None
     shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None

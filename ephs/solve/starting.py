@@ -30,7 +30,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     SolveError
         It names the state that jumps farthest.
     """
-    if problem.document or not model.constraint_rows.size:
+    if problem.scene is not None or not model.constraint_rows.size:
         return
     d = problem.descriptor
     x = d.pack(problem.initial)

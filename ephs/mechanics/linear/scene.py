@@ -16,7 +16,7 @@ import numpy as np
 
 from ephs.mechanics.dynamics import Derivatives, Dynamics, State, dynamics
 from ephs.mechanics.linear.statespace import StateSpace
-from ephs.mechanics.linear.structure import PortHamiltonian
+from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import GROUND, Scene
@@ -185,11 +185,12 @@ class _Linear:
         A[warm, warm] = by.entropy_s[np.ix_(self.nodes, self.nodes)]
         B, C, names_in, names_out = self._ports(by.acceleration_force)
         structure, reason, A = self._structure(A, by)
+        D = np.zeros((C.shape[0], B.shape[1]))
         return StateSpace(
-            self.model.scene.name, A, B, C, np.zeros((C.shape[0], B.shape[1])), self._names(), names_in, names_out,
+            self.model.scene.name, A, B, C, D, self._names(), names_in, names_out,
             structure, reason, MappingProxyType(self._shapes()),
             MappingProxyType({str(path): value for path, value in self.model.states(self.state).items()}),
-            partial(_play, self),
+            partial(_play, self), Sizes.of(B, C, D),
         )  # fmt: skip
 
     def _ports(self, by_force: Array) -> tuple[Array, Array, tuple[str, ...], tuple[str, ...]]:

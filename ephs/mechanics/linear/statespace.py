@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.linear.modes import Complex, Mode, modes_of
-from ephs.mechanics.linear.structure import Law, PortHamiltonian, laws_of
+from ephs.mechanics.linear.structure import Law, PortHamiltonian, Sizes, laws_of
 from ephs.semantics.bundle import Array
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ class StateSpace:
         Path -> value of the system's states where it was linearised.
     play
         Makes a `Solution` that moves along some displacement of the states, see `film`; None where that cannot be.
+    sizes
+        What B, C and D were solved together with.
     """
 
     name: str
@@ -55,6 +57,7 @@ class StateSpace:
     shapes: Mapping[str, Array]
     about: Mapping[str, Array]
     play: Any
+    sizes: Sizes
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show.notebook import state_space_html
@@ -101,7 +104,9 @@ class StateSpace:
         """The laws of the structure; none where there is no structure."""
         if self.structure is None:
             return ()
-        return laws_of(self.A, self.B, self.C, self.D, self.structure, self.inputs == self.outputs)
+        return laws_of(
+            self.A, self.B, self.C, self.D, self.structure, self.sizes, conjugate=self.inputs == self.outputs
+        )
 
     def transfer(self, s: complex) -> Complex:
         """(p, m) the transfer matrix C (s − A)⁻¹ B + D at a complex frequency in 1/s."""

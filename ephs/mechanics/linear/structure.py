@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["Law", "PortHamiltonian", "laws_of"]
+__all__ = ["Law", "PortHamiltonian", "Sizes", "laws_of"]
 
 ROUNDING = 1e-12
 """Relative tolerance of a power balance: rounding of products of matrices."""
@@ -62,11 +62,33 @@ class PortHamiltonian:
         return float(effort @ self.R @ effort)
 
 
-def laws_of(A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, conjugate: bool) -> tuple[Law, ...]:
+@final
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Largest absolute terms of the solutions that matrices are parts of.
+
+    Entries of a solution are known to κ ε of its largest: what vanishes is rounding of that, not of itself.
+    """
+
+    B: float
+    C: float
+    D: float
+
+    @classmethod
+    def of(cls, B: Array, C: Array, D: Array) -> "Sizes":
+        """Those of matrices that are whole solutions."""
+        return cls(_size(B), _size(C), _size(D))
+
+
+def laws_of(
+    A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, sizes: Sizes, *, conjugate: bool
+) -> tuple[Law, ...]:
     """The laws of the structure, both sides of each.
 
     Parameters
     ----------
+    sizes
+        What B, C and D were solved together with.
     conjugate
         Whether the outputs are the inputs' power conjugates.
     """
@@ -81,8 +103,8 @@ def laws_of(A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, conjuga
     ]
     if conjugate:
         gain = np.asarray(np.linalg.eigvalsh(D + D.T), dtype=float)
-        out.append(Law("C = Bᵀ Q", C, B.T @ Q, _size(np.abs(B.T) @ np.abs(Q))))
-        out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), _size(D)))
+        out.append(Law("C = Bᵀ Q", C, B.T @ Q, max(sizes.C, sizes.B * float(np.abs(Q).sum(axis=0).max(initial=0.0)))))
+        out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), sizes.D))
     return tuple(out)
 
 

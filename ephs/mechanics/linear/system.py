@@ -13,7 +13,7 @@ import numpy as np
 
 from ephs.mechanics.linear.pencil import Parts, Pencil, system_problem
 from ephs.mechanics.linear.statespace import StateSpace
-from ephs.mechanics.linear.structure import PortHamiltonian
+from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
@@ -89,7 +89,9 @@ class _Linear:
         matrix = np.hstack([p.flow_rates @ moving, acting @ W])
         right = np.hstack([-(p.flow_rates @ self._turning() + p.flow_states @ X), p.force]) - acting @ by
         found = _solved(matrix[p.stored], right[p.stored], k)
-        whole = by + W @ found[moving.shape[1] :]
+        rest = found[moving.shape[1] :]
+        whole, terms = by + W @ rest, np.abs(by) + np.abs(W) @ np.abs(rest)
+        sizes = Sizes.of(found[:, k:], terms[:, :k], terms[:, k:])
         efforts, flows = whole[: pencil.n_e], whole[pencil.n_e + pencil.n_l :]
         A, B = found[:k, :k], found[:k, k:]
         names_in = self._names_in()
@@ -102,7 +104,7 @@ class _Linear:
             pencil.problem.name, A, B, C, D, self._names(), names_in, names_out, structure, reason,
             MappingProxyType({str(slot.path): X[slot.rates] for slot in d.states if slot.quantity.space.dim}),
             MappingProxyType({str(path): value.copy() for path, value in d.unpack(self.x).items()}),
-            partial(_play, pencil.problem, pencil.model, self.x, X),
+            partial(_play, pencil.problem, pencil.model, self.x, X), sizes,
         )  # fmt: skip
 
     def _turning(self) -> Array:

@@ -51,7 +51,7 @@ def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
     machine = f"{platform.system()} {platform.machine()}"
     return {
         "name": problem.name,
-        "model": problem.document,
+        "model": problem.document(),
         "run": {
             **{key: _plain(value) for key, value in asked.items()},
             "model": _digest(problem),
@@ -63,7 +63,7 @@ def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
 def _digest(problem: Problem) -> str:
     """Digest of every component with its numbers, the initial states and the surroundings."""
     d = problem.descriptor
-    parts: list[Any] = [problem.document, problem.reference]
+    parts: list[Any] = [problem.document(), problem.reference]
     for slot in d.components:
         kernel = slot.primitive.kernel
         numbers = (kernel.name, kernel.parameters) if kernel is not None else ()

@@ -362,7 +362,7 @@ def problem_of_scene(
         Reference(world.temperature, world.pressure),
         motion=lambda solution: SceneMotion(scene, solution),
         scene=scene,
-        document=once(scene, "text", lambda: scene_to_text(scene)),
+        document=lambda: once(scene, "text", lambda: scene_to_text(scene)),
         dependences=lambda: explain(scene),
         shaky=lambda: is_shaky(scene),
         length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),

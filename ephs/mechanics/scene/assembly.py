@@ -93,6 +93,9 @@ def _place(
     drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], index: Mapping[str, int], rest: Sequence[Array]
 ) -> Array:
     poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(-1, 7)
+    open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
+    if not open_bodies:
+        return poses
     links = {j.name: _link(j, index, poses) for j in joints if j.place.in_bodies}
     by_name = {j.name: j for j in joints}
 
@@ -101,7 +104,6 @@ def _place(
         x = link.coupling.identity() if draft.coordinates is None else link.coupling.element(draft.coordinates)
         poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
 
-    open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
     _settle(open_bodies, list(links.values()), follow)
     return poses
 

@@ -1,12 +1,14 @@
 """Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators; stores of heat, conduction."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self, final
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Element, Number
 
 __all__ = [
     "ATTACHED",
@@ -17,66 +19,18 @@ __all__ = [
     "GasSpring",
     "Gear",
     "Motor",
-    "Number",
     "ThermalNode",
 ]
 
 Array = NDArray[np.float64]
-POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
-"""A lower bound, and whether it is excluded."""
 
 
-@final
-@dataclass(frozen=True, slots=True)
-class Number:
-    """Dimension, count and range of a number of an attachment.
-
-    Parameters
-    ----------
-    energy, time, length
-        Exponents of its dimension.
-    first, others
-        Exponents of the units of coordinates: of the first joint; of its own joint, where there is a number for each.
-    count
-        Of a row of numbers; 0 for one number.
-    each
-        There is a number for each joint from this one on; −1 for none.
-    least
-        Bound from below, and whether it is excluded.
-    """
-
-    energy: int = 0
-    time: int = 0
-    length: int = 0
-    first: int = 0
-    others: int = 0
-    count: int = 0
-    each: int = -1
-    least: tuple[float, bool] | None = None
-
-    def shape(self, joints: int) -> tuple[int, ...]:
-        """Shape of its array at an attachment of so many joints."""
-        return (joints - self.each,) if self.each >= 0 else (self.count,) if self.count else ()
-
-    def unit(self, length: float, mass: float, time: float, joints: Sequence[float]) -> Any:
-        """Its unit, of those of length, mass and time, and of the coordinates of joints."""
-        energy = mass * length**2 / time**2
-        whole = energy**self.energy * time**self.time * length**self.length * joints[0] ** self.first
-        return whole * np.array(joints[self.each :]) ** self.others if self.each >= 0 else whole
-
-
-class Attachment(ABC):
+class Attachment(Element):
     """Attachments to joints with one degree of freedom each."""
 
     __slots__ = ()
-    numbers: ClassVar[Mapping[str, Number]]
-    name: str
+    names: ClassVar[Mapping[str, str]] = {"joint": "joint", "heat": "node"}
     heat: str
-
-    @property
-    @abstractmethod
-    def tied(self) -> tuple[str, ...]:
-        """Its joints."""
 
     @property
     @abstractmethod
@@ -84,30 +38,18 @@ class Attachment(ABC):
         """Whether it makes heat."""
 
     @property
+    def tied(self) -> tuple[str, ...]:
+        """Its joints."""
+        return self.named("joint")
+
+    @property
     def commanded(self) -> bool:
         """Whether it is an input of runs."""
         return isinstance(self, Motor | Cylinder | Actuator)
 
     @abstractmethod
-    def seen(self, path: str, heat: str) -> Self:
-        """Itself with names as seen from outside of the part at a path."""
-
-    @abstractmethod
     def __str__(self) -> str:
         """In a few words."""
-
-    def values(self) -> dict[str, tuple[Any, tuple[int, ...]]]:
-        """Its numbers with their required shapes, without omitted ones."""
-        given = {key: (getattr(self, key), number.shape(len(self.tied))) for key, number in self.numbers.items()}
-        return {key: pair for key, pair in given.items() if pair[0] is not None}
-
-    def rescaled(self, length: float, mass: float, time: float, joints: Sequence[float]) -> Self:
-        """The same in other units; ``joints`` are those of its joints' coordinates."""
-        changed: dict[str, Any] = {}
-        for key, (value, _) in self.values().items():
-            found = value * self.numbers[key].unit(length, mass, time, joints)
-            changed[key] = _frozen(found) if isinstance(value, np.ndarray) else float(found)
-        return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all attachments are dataclasses
 
 
 @final
@@ -149,15 +91,8 @@ class Motor(Attachment):
     heat: str
 
     @property
-    def tied(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    @property
     def warms(self) -> bool:
         return True
-
-    def seen(self, path: str, heat: str) -> Self:
-        return replace(self, name=path + self.name, joint=path + self.joint, heat=heat)
 
     def __str__(self) -> str:
         return f"on {self.joint}, {self.resistance:g} Ω, gear {self.gear:g}"
@@ -181,6 +116,7 @@ class Gear(Attachment):
         Of the belt at the start, rad or m of the first joint.
     """
 
+    names: ClassVar[Mapping[str, str]] = {"joints": "joint", "heat": "node"}
     numbers: ClassVar[Mapping[str, Number]] = {
         "ratio": Number(first=1, others=-1, each=1),
         "stiffness": Number(energy=1, first=-2, least=NON_NEGATIVE),
@@ -198,15 +134,8 @@ class Gear(Attachment):
     stretch: float = 0.0
 
     @property
-    def tied(self) -> tuple[str, ...]:
-        return self.joints
-
-    @property
     def warms(self) -> bool:
         return bool(self.friction or (self.stiffness and self.damping))
-
-    def seen(self, path: str, heat: str) -> Self:
-        return replace(self, name=path + self.name, joints=tuple(path + each for each in self.joints), heat=heat)
 
     def __str__(self) -> str:
         return f"{' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
@@ -250,15 +179,8 @@ class Cylinder(Attachment):
     heat: str
 
     @property
-    def tied(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    @property
     def warms(self) -> bool:
         return True
-
-    def seen(self, path: str, heat: str) -> Self:
-        return replace(self, name=path + self.name, joint=path + self.joint, heat=heat)
 
     def __str__(self) -> str:
         return f"on {self.joint}, {' and '.join(f'{x:g}' for x in self.area)} m²"
@@ -300,15 +222,8 @@ class GasSpring(Attachment):
     heat: str
 
     @property
-    def tied(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    @property
     def warms(self) -> bool:
         return bool(self.conductance)
-
-    def seen(self, path: str, heat: str) -> Self:
-        return replace(self, name=path + self.name, joint=path + self.joint, heat=heat)
 
     def __str__(self) -> str:
         return f"on {self.joint}, {self.volume:g} m³ at {self.pressure:g} Pa"
@@ -327,6 +242,7 @@ class Actuator(Attachment):
         (2,) least and largest control; None for none.
     """
 
+    names: ClassVar[Mapping[str, str]] = {"joints": "joint", "heat": "node"}
     numbers: ClassVar[Mapping[str, Number]] = {
         "ratio": Number(energy=1, others=-1, each=0),
         "limits": Number(count=2),
@@ -338,15 +254,8 @@ class Actuator(Attachment):
     heat: str = "environment"
 
     @property
-    def tied(self) -> tuple[str, ...]:
-        return self.joints
-
-    @property
     def warms(self) -> bool:
         return False
-
-    def seen(self, path: str, heat: str) -> Self:
-        return replace(self, name=path + self.name, joints=tuple(path + each for each in self.joints))
 
     def __str__(self) -> str:
         return f"{' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
@@ -364,13 +273,19 @@ ATTACHED: Mapping[str, type[Attachment]] = {
 
 @final
 @dataclass(frozen=True, slots=True)
-class ThermalNode:
+class ThermalNode(Element):
     """A body of uniform temperature: capacity in J/K, initial temperature in K.
 
     One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the
     ``reference`` in K.
     """
 
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "capacity": Number(energy=1, least=POSITIVE),
+        "temperature": Number(least=POSITIVE),
+        "pull": Number(energy=1, length=-1),
+        "reference": Number(),
+    }
     name: str
     capacity: float
     temperature: float
@@ -385,15 +300,11 @@ class ThermalNode:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Conduction:
+class Conduction(Element):
     """Heat conduction between two thermal nodes, or one and the environment; conductance in W/K."""
 
+    names: ClassVar[Mapping[str, str]] = {"between": "node"}
+    numbers: ClassVar[Mapping[str, Number]] = {"conductance": Number(energy=1, time=-1, least=NON_NEGATIVE)}
     name: str
     between: tuple[str, str]
     conductance: float
-
-
-def _frozen(values: Array) -> Array:
-    array = np.array(values, dtype=np.float64)
-    array.setflags(write=False)
-    return array

@@ -9,7 +9,8 @@ import numpy as np
 from ephs.mechanics.elements.cylinder import gas_spring, hydraulic_cylinder
 from ephs.mechanics.elements.gear import gear
 from ephs.mechanics.elements.motor import motor
-from ephs.mechanics.scene.attached import Attachment, Cylinder, GasSpring, Gear, Motor, Number
+from ephs.mechanics.scene.attached import Attachment, Cylinder, GasSpring, Gear, Motor
+from ephs.mechanics.scene.element import Number
 from ephs.mechanics.scene.model import ENVIRONMENT, Joint, Scene
 from ephs.operad import Path, Quantity, quantity
 from ephs.semantics.bundle import Array

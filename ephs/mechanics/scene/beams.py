@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.attached import Conduction, ThermalNode
+from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.entries import Checked, shown
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.flexible import FREE_END, Beam, Strain
+from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.placing import Place
@@ -95,12 +96,15 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     n = len(frames) - 1
     lengths = np.array([float(np.linalg.norm(shape[3:])) for shape in shapes])
     initial = np.array(entry.strain or np.zeros(6))
+    make = _element if entry.rod == "reissner" else _hinge
     joints: list[JointDraft] = []
-    for i, (shape, length) in enumerate(zip(shapes, lengths.tolist(), strict=True)):
-        between = f"{name}.{i}", f"{name}.{i + 1}"
-        make = _element if entry.rod == "reissner" else _hinge
-        element = make(f"{name}-{i + 1}", between, _settled(shape / length), length, initial, section, entry)
-        joints.append(element if entry.thermal is None else replace(element, heat=element.name))
+    for i, shape in enumerate(shapes):
+        own, ends_of = f"{name}-{i + 1}", (f"{name}.{i}", f"{name}.{i + 1}")
+        if i and shape is shapes[i - 1]:
+            element = replace(joints[-1], name=own, body1=ends_of[0], body2=ends_of[1])
+        else:
+            element = make(own, ends_of, _settled(shape / lengths[i]), float(lengths[i]), initial, section, entry)
+        joints.append(element if entry.thermal is None else replace(element, heat=own))
     held = "spherical" if entry.rod == "string" else "fixed"
     for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
         if end != FREE_END:
@@ -183,9 +187,10 @@ def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths
     swing = section.mass / 24.0 * (sides[0] ** 3 + sides[1] ** 3)
     way = {"reissner": np.zeros(3), "kirchhoff": np.array([0.0, 1.0, 1.0]), "string": np.array([0.1, 1.0, 1.0])}
     speed, spin = np.array(entry.velocity or np.zeros(3)), np.array(entry.angular_velocity or np.zeros(3))
+    places = np.array(frames)[:, 4:]
+    velocities = speed + np.cross(spin, places - places[0])
     bodies: dict[str, Body] = {}
-    for i, (pose, length) in enumerate(zip(frames, share, strict=True)):
-        velocity = speed + np.cross(spin, pose[4:] - frames[0][4:])
+    for i, (pose, length, velocity) in enumerate(zip(frames, share, velocities, strict=True)):
         twist = body_twist(pose, velocity, so3.quaternion_to_matrix(pose[:4]).T @ spin)
         back = 0.5 * lengths[i - 1] if i else 0.0
         bodies[str(i)] = Body(
@@ -302,7 +307,7 @@ def curve(points: Array, up: Array | None, elements: int) -> tuple[list[Array], 
     frames, shapes = [corners[0]], list[Array]()
     for one, two in pairwise(corners):
         along = SE3.log(SE3.compose(SE3.inverse(one), two))
-        frames += [SE3.normalise(SE3.compose(one, SE3.exp(along * (i / cut)))) for i in range(1, cut)]
+        frames += [SE3.retract(one, along * (i / cut)) for i in range(1, cut)]
         frames.append(two)
         shapes += [along / cut] * cut
     return frames, shapes

@@ -1,7 +1,7 @@
 """Scenes as JSON text: every number resolved, exact in a round trip. Solution files carry them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any
@@ -9,42 +9,19 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.attached import ATTACHED, Conduction, ThermalNode
-from ephs.mechanics.scene.flexible import Beam, Load, Strain
-from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
+from ephs.mechanics.scene.flexible import Strain
+from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
-from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 
 __all__ = ["scene_from_text", "scene_to_text"]
 
-_ARRAYS = {
-    World: {"gravity"},
-    Body: {"inertia", "pose", "twist"},
-    Joint: {"frame1", "frame2", "friction", "stiffness", "rest", "drive", "coordinate", "rate", "middle", "limits"},
-    Spring: {"at1", "at2"},
-    Marker: {"at"},
-    Surface: {"frame"},
-    Strain: {"stiffness", "rest"},
-    Load: {"force", "moment"},
-    **{kind: {key for key, of in kind.numbers.items() if of.shape(2)} for kind in ATTACHED.values()},
-}
-_PARTS = {
-    "bodies": Body,
-    "joints": Joint,
-    "springs": Spring,
-    "thermal": ThermalNode,
-    "conduction": Conduction,
-    "markers": Marker,
-    "surfaces": Surface,
-    "contacts": Contact,
-    "beams": Beam,
-    "loads": Load,
-    **ATTACHED,
-    "parts": Scene,
-}
+_BESIDE: Mapping[Any, frozenset[str]] = {Joint: frozenset({"coordinate", "limits"})}
+"""Arrays beside those among the numbers."""
+_SEVERAL = frozenset({"shapes", "between", "surfaces", "joints", "ends", "outline", "lengths"})
+"""What is several things, in order."""
 
 
 def scene_to_text(scene: Scene) -> str:
@@ -84,48 +61,37 @@ def _array(value: Any) -> Any:
 
 
 def _value(cls: Any, data: dict[str, Any]) -> Any:
-    arrays = _ARRAYS.get(cls, set())
-    return cls(**{key: _array(value) if key in arrays else value for key, value in data.items()})
+    """A value, with its arrays and the laws in it."""
+
+    def made(key: str, value: Any) -> Any:
+        if key in arrays:
+            return _array(value)
+        if key in _SEVERAL:
+            return tuple(value)
+        return _INSIDE[key](value) if value is not None and key in _INSIDE else value
+
+    arrays = {key for key, number in cls.numbers.items() if number.shape(1)} | _BESIDE.get(cls, frozenset())
+    return cls(**{key: made(key, value) for key, value in data.items()})
 
 
 def _law(given: dict[str, Any]) -> Law | Impact:
     return Law(**given) if "stiffness" in given else Impact(**given)
 
 
+_INSIDE: Mapping[str, Callable[[Any], Any]] = {
+    "motion": law_from,
+    "dry": lambda of: Dry(**of),
+    "stop": _law,
+    "law": _law,
+    "strain": lambda of: _value(Strain, of),
+}
+
+
 def _scene(data: dict[str, Any]) -> Scene:
     given = dict(data)
-    for key, cls in _PARTS.items():
-        entries: dict[str, Any] = given.get(key, {})  # older files lack some
-        if cls is Body:
-            entries = {name: entry | {"shapes": tuple(entry.get("shapes", ()))} for name, entry in entries.items()}
-        if cls is Conduction:
-            entries = {name: entry | {"between": tuple(entry["between"])} for name, entry in entries.items()}
-        if cls in ATTACHED.values():
-            entries = {
-                name: {key: tuple(value) if key == "joints" else value for key, value in entry.items()}
-                for name, entry in entries.items()
-            }
-        if cls is Joint:
-            entries = {
-                name: entry
-                | ({"motion": law_from(entry["motion"])} if entry.get("motion") is not None else {})
-                | ({"dry": Dry(**entry["dry"])} if entry.get("dry") else {})
-                | ({"stop": _law(entry["stop"])} if entry.get("stop") else {})
-                | ({"strain": _value(Strain, entry["strain"])} if entry.get("strain") else {})
-                for name, entry in entries.items()
-            }
-        if cls is Contact:
-            entries = {
-                name: entry | {"surfaces": tuple(entry["surfaces"]), "law": _law(entry["law"])}
-                for name, entry in entries.items()
-            }
-        if cls is Beam:
-            several = ("ends", "outline", "lengths")
-            entries = {
-                name: entry | {key: tuple(entry.get(key, ())) for key in several} for name, entry in entries.items()
-            }
-        make = _scene if cls is Scene else lambda entry, cls=cls: _value(cls, entry)
-        given[key] = {name: make(entry) for name, entry in entries.items()}
+    for key, cls in ELEMENTS.items():  # older files lack some
+        given[key] = {name: _value(cls, entry) for name, entry in given.get(key, {}).items()}
+    given["parts"] = {name: _scene(part) for name, part in given.get("parts", {}).items()}
     given["world"] = _value(World, given["world"])
     adjusted = given["adjusted"]
     if adjusted is not None:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.attached import ATTACHED
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
-from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Joint, Scene, frozen
+from ephs.mechanics.scene.model import ELEMENTS, GROUND, IDENTITY_POSE, Joint, Scene, World, frozen
 from ephs.mechanics.scene.motions import changed, number_of_law
 from ephs.mechanics.scene.surfaces import Contact
 from ephs.semantics.spaces import SE3
@@ -20,10 +21,6 @@ from ephs.semantics.spaces.rank import INERTIA
 __all__ = ["FIELDS", "Field", "placed"]
 
 Array = NDArray[np.float64]
-Least = tuple[float, bool]
-"""A lower bound, and whether it is excluded."""
-NON_NEGATIVE: Least = (0.0, False)
-POSITIVE: Least = (0.0, True)
 
 
 def _sound(_scene: Scene, _name: str, _before: Scene) -> list[Fault]:
@@ -40,7 +37,7 @@ class Field:
     get, put
         The array from (scene, dotted name); the scene from (scene, dotted name, array).
     least
-        Bound of every number.
+        Bound of every number, and whether it is excluded.
     spread
         Whether one number may stand for all freedoms.
     moves
@@ -51,7 +48,7 @@ class Field:
 
     get: Callable[[Scene, str], Array]
     put: Callable[[Scene, str, Array], Scene]
-    least: Least | None = None
+    least: tuple[float, bool] | None = None
     spread: bool = False
     moves: str = ""
     faults: Callable[[Scene, str, Scene], list[Fault]] = _sound
@@ -84,7 +81,7 @@ def _thing(scene: Scene, kind: str, name: str) -> Any:
     return _thing(scene.parts[part], kind, rest)
 
 
-def _attribute(kind: str, key: str, least: Least | None = None, **more: Any) -> Field:
+def _attribute(kind: str, key: str, **more: Any) -> Field:
     """A number or an array that is an attribute."""
 
     def get(scene: Scene, name: str) -> Array:
@@ -94,10 +91,14 @@ def _attribute(kind: str, key: str, least: Least | None = None, **more: Any) -> 
         value = frozen(values) if values.ndim else float(values)
         return _edited(scene, kind, name, lambda thing: replace(thing, **{key: value}))
 
-    return Field(get, put, least, **more)
+    return Field(get, put, ELEMENTS[kind].numbers[key].least, **more)
 
 
-def _law(key: str, least: Least | None = None) -> Field:
+def _attributes(kind: str) -> dict[str, Field]:
+    return {key: _attribute(kind, key) for key in ELEMENTS[kind].numbers}
+
+
+def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
     """A number of the law of contacts that have it: hard ones have no stiffness, soft ones no restitution."""
 
     def get(scene: Scene, name: str) -> Array:
@@ -113,14 +114,14 @@ def _law(key: str, least: Least | None = None) -> Field:
     return Field(get, put, least)
 
 
-def _world(key: str, least: Least | None = None) -> Field:
+def _world(key: str) -> Field:
     """A number of the world, which is the same in all parts."""
 
     def put(scene: Scene, name: str, values: Array) -> Scene:
         world = replace(scene.world, **{key: frozen(values) if values.ndim else float(values)})
         return replace(scene, world=world, parts={n: put(part, name, values) for n, part in scene.parts.items()})
 
-    return Field(lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), put, least)
+    return Field(lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), put, World.numbers[key].least)
 
 
 # ---- bodies ------------------------------------------------------------------------------------------------------
@@ -293,13 +294,9 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
 
 
 FIELDS: Mapping[str, Mapping[str, Field]] = {
-    "world": {
-        "gravity": _world("gravity"),
-        "temperature": _world("temperature", POSITIVE),
-        "pressure": _world("pressure", POSITIVE),
-    },
+    "world": {key: _world(key) for key in World.numbers},
     "bodies": {
-        "mass": _attribute("bodies", "mass", NON_NEGATIVE, faults=_body_faults),
+        "mass": _attribute("bodies", "mass", faults=_body_faults),
         "inertia": Field(_inertia, _put_inertia, faults=_body_faults),
         "position": Field(lambda scene, name: np.array(scene.body(name).pose[4:]), _put_position),
         "angular_velocity": Field(
@@ -321,22 +318,9 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "frame1.position": _frame("frame1"),
         "frame2.position": _frame("frame2"),
     },
-    "springs": {
-        "stiffness": _attribute("springs", "stiffness"),
-        "length": _attribute("springs", "length", NON_NEGATIVE),
-        "damping": _attribute("springs", "damping", NON_NEGATIVE),
-        "at1": _attribute("springs", "at1"),
-        "at2": _attribute("springs", "at2"),
-    },
-    **{
-        section: {key: _attribute(section, key, number.least) for key, number in kind.numbers.items()}
-        for section, kind in ATTACHED.items()
-    },
-    "thermal": {
-        "capacity": _attribute("thermal", "capacity", POSITIVE),
-        "temperature": _attribute("thermal", "temperature", POSITIVE),
-    },
-    "conduction": {"conductance": _attribute("conduction", "conductance", NON_NEGATIVE)},
+    **{section: _attributes(section) for section in ("springs", *ATTACHED)},
+    "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
+    **{section: _attributes(section) for section in ("conduction", "markers")},
     "contacts": {
         "stiffness": _law("stiffness", POSITIVE),
         "loss": _law("loss", NON_NEGATIVE),
@@ -345,6 +329,5 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "rolling": _law("rolling", NON_NEGATIVE),
         "spinning": _law("spinning", NON_NEGATIVE),
     },
-    "markers": {"at": _attribute("markers", "at")},
 }
 """Kind of element -> key of the scene file -> its numbers."""

@@ -1,21 +1,22 @@
 """Resolved beams and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FREE_END", "Beam", "Load", "Strain"]
+from ephs.mechanics.scene.element import Element, Measured, Number
+
+__all__ = ["Beam", "Load", "Strain"]
 
 Array = NDArray[np.float64]
-FREE_END = "free"
-"""A free end of a beam."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Strain:
+class Strain(Measured):
     """Elasticity of a beam element: the energy of the mean strain ξ = log(exp(L ξ₀) q_r)/L.
 
     Its joint's frame C1 is where C2 would be without force, so that q_r is 1 there.
@@ -29,6 +30,12 @@ class Strain:
     order : 2, the strain is the same all along, or 4, the stress is in balance; see `elements.strain`
     """
 
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "length": Number(length=1),
+        "stiffness": Number(energy=1, length=-1, head=1, ahead=3, count=6),
+        "rest": Number(head=-1, ahead=3, count=6),
+        "damping": Number(time=1),
+    }
     length: float
     stiffness: Array
     rest: Array
@@ -38,7 +45,7 @@ class Strain:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Beam:
+class Beam(Element):
     """A rod: its nodes are the bodies ``NAME.0`` … ``NAME.n``, its elements the joints ``NAME-1`` … ``NAME-n``.
 
     Attributes
@@ -48,6 +55,7 @@ class Beam:
     lengths : of the elements in m, where these are spherical joints between rigid pieces
     """
 
+    names: ClassVar[Mapping[str, str]] = {"ends": "end"}
     name: str
     elements: int
     ends: tuple[str, str]
@@ -67,12 +75,18 @@ class Beam:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Load:
+class Load(Element):
     """A force (3,) in N and a moment (3,) in N m on a body's centre of mass, which grow over ``ramp`` seconds.
 
     In world axes; those of a follower are in the axes of the body.
     """
 
+    names: ClassVar[Mapping[str, str]] = {"body": "body"}
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "force": Number(energy=1, length=-1, count=3),
+        "moment": Number(energy=1, count=3),
+        "ramp": Number(time=1),
+    }
     name: str
     body: str
     force: Array

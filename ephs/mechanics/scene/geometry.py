@@ -135,7 +135,7 @@ def frame_rotation(z: Array, x: Array | None = None) -> Array | None:
     if np.linalg.norm(normal) < ALIGNED:
         return None
     normal = normal / np.linalg.norm(normal)
-    return so3.matrix_to_quaternion(np.column_stack((normal, np.cross(z, normal), z)))
+    return so3.matrix_to_quaternion(np.column_stack((normal, so3.hat(z) @ normal, z)))
 
 
 def body_twist(pose: Array, velocity: Array, angular_velocity: Array) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.model import IDENTITY_POSE
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import rotations as so3
 
 Array = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ class Link:
     def gap(self, poses: Array, x: Array) -> tuple[float, float]:
         """The gap of the joint: distance in m, angle in rad."""
         gap = SE3.compose(SE3.inverse(self.coupling.include(x)), self.relative(poses))
-        return float(np.linalg.norm(gap[4:])), float(np.linalg.norm(SE3.log(gap)[:3]))
+        return float(np.linalg.norm(gap[4:])), so3.turn_of(gap[:4])
 
     def rows(self, x: Array) -> tuple[Array, Array]:
         """The matrices (6, 6) from the twists of body 1 and body 2 to the relative twist of C2 in C1, in

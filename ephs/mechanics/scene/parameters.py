@@ -11,14 +11,13 @@ it: joints keep what is not varied, unless they close a loop; then the nearest s
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, listing
 from ephs.mechanics.scene.fields import FIELDS, Field, placed
 from ephs.mechanics.scene.model import Scene
@@ -171,27 +170,12 @@ def _uniform(values: Array) -> bool:
 
 
 def _has(scene: Scene, kind: str, name: str) -> bool:
-    return not name if kind == "world" else name in _things(scene, kind)
-
-
-def _things(scene: Scene, kind: str) -> Mapping[str, Any]:
-    every: Mapping[str, Callable[[], Iterable[tuple[str, Any]]]] = {
-        "bodies": scene.all_bodies,
-        "joints": scene.all_joints,
-        "springs": scene.all_springs,
-        "thermal": scene.all_thermal,
-        "conduction": scene.all_conduction,
-        "contacts": scene.all_contacts,
-        "markers": scene.all_markers,
-    }
-    if kind in ATTACHED:
-        return {name: each for section, name, each in scene.all_attachments() if section == kind}
-    return dict(every[kind]())
+    return not name if kind == "world" else name in dict(scene.every(kind))
 
 
 def _paths(scene: Scene) -> Iterator[str]:
     for kind, fields in FIELDS.items():
-        for name in ("",) if kind == "world" else _things(scene, kind):
+        for name in ("",) if kind == "world" else dict(scene.every(kind)):
             for key, field in fields.items():
                 stem = f"{kind}.{name}.{key}" if name else f"{kind}.{key}"
                 values = field.get(scene, name)

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.mechanics.scene.element import POSE, Element, Number
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface:
+class Surface(Element):
     """A surface on a body, or on the ground.
 
     Attributes
@@ -27,6 +28,8 @@ class Surface:
     frame : (7,) pose in the body's centre-of-mass frame (ground: world)
     """
 
+    names: ClassVar[Mapping[str, str]] = {"body": "body"}
+    numbers: ClassVar[Mapping[str, Number]] = {"frame": POSE}
     name: str
     body: str
     shape: Mapping[str, Any]
@@ -35,7 +38,7 @@ class Surface:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Contact:
+class Contact(Element):
     """A contact between two surfaces.
 
     Attributes
@@ -45,6 +48,7 @@ class Contact:
     heat : where the heat goes, ``"environment"`` or the name of a thermal node
     """
 
+    names: ClassVar[Mapping[str, str]] = {"surfaces": "surface", "heat": "node"}
     name: str
     surfaces: tuple[str, str]
     law: Law | Impact

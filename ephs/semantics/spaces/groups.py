@@ -13,7 +13,7 @@ Twists are ordered (ω, υ), wrenches and momenta likewise.
 """
 
 from dataclasses import dataclass
-from math import cos, factorial, sin
+from math import cos, factorial, sin, sqrt
 from typing import final
 
 import numpy as np
@@ -79,7 +79,7 @@ class Rotations(Manifold):
         return a * np.array([1.0, -1.0, -1.0, -1.0])
 
     def exp(self, v: Array) -> Array:
-        return so3.matrix_to_quaternion(so3.rotation_exp(v))
+        return so3.rotation_exp(v)
 
     def log(self, x: Array) -> Array:
         return so3.rotation_log(x)
@@ -178,19 +178,16 @@ class RigidMotions(Manifold):
         # numbers, not arrays: setting up a mechanism composes some twenty poses a body
         w, x, y, z, *at = a.tolist()
         s, i, j, k, *to = b.tolist()
-        q = np.array([
-            w * s - x * i - y * j - z * k,
-            w * i + x * s + y * k - z * j,
-            w * j - x * k + y * s + z * i,
-            w * k + x * j - y * i + z * s,
-        ])  # fmt: skip
+        a0, a1 = w * s - x * i - y * j - z * k, w * i + x * s + y * k - z * j
+        a2, a3 = w * j - x * k + y * s + z * i, w * k + x * j - y * i + z * s
+        size = sqrt(a0 * a0 + a1 * a1 + a2 * a2 + a3 * a3) * (1.0 if a0 >= 0.0 else -1.0)
         e, f, g = y * to[2] - z * to[1], z * to[0] - x * to[2], x * to[1] - y * to[0]
-        moved = [
+        return np.array([
+            a0 / size, a1 / size, a2 / size, a3 / size,
             at[0] + to[0] + 2.0 * (w * e + y * g - z * f),
             at[1] + to[1] + 2.0 * (w * f + z * e - x * g),
             at[2] + to[2] + 2.0 * (w * g + x * f - y * e),
-        ]
-        return np.concatenate((so3.normalised(q if q[0] >= 0.0 else -q), moved))
+        ])  # fmt: skip
 
     def inverse(self, a: Array) -> Array:
         w, x, y, z, *at = a.tolist()
@@ -203,11 +200,13 @@ class RigidMotions(Manifold):
         ])  # fmt: skip
 
     def exp(self, v: Array) -> Array:
-        return np.concatenate((so3.matrix_to_quaternion(so3.rotation_exp(v[:3])), so3.rotation_dexp(v[:3]) @ v[3:]))
+        w = v[:3]
+        angle = sqrt(w @ w)
+        return np.concatenate((so3.rotation_exp(w), so3.sheared(w, v[3:], so3.beta(angle), so3.gamma(angle))))
 
     def log(self, x: Array) -> Array:
-        rotation = so3.rotation_log(x[:4])
-        return np.concatenate((rotation, so3.rotation_dexp_inv(rotation) @ x[4:]))
+        w = so3.rotation_log(x[:4])
+        return np.concatenate((w, so3.sheared(w, x[4:], -0.5, so3.cotangent(sqrt(w @ w)))))
 
     def adjoint(self, x: Array) -> Array:
         rotation = so3.quaternion_to_matrix(x[:4])
@@ -301,7 +300,7 @@ class DirectMotions(Manifold):
         return a * np.array([1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0])
 
     def exp(self, v: Array) -> Array:
-        return np.concatenate((so3.matrix_to_quaternion(so3.rotation_exp(v[:3])), v[3:]))
+        return np.concatenate((so3.rotation_exp(v[:3]), v[3:]))
 
     def log(self, x: Array) -> Array:
         return np.concatenate((so3.rotation_log(x[:4]), x[4:]))

@@ -11,7 +11,7 @@ Source: Lohmayer, Capobianco, Leyendecker, "Exergetic Port-Hamiltonian Systems f
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias, final
 
@@ -125,6 +125,8 @@ class Pair:
 
     def fit(self, relative: Array, near: Array | None = None) -> Array:
         """The element whose inclusion is nearest to a pose (7,); of several, one close to ``near``."""
+        if self.code == codes.SE3:
+            return np.array(relative)
         pitch = dict(self.parameters).get("pitch", 0.0)
         if near is not None:
             x = np.array(near)
@@ -198,6 +200,7 @@ def register_pair(entry: PairEntry) -> None:
     _ENTRIES[entry.name] = entry
 
 
+@lru_cache(maxsize=256)
 def pair(kind: str, **parameters: float) -> Pair:
     """The lower pair of a kind.
 

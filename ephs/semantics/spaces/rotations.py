@@ -4,7 +4,7 @@ Quaternions are stored [w, x, y, z], rotate body coordinates to world coordinate
 """
 
 from collections.abc import Callable
-from math import factorial, sin, tan
+from math import atan2, cos, factorial, sin, sqrt, tan
 
 import numpy as np
 
@@ -32,26 +32,23 @@ def terms(coefficient: Callable[[int], float]) -> tuple[float, ...]:
 
 def series(coefficients: tuple[float, ...], x: float) -> float:
     """The power series Σ coefficients[k] xᵏ."""
-    return sum(coefficient * x**k for k, coefficient in enumerate(coefficients))
+    found = 0.0
+    for coefficient in reversed(coefficients):
+        found = found * x + coefficient
+    return found
 
 
-_ALPHA = terms(lambda k: (-1) ** k / factorial(2 * k + 1))
-_BETA = terms(lambda k: (-1) ** k / factorial(2 * k + 2))
 _GAMMA = terms(lambda k: (-1) ** k / factorial(2 * k + 3))
 
 
 def alpha(angle: float) -> float:
     """sin θ / θ."""
-    if abs(angle) < SMALL_ANGLE:
-        return series(_ALPHA, angle**2)
-    return sin(angle) / angle
+    return sin(angle) / angle if angle else 1.0
 
 
 def beta(angle: float) -> float:
     """(1 − cos θ) / θ²."""
-    if abs(angle) < SMALL_ANGLE:
-        return series(_BETA, angle**2)
-    return 2.0 * (sin(0.5 * angle) / angle) ** 2
+    return 0.5 * alpha(0.5 * angle) ** 2
 
 
 def gamma(angle: float) -> float:
@@ -81,9 +78,30 @@ def cotangent(angle: float) -> float:
 
 
 def rotation_exp(w: Array) -> Array:
-    """Rotation matrix of a rotation vector: 1 + α ŵ + β ŵ²."""
-    angle, skew = float(np.linalg.norm(w)), hat(w)
-    return np.eye(3) + alpha(angle) * skew + beta(angle) * skew @ skew
+    """Unit quaternion with w ≥ 0 of a rotation vector: cos ½θ, ½ α(½θ) w."""
+    x, y, z = w.tolist()
+    half = 0.5 * sqrt(x * x + y * y + z * z)
+    real = cos(half)
+    scale = 0.5 * alpha(half) * (1.0 if real >= 0.0 else -1.0)
+    return np.array([abs(real), scale * x, scale * y, scale * z])
+
+
+def turn_of(q: Array) -> float:
+    """Angle of a unit quaternion's rotation, in [0, π]."""
+    w, x, y, z = q.tolist()
+    return 2.0 * atan2(sqrt(x * x + y * y + z * z), abs(w))
+
+
+def sheared(w: Array, v: Array, first: float, second: float) -> list[float]:
+    """(1 + a ŵ + b ŵ²) v with a and b the ``first`` and ``second`` coefficient."""
+    x, y, z = w.tolist()
+    e, f, g = v.tolist()
+    i, j, k = y * g - z * f, z * e - x * g, x * f - y * e
+    return [
+        e + first * i + second * (y * k - z * j),
+        f + first * j + second * (z * i - x * k),
+        g + first * k + second * (x * j - y * i),
+    ]
 
 
 def rotation_dexp(w: Array) -> Array:

@@ -109,7 +109,7 @@ def content(solution: "Solution", *, wrenches: bool = True) -> Content:
         "name": solution.name,
         "reference_temperature": solution.ledgers.temperature,
         "stats": json.dumps(dict(solution.stats)),
-        "model": solution.problem.document if solution.problem is not None else "",
+        "model": solution.problem.document() if solution.problem is not None else "",
     }
     return Content(solution.t, variables, attributes)
 

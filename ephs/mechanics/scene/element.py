@@ -1,0 +1,160 @@
+"""Numbers and references of a resolved scene's elements: shape, dimension and range of each number, kind of each name.
+
+Reading and writing, checks of files, other units, parameters by path and names seen from outside a part follow.
+"""
+
+from abc import ABC
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Final, Self, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "ENVIRONMENT",
+    "FREE_END",
+    "GROUND",
+    "NON_NEGATIVE",
+    "OUTSIDE",
+    "POSE",
+    "POSITIVE",
+    "TWIST",
+    "Element",
+    "Measured",
+    "Number",
+    "frozen",
+]
+
+Array = NDArray[np.float64]
+GROUND = "ground"
+ENVIRONMENT = "environment"
+FREE_END = "free"
+"""A free end of a beam."""
+OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
+    "body": frozenset({GROUND}),
+    "end": frozenset({GROUND, FREE_END}),
+    "node": frozenset({ENVIRONMENT}),
+    "joint": frozenset(),
+    "surface": frozenset(),
+}
+"""Kind of a name that refers to something -> the names that are the same in all parts."""
+POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
+"""A lower bound, and whether it is excluded."""
+
+
+def frozen(values: ArrayLike) -> Array:
+    """A read-only float copy of ``values``."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Number:
+    """Dimension, count and range of a number, or of a row or square of numbers.
+
+    Parameters
+    ----------
+    energy, time, length
+        Exponents of its dimension.
+    first, others
+        Exponents of the units of coordinates: of the first one; of each one's own, where there is a number for each.
+    count
+        Of a row of numbers; 0 for one number.
+    each
+        There is a number for each coordinate from this one on; −1 for none.
+    square
+        Whether there is such a row for each of them.
+    head, ahead
+        The first ``ahead`` numbers of a row have the exponent ``head`` of length instead.
+    least
+        Bound from below, and whether it is excluded.
+    """
+
+    energy: int = 0
+    time: int = 0
+    length: int = 0
+    first: int = 0
+    others: int = 0
+    count: int = 0
+    each: int = -1
+    square: bool = False
+    head: int = 0
+    ahead: int = 0
+    least: tuple[float, bool] | None = None
+
+    def shape(self, coordinates: int) -> tuple[int, ...]:
+        """Shape of its array where there are so many coordinates."""
+        if self.each < 0 and not self.count:
+            return ()
+        return (coordinates - self.each if self.each >= 0 else self.count,) * (2 if self.square else 1)
+
+    def unit(self, length: float, mass: float, time: float, coordinates: Sequence[float]) -> Any:
+        """Its unit, of those of length, mass and time, and of coordinates."""
+        energy = mass * length**2 / time**2
+        whole = energy**self.energy * time**self.time
+        whole *= coordinates[0] ** self.first if self.first and len(coordinates) else 1.0
+        powers = [self.head] * self.ahead + [self.length] * (max(self.count, 1) - self.ahead)
+        if self.each >= 0:
+            own = np.array([x**self.others for x in coordinates[self.each :]])
+            return whole * length**self.length * (np.outer(own, own) if self.square else own)
+        return whole * (np.array([length**x for x in powers]) if self.ahead else length**self.length)
+
+
+POSE: Final = Number(length=1, ahead=4, count=7)
+TWIST: Final = Number(time=-1, length=1, ahead=3, count=6)
+
+
+class Measured(ABC):  # noqa: B024 - what differs are values
+    """Something with numbers."""
+
+    __slots__ = ()
+    numbers: ClassVar[Mapping[str, Number]] = {}
+
+    def values(self, coordinates: int = 0) -> dict[str, tuple[Any, tuple[int, ...]]]:
+        """Its numbers with their required shapes, without omitted ones."""
+        given = {key: (getattr(self, key), number.shape(coordinates)) for key, number in self.numbers.items()}
+        return {key: pair for key, pair in given.items() if pair[0] is not None}
+
+    def rescaled(self, length: float, mass: float, time: float, coordinates: Sequence[float] = ()) -> Self:
+        """The same in other units; ``coordinates`` are those of its coordinates, or of its joints'."""
+        changed: dict[str, Any] = {}
+        for key, (value, _) in self.values().items():
+            found = value * self.numbers[key].unit(length, mass, time, coordinates)
+            changed[key] = frozen(found) if isinstance(value, np.ndarray) else float(found)
+        return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all are dataclasses
+
+
+class Element(Measured):
+    """Something in a scene that has a name.
+
+    Attributes
+    ----------
+    names
+        Attributes that name other elements, one or several, and of which kind: a key of `OUTSIDE`.
+    """
+
+    __slots__ = ()
+    names: ClassVar[Mapping[str, str]] = {}
+    name: str
+
+    def named(self, kind: str) -> tuple[str, ...]:
+        """The names of a kind to which it refers."""
+        given: list[str | tuple[str, ...]] = [getattr(self, key) for key, of in self.names.items() if of == kind]
+        return tuple(name for one in given for name in ((one,) if isinstance(one, str) else one))
+
+    def seen(self, path: str) -> Self:
+        """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
+        if not path:
+            return self
+
+        def dotted(name: str, kind: str) -> str:
+            return name if name in OUTSIDE[kind] else path + name
+
+        changed: dict[str, Any] = {"name": path + self.name}
+        for key, kind in self.names.items():
+            own: str | tuple[str, ...] = getattr(self, key)
+            changed[key] = dotted(own, kind) if isinstance(own, str) else tuple(dotted(name, kind) for name in own)
+        return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all are dataclasses

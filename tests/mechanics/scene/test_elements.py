@@ -1,0 +1,74 @@
+"""What a scene's elements declare of their numbers and names is all that there is of them."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.element import OUTSIDE
+from ephs.mechanics.scene.flexible import Strain
+from ephs.mechanics.scene.model import ELEMENTS, Joint, World
+from ephs.mechanics.scene.rescaled import rescaled
+from ephs.mechanics.scene.soundness import check_scene
+
+SCENES = sorted((Path(__file__).parents[3] / "scenes").glob("*.toml"))
+BESIDE = {Joint: {"coordinate", "limits"}}
+EXPONENTS = st.tuples(*[st.integers(-30, 30)] * 3)
+
+
+def is_number(kind):
+    return kind is float or "ndarray" in str(kind)
+
+
+@pytest.mark.parametrize("kind", [*ELEMENTS.values(), World, Strain], ids=lambda kind: kind.__name__)
+def test_every_number_has_a_dimension(kind):
+    found = {each.name for each in fields(kind) if is_number(each.type)}
+    assert found - BESIDE.get(kind, set()) == set(kind.numbers)
+
+
+@pytest.mark.parametrize("kind", ELEMENTS.values(), ids=lambda kind: kind.__name__)
+def test_every_reference_says_of_what(kind):
+    assert set(kind.names) <= {each.name for each in fields(kind)} - {"name"}
+    assert set(kind.names.values()) <= set(OUTSIDE)
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_units_come_back_to_the_bit(path):
+    scene = ephs.load(path)
+    before = scene_to_text(scene)
+
+    @settings(max_examples=3, deadline=None)
+    @given(exponents=EXPONENTS)
+    def law(exponents):
+        sizes = [2.0**k for k in exponents]
+        there = rescaled(scene, *sizes)
+        check_scene(there)
+        assert scene_to_text(rescaled(there, *(1.0 / size for size in sizes))) == before
+        assert scene_to_text(scene_from_text(before)) == before
+
+    law()
+
+
+def test_numbers_have_the_units_that_physics_gives_them():
+    """Force is mass times acceleration, a moment force times arm, inertia mass times the square of an arm."""
+    unit = {
+        (section, key): number.unit(3.0, 5.0, 7.0, ())
+        for section, kind in ELEMENTS.items()
+        for key, number in kind.numbers.items()
+        if number.each < 0
+    }
+    force = 5.0 * 3.0 / 49.0
+    expected = {
+        ("bodies", "mass"): 5.0, ("bodies", "inertia"): 45.0, ("springs", "stiffness"): force / 3.0,
+        ("springs", "damping"): force * 7.0 / 3.0, ("loads", "force"): force, ("loads", "moment"): 3.0 * force,
+        ("conduction", "conductance"): 3.0 * force / 7.0, ("motors", "constant"): 21.0 * force,
+        ("cylinders", "bulk"): force / 9.0, ("markers", "at"): 3.0,
+    }  # fmt: skip
+    for key, value in expected.items():
+        np.testing.assert_allclose(unit[key], value, rtol=1e-14)
+    np.testing.assert_allclose(unit["bodies", "twist"] * 7.0, [1.0] * 3 + [3.0] * 3, rtol=1e-15)
