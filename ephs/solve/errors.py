@@ -139,14 +139,14 @@ def count_of(key: str, given: object) -> int:
 
 
 class SimulationError(RuntimeError):
-    """A run that failed part-way.
+    """A failed run.
 
     Attributes
     ----------
     outcome, time, path, equation, advice
-        What happened, at which time in s, in which component and equation, and what to do.
+        Cause, time in s, component, equation, and advice.
     partial
-        The Solution up to there, or None where not even the first step was set up.
+        The Solution up to the failure, or None if it happened before the first step.
     """
 
     def __init__(self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None") -> None:

@@ -97,62 +97,61 @@ def simulate(
     Parameters
     ----------
     until, t0
-        End and start in s. An end before the start runs backward in time, where nothing produces entropy.
+        End and start in s. An end before the start runs backward in time; then no component may produce entropy.
     initial
-        Values of states by path; a system's others at the identity, a scene's as it says.
+        Values of states by path. Other states are at the identity in systems, and as in the file in scenes.
     method
-        One of `ephs.mechanics.methods.registry.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
-        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or ``"auto"``: natural with ``step``; without it explicit, and
-        radau from where the problem shows itself stiff, for scenes, radau for systems on vector spaces. Or a
-        `Method` of one's own.
+        One of `ephs.mechanics.methods.registry.METHODS`, such as ``"natural"``, ``"natural4"``, ``"variational"``,
+        ``"radau"``, ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or a `Method` of your own; or ``"auto"``: natural
+        with ``step``; without it radau for systems on vector spaces, and for scenes explicit, and radau if stiff.
     rtol, atol
-        Without ``step``: each state x is wanted to ``atol + rtol·|x|``, atol in the state's own unit, of the
-        mechanism's own length, mass and time where these are far from 1 m, 1 kg and 1 s. Either may be
-        a mapping from kinds of quantities or paths to numbers, ``"*"`` for all others.
+        Tolerances without ``step``: the error of a state x should be below ``atol + rtol·|x|``. atol is in the
+        state's unit, or in the mechanism's own units if these are far from 1 m, 1 kg and 1 s. Each may be
+        a mapping from kinds of quantities or paths to numbers, with ``"*"`` for all others.
     step
-        The grid is t₀ + k·step, the last step shortened to end on ``until``. Without it rtol and atol steer.
+        Constant step in s: the grid is t₀ + k·step, the last step ends at ``until``. Default: chosen by rtol and atol.
     max_step, min_step, max_steps
-        Limits for the steps in s that are chosen, and for their number.
+        Limits of chosen steps in s, and of their number.
     save_at
-        Times to keep, met by dense output; every step where None.
+        Times to keep; all steps if None.
     form
-        ``"paper"``: as flattened, what the natural methods solve; ``"folded"``: the same with transformers and the
-        junctions behind them taken out, for them too; ``"reduced"``, the default: the least that a method can use.
+        ``"paper"``: the flattened equations, for natural methods; ``"folded"``: without transformers and the
+        junctions behind them, for natural methods; ``"reduced"``, the default: the smallest form of the method.
     events
-        `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
-        and end the run where they say so.
+        `ephs.Event` values or functions f(t, state) -> number. Their zeros are located and recorded in
+        ``sol.events``; events with ``stop`` end the run.
     options
-        The method's own: ``{"rho": 0.8}`` of alpha.
+        Options of the method, such as ``{"rho": 0.8}`` of alpha.
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
-        force in world axes; f a constant, f(t), f(t, state), or `ephs.Sampled`. A tuple of such names has the numbers
-        of all in a row. The state is read by path, that of a scene by name too: ``state.joints.pin.rate``; see
-        `ephs.mechanics.motion.views.StateView`.
+        force in world axes; f is a constant, f(t), f(t, state), or `ephs.Sampled`. For a tuple of names, f returns
+        the numbers of all as one vector. States are read by path, those of scenes also by name, as
+        ``state.joints.pin.rate``; see `ephs.mechanics.motion.views.StateView`.
     jumps
-        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and go on
-        from the other side. Functions are searched for others; see `ephs.solve.probe`.
+        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end and restart
+        there. Functions are searched for undeclared jumps; see `ephs.solve.probe`.
     reference
-        The reference environment of a system; a scene's world gives its own.
+        The reference environment of a system; a scene has its own.
     progress
         Called as progress(t, until, stats) a few times a second.
     journal
-        A file that receives the run while it goes on. Whatever ends the run, the same call goes on from there, to the
-        very numbers of a run that nothing disturbed; `load_solution` reads what it holds.
+        A file to which the run is written as it proceeds. After an interruption, the same call resumes, with the same
+        numbers as an uninterrupted run; `load_solution` reads the file.
     audit
-        What findings of the run's audit become: ``"fail"`` an `AuditError`, ``"warn"`` an `AuditWarning`, ``"off"``
-        nothing but the record in ``sol.audit`` and the summary.
+        Consequence of findings of the audit: ``"fail"`` raises `AuditError`, ``"warn"`` warns with `AuditWarning`,
+        ``"off"`` only records them in ``sol.audit`` and the summary.
 
     Raises
     ------
     AuditError
-        The run reached its end, and its result breaks a law; ``.partial`` is the whole solution.
+        The run is complete, but its result violates a law; ``.partial`` is the whole solution.
     SimulationError
-        The run failed part-way; ``.partial`` is the solution up to there.
+        The run failed; ``.partial`` is the solution up to the failure.
     SemanticsError
-        The model has no square system of equations, a state or an input does not fit.
+        The equations of the model are not square, or a state or an input does not fit.
     OptionError
-        An option is not known, or not possible with the method; a ValueError.
+        An option is unknown, or not possible with the method; a ValueError.
     """
     if form not in FORMS:
         raise OptionError("form", form, f"one of {', '.join(FORMS)}" + nearest_of(form, FORMS))
