@@ -1,6 +1,5 @@
 """Processor time of the commands of every day, each in a new process with kernels on disk."""
 
-import os
 import resource
 import subprocess
 import sys
@@ -9,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from benchmarks.process import with_bytecode
 from benchmarks.report import Report, table_of
 
 __all__ = ["report"]
@@ -21,14 +21,9 @@ TIMES = 2
 def spent(words: Sequence[str]) -> float:
     """Processor time in s, of all threads, of ``python`` with these words."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL, env=_bytecode())
+    subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL, env=with_bytecode())
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-
-
-def _bytecode() -> dict[str, str]:
-    """The environment, with compiled modules kept as in an installation."""
-    return {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
 
 def report() -> Report:

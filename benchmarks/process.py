@@ -8,7 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-__all__ = ["run"]
+__all__ = ["run", "with_bytecode"]
+
+
+def with_bytecode() -> dict[str, str]:
+    """The environment, with compiled modules of Python kept as in an installation."""
+    return {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
 
 def run(
@@ -36,7 +41,7 @@ def run(
             text=True,
             timeout=limit,
             cwd=Path(__file__).parent.parent,
-            env={**os.environ, **(environment or {})},
+            env={**with_bytecode(), **(environment or {})},
             check=False,
         )
     except subprocess.TimeoutExpired:
