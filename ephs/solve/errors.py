@@ -31,10 +31,10 @@ __all__ = [
 class Outcome(StrEnum):
     """Cause that ended a run, in words; `advice` is the remedy."""
 
-    DIVERGED = "the step's equations have no solution near by"
+    DIVERGED = "the step's equations have no solution nearby"
     SINGULAR = "the step's equations stay singular"
     CONTRADICTION = "a constraint contradicts the others"
-    OPEN = "a loop that does not close near by"
+    OPEN = "a loop that does not close nearby"
     SHAKY = "a mechanism that moves to first order only"
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
@@ -45,16 +45,16 @@ class Outcome(StrEnum):
     RANGE = "a state beyond the range of numbers"
     PYTHON = "a Python function of the model raised an exception"
     INCONSISTENT = "an initial state that contradicts the constraints"
-    TINY = "a step below the least that is allowed"
+    TINY = "a step below the smallest allowed one"
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
     RESTLESS = "no state in which nothing moves"
     INPUT = "an input's function has no value"
     EVENT = "an event's function has no value"
     UNWRITTEN = "the journal cannot be written"
-    PROGRESS = "the function that is told of progress raised an exception"
+    PROGRESS = "the progress function raised an exception"
     UNLAWFUL = "the result does not pass its audit"
-    MEMORY = "more memory than there is"
+    MEMORY = "exhausted memory"
     INTERRUPTED = "interrupted"
 
     @property
@@ -67,12 +67,12 @@ _ADVICE = {
     Outcome.DIVERGED: "take a smaller step",
     Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which omits redundant equations",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
-    Outcome.OPEN: "take a smaller step, or check what is prescribed: the mechanism may be at the end of its travel",
-    Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry nothing across their line",
+    Outcome.OPEN: "take a smaller step, or check the prescribed motions: the mechanism may be at the end of its travel",
+    Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry no load across their line",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
-    Outcome.ENTROPY: "mend the component's function there; if it is right, take a smaller step",
-    Outcome.LAWLESS: "take a smaller step, or natural; mend the component where that is refused, too",
+    Outcome.ENTROPY: "correct the component's function there; if it is correct, take a smaller step",
+    Outcome.LAWLESS: "take a smaller step, or natural; correct the component if natural refuses it, too",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",
@@ -81,14 +81,14 @@ _ADVICE = {
     Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
     Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
-    Outcome.RESTLESS: "start nearer to one, or add what holds it: a spring, a stop of the drive, an environment",
-    Outcome.INPUT: "see the exception above this one, or give a function of as many finite numbers as are wanted",
-    Outcome.EVENT: "see the exception above this one, or give a function that is a number everywhere",
-    Outcome.UNWRITTEN: "make room on the disk, then let the run go on with the same journal",
+    Outcome.RESTLESS: "start nearer to one, or hold the system by a spring, a stop of the drive, or an environment",
+    Outcome.INPUT: "see the exception above this one, or return the required number of finite numbers",
+    Outcome.EVENT: "see the exception above this one, or return a number everywhere",
+    Outcome.UNWRITTEN: "free disk space, then resume with the same journal",
     Outcome.PROGRESS: "see the exception above this one",
     Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
     Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
-    Outcome.INTERRUPTED: "what was computed is in .partial",
+    Outcome.INTERRUPTED: "the results so far are in .partial",
 }
 LARGEST = 1e150
 """Bound of states: squares of larger ones overflow."""

@@ -50,7 +50,7 @@ class SweepInterrupted(KeyboardInterrupt):
     """
 
     def __init__(self, partial: "xr.Dataset") -> None:
-        super().__init__("interrupted; what was computed is in .partial")
+        super().__init__("interrupted; the results so far are in .partial")
         self.partial = partial
 
 
