@@ -41,18 +41,18 @@ def export(
         ``.c``: C text; ``.o``: object code; both with a header ``.h`` beside it, which lists inputs and outputs.
         ``.wasm``: WebAssembly, whose functions are those of the header.
     name
-        Beginning of the names of its functions; left out, the file's.
+        Prefix of the names of its functions; default: the file's name.
     inputs
-        Joints, as ``joints.pin``, on whose free coordinates forces in N or N m are given from outside.
+        Joints, as ``joints.pin``, with inputs: forces in N or N m on their free coordinates.
     parameters
-        Numbers of the model that may be changed at the start, by their paths, as ``bodies.rod.mass``: those that the
-        program's numbers are polynomials of degree 2 in, so that nothing is approximated.
+        Paths of numbers that can be changed at the start, as ``bodies.rod.mass``. The program's numbers must be
+        polynomials of degree 2 in them, so that nothing is approximated.
     method, rtol, atol, step
-        As of `ephs.simulate`: rk54 or rk87.
+        As for `ephs.simulate`: rk54 or rk87.
     until
-        Time in s over which the error is to stay within the tolerances; the program runs on beyond.
+        Time in s over which the error should stay within the tolerances; the program can run longer.
     target
-        Machine of object code, of `ephs.semantics.stage.objects.TARGETS`; left out, this one.
+        Machine of object code, of `ephs.semantics.stage.objects.TARGETS`; default: this one.
 
     Returns
     -------

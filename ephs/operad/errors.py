@@ -71,9 +71,9 @@ class PatternError(ValueError):
     kind
         The key of the message.
     box, port, junction
-        The dotted paths of what is at fault, ``None`` where it does not apply.
+        Dotted paths of the faulty items, or ``None``.
     found, expected
-        What was given, and what would have been right.
+        The given and the expected value.
     **facts
         Further words of the message.
     """

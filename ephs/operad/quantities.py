@@ -83,23 +83,23 @@ class Quantity:
     kind
         Its name: ``"displacement"``, ``"momentum"``, ``"entropy"``, ``"pose"``, …
     space
-        Where its values, flows and efforts live.
+        The space of its values, flows and efforts.
     parity
         +1 if it is even under time reversal, -1 if it is odd, as momenta and flux linkages are.
     frame
         Name of the frame in which it is given, to find ports connected across frames. It has no bearing on
         the semantics and is compared only where both sides carry one.
     domain
-        Open interval of its numbers, such as (0, inf): states of vector spaces only, groups are as they are.
+        Open interval of its numbers, such as (0, inf); for states on vector spaces only.
     charges
-        What is conserved with it: pairs of a name and the amount of that in a unit of each number; a mapping will do.
-        Of a species the names are elements, so that the charges of several quantities are an element matrix. The
-        reference environment has an intensive value for each charge, as the temperature for ``"entropy"``, the
+        Conserved contents: pairs, or a mapping, of a name and the amount per unit of each number.
+        For a species the names are elements, so the charges of several quantities form an element matrix. The
+        reference environment has an intensive value for each charge: the temperature for ``"entropy"``, the
         pressure for ``"volume"``, and potentials for all others.
     unit
-        As ``"kg m²/s"``; empty where it is not said.
+        Such as ``"kg m²/s"``; empty if unknown.
 
-    A scalar of a kind that the package knows has that kind's domain, charges and unit where it gives none.
+    Scalars of the package's kinds have the domain, charges and unit of the kind by default.
 
     Raises
     ------

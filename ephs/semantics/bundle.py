@@ -30,8 +30,8 @@ class Reference:
     Parameters
     ----------
     potentials
-        μ₀ of each further charge in J a unit of it: of elements, in J/mol, so that the reference potential of a species
-        is the sum over its atoms, and no reaction changes it; 0 where it is not given.
+        μ₀ of each further charge in J per unit, 0 by default; of elements in J/mol. The reference potential of a
+        species is the sum over its atoms, and no reaction changes it.
     """
 
     temperature: float = 293.15

@@ -45,11 +45,11 @@ def storage(
     energy
         E in J, called with the ports' states by name: floats where scalar, else arrays.
     gradient
-        dE, left-trivialised: a sequence with an entry for each port, or (n,). Where None it is derived from the
-        energy; by differences where that cannot be recorded.
+        dE, left-trivialised: a sequence with an entry for each port, or (n,). By default derived from the
+        energy, by finite differences if the energy cannot be recorded.
     domain
-        Port name -> (least, greatest) number between which its states lie: the conditions are to hold there. A run that
-        leaves it ends by name.
+        Port name -> (least, greatest) bounds of its states, within which the conditions must hold. A run that
+        leaves the domain ends with a message.
 
     Raises
     ------

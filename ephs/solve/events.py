@@ -27,11 +27,11 @@ class Event:
     function
         f(t, state) -> number; the state is read by path, as in inputs.
     name
-        What the solution calls it.
+        Its name in the solution.
     direction
-        +1: only where it rises in time, −1: only where it falls, 0: both.
+        +1: only rising in time, −1: only falling, 0: both.
     stop
-        Whether the run ends there.
+        Whether the run ends at this event.
     """
 
     function: Callable[[float, Mapping[Any, Array]], float]

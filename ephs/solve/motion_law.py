@@ -162,16 +162,16 @@ class HarmonicMotion(MotionLaw):
 @final
 @dataclass(frozen=True, slots=True)
 class TabulatedMotion(MotionLaw):
-    """A spline of fifth order through points: at rest before the first one and after the last.
+    """A spline of fifth order through points, at rest before the first and after the last one.
 
-    Rate and acceleration are zero at both ends, so that they are continuous throughout.
+    Rate and acceleration are zero at both ends, and continuous everywhere.
 
     Parameters
     ----------
     times
         (n,) ascending, in s, n ≥ 2.
     displacements
-        (n,) in rad or m, of which differences count.
+        (n,) in rad or m; only their differences matter.
 
     Raises
     ------

@@ -33,22 +33,22 @@ class Sampled:
     Parameters
     ----------
     period
-        In s; samples are taken at t₀ + k·period.
+        Time between samples in s; samples are taken at t₀ + k·period.
     function
-        f(t, state) -> numbers, the state read as by other inputs; with ``memory`` f(t, state, memory) -> (numbers,
-        memory for the next sample).
+        f(t, state) -> numbers, with the state read as by other inputs; with ``memory`` f(t, state, memory) ->
+        (numbers, memory for the next sample).
     memory
-        What the controller remembers at first: numbers, arrays, and lists and mappings of such. None: nothing.
+        Initial memory of the controller: numbers, arrays, and lists and mappings of these. None: no memory.
     delay
-        In s, from a sample to where its value takes effect; ``initial`` is held until the first one does.
+        Time in s from a sample until its value takes effect; before the first one, the value is ``initial``.
     limits
-        (lower, upper): numbers, or arrays of as many as the function gives, that its values are cut off at.
+        (lower, upper) bounds of the values: numbers, or arrays of the length of the function's result.
     noise
-        Standard deviations by what is measured: ``{"joints.waist.rate": 0.01}``, or by path of a state.
+        Measured quantity -> standard deviation: ``{"joints.waist.rate": 0.01}``, or by path of a state.
     seed
-        Of the noise: it depends on this and on the number of the sample, on nothing else.
+        Seed of the noise, which depends only on the seed and the number of the sample.
     initial
-        A number, or an array.
+        Value before the first sample takes effect: a number, or an array.
 
     Raises
     ------

@@ -27,17 +27,17 @@ def dynamics(
     Parameters
     ----------
     scene
-        With its drives, springs, friction and prescribed motions; its initial state is ``state0``. Bodies and joints of
-        a system have the paths of their boxes for names.
+        With its drives, springs, friction and prescribed motions; its initial state is ``state0``. The names of bodies
+        and joints of a system are the paths of their boxes.
     initial, inputs, reference
-        Of a system, as `simulate` takes them.
+        Of a system, as in `simulate`.
 
     Raises
     ------
     OptionError
-        The reduced form cannot have the model: a loop of prescribed joints; or what a scene says itself is given.
+        The reduced form does not support the model (a loop of prescribed joints), or an argument is part of the scene.
     Unplaced
-        A component of a system has no place in joint coordinates.
+        A component of a system is not supported in joint coordinates.
     SimulationError
         The initial state contradicts the joints.
     """

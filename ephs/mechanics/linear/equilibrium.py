@@ -82,24 +82,24 @@ def equilibrium(
 ) -> Equilibrium:
     """An equilibrium near the initial state.
 
-    A scene goes from its initial state, rates zero, to where gravity, springs and drives balance: by steps along the
-    eigenvectors of its stiffness in the mass metric, against the forces also where it is not stable, so that it comes
-    to rest in a minimum of the energy unless it starts balanced. A system settles by implicit Euler steps of growing
-    length, which keep its linear invariants (charges, volumes, entropies of what exchanges none).
+    For a scene, the search starts at its initial state with zero rates, and ends at a balance of gravity, springs and
+    drives. It takes steps along the eigenvectors of the stiffness in the mass metric, downhill in unstable directions,
+    too; unless the initial state is balanced, the result is a minimum of the energy. A system settles by implicit Euler
+    steps of growing length, which preserve its linear invariants (charges, volumes, entropies of isolated parts).
 
     Parameters
     ----------
     initial
-        Of a system: where it starts, states by path, others at the identity.
+        Initial states of a system by path, others at the identity.
     inputs
-        Of a system: ``{port: {"effort": e}}`` or ``{"flow": f}``, constant; zero flow at ports that are not named.
+        Of a system: ``{port: {"effort": e}}`` or ``{"flow": f}``, constant; zero flow at all other ports.
     reference
         The reference environment of a system.
 
     Raises
     ------
     SimulationError
-        None was found: the message says what still moves, and where.
+        No equilibrium was found; the message names what still moves.
     """
     if isinstance(model, System):
         return _of_system(model, initial, inputs, reference)

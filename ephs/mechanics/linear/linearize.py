@@ -34,17 +34,17 @@ def linearize(
     Parameters
     ----------
     state
-        Where: a `State` of `ephs.dynamics`, values of states by path, an `Equilibrium`, or ``"equilibrium"`` to have
-        one found; where None a scene's initial state, a system's states at the identity. In a state that moves, the
-        system is that of the moment.
+        A `State` of `ephs.dynamics`, values of states by path, an `Equilibrium`, or ``"equilibrium"``, which finds
+        one. Default: the initial state of a scene, the identity for states of a system. In a moving state, the linear
+        system holds at that instant.
     inputs
-        Of a scene the names of what is pushed: ``"joints.pin"``, a force on its twist u_r, ``"bodies.crank"``, a wrench
-        in the body frame, ``"markers.tip"``, a force in world axes; all joints where None. Of a system
-        ``{port: {"effort": e}}`` or ``{"flow": f}``, what is prescribed at its outer ports and its value there; flow
-        zero at ports that are not named.
+        Names of inputs of a scene: ``"joints.pin"``, a force on its twist u_r, ``"bodies.crank"``, a wrench
+        in the body frame, ``"markers.tip"``, a force in world axes; all joints by default. For a system
+        ``{port: {"effort": e}}`` or ``{"flow": f}``, the prescribed quantity at its outer ports and its value; zero
+        flow at all other ports.
     outputs
-        The inputs' power conjugates where None. Of a scene names as for inputs, for rates and twists, or with
-        ``.coordinate`` (joints), ``.position`` (bodies, markers) for places; of a system ports and paths of states.
+        Default: the power conjugates of the inputs. For a scene, names as for inputs give rates and twists; with
+        ``.coordinate`` (joints) and ``.position`` (bodies, markers) positions. For a system, ports and paths of states.
     form
         ``"reduced"``: a scene in independent joint coordinates; ``"paper"``: the states of its system.
     reference

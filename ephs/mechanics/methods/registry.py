@@ -222,7 +222,7 @@ def register_method(method: Method) -> None:
     Raises
     ------
     OptionError
-        The name is taken, or it neither chooses its steps nor takes constant ones.
+        The name is in use, or the method supports neither chosen nor constant steps.
     """
     if method.name in METHODS or method.name == "auto":
         raise OptionError("method", method.name, "a name that is not taken")

@@ -68,7 +68,7 @@ def _friction(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     at = [where.junction for where in draft.wires[box].values()]
     lonely = [j for j in at if {b for b, _ in draft.on(j)} == {box} and draft.junctions[j].exposed]
     if not refusal and lonely:
-        refusal = f"nothing else lies on the outer port {lonely[0]}"
+        refusal = f"nothing else is connected to the outer port {lonely[0]}"
 
     def make(draft: Draft) -> StateMap:
         touched = [where.junction for where in draft.wires[box].values()]
@@ -78,7 +78,7 @@ def _friction(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         return _without(lost, lambda _state, start: {path: start[path] for path in lost})
 
     reason = f"{box} resists nothing" + (f", and no heat reaches {sinks[0]}" if sinks else "")
-    return Site("drop friction that resists nothing", box, Strength.RELATION, reason, refusal, make)
+    return Site("remove friction of zero resistance", box, Strength.RELATION, reason, refusal, make)
 
 
 def _storage(draft: Draft, box: Path) -> Storage:
@@ -126,14 +126,14 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     elif others := [b for b, _ in draft.on(body.pose) if b not in (box, body.coupling)]:
         refusal = f"{others[0]} acts on the pose"
     elif {b for b, _ in draft.on(body.momentum)} == {body.coupling} and draft.junctions[body.momentum].exposed:
-        refusal = f"nothing else lies on the outer port {body.momentum}"
+        refusal = f"nothing else is connected to the outer port {body.momentum}"
     elif waiting := [at for at in _at(draft, body.momentum) if _goes(draft, at)]:
         refusal = f"{waiting[0]} {FIRST}"  # it stores the pose too, or is reconstructed from it
     else:
         # of bodies without connection to the ground the first keeps its pose, in any order of the others
         way = reach(draft, body.momentum, {None, *(j for j in found if j < body.momentum)})
         if way is None:
-            refusal = "no joint ties the body to a frame whose pose is kept: it could not be found again"
+            refusal = "no joint ties the body to a frame whose pose is kept: it could not be computed from the others"
     known = {None: None} | {j: b.state for j, b in found.items()}
 
     def make(draft: Draft) -> StateMap:
@@ -153,8 +153,8 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         return _without({body.state}, rebuilt)
 
     path = "" if way is None else f", and it follows from {' and '.join(str(joint.box) for joint, _ in way)}"
-    reason = f"nothing depends on the pose of {body.momentum}{path}"
-    return Site("drop a pose that nothing reads", box, Strength.RELATION, reason, refusal, make)
+    reason = f"no other part depends on the pose of {body.momentum}{path}"
+    return Site("remove an unused pose", box, Strength.RELATION, reason, refusal, make)
 
 
 def _at(draft: Draft, momentum: Path) -> list[Path]:
@@ -201,7 +201,7 @@ def _joint(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     elif others := [b for b, _ in draft.reading(relative) if b != box]:
         refusal = f"{others[0]} reads its relative pose"
     elif lost := [end for end in joint.ends if end is not None and end not in found]:
-        refusal = f"the pose of {lost[0]} is not kept, so that its own could not be found again"
+        refusal = f"the pose of {lost[0]} is not kept, so the relative pose could not be computed from it"
     ends = [None if end is None else found[end].state for end in joint.ends if end is None or end in found]
 
     def make(draft: Draft) -> StateMap:
@@ -218,8 +218,8 @@ def _joint(draft: Draft, place: tuple[Path, ...]) -> Site | None:
 
         return _without({joint.relative}, rebuilt)
 
-    reason = f"{box} holds none of its six degrees of freedom, pulls none and resists none"
-    return Site("drop a joint that holds nothing", box, Strength.RELATION, reason, refusal, make)
+    reason = f"{box} has six degrees of freedom, without constraint, spring and friction"
+    return Site("remove a joint without effect", box, Strength.RELATION, reason, refusal, make)
 
 
 def _empty(draft: Draft, junction: Path) -> bool:
@@ -259,17 +259,17 @@ def _gyroscopic(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         elif vanish:
             reason = f"the inertia of {momentum} is the same about all axes, and its velocity is taken in world axes"
         else:
-            refusal = "it turns, and not only about a principal axis through its centre of mass"
+            refusal = "it turns not only about a principal axis through its centre of mass"
             if np.ptp(np.diag(inertia)[:3]) < ROUNDING * inertia[0, 0] and sliding:
                 refusal += ": with an inertia that is the same about all axes the transport term p_υ × ω remains"
             elif moves.shape[1] <= 3:
-                refusal += ": in a plane, too, the transport term p_υ × ω remains"
+                refusal += ": in planar motion, too, the transport term p_υ × ω remains"
 
     def make(draft: Draft) -> StateMap:
         draft.remove([box])
         return StateMap()
 
-    return Site("drop gyroscopic forces that vanish", box, Strength.RELATION, reason, refusal, make)
+    return Site("remove vanishing gyroscopic forces", box, Strength.RELATION, reason, refusal, make)
 
 
 def _vanish(part: Reversible, inertia: Array, moves: Array) -> bool:
@@ -313,18 +313,20 @@ def _carried(joint: Joint, forward: bool, span: Array, rng: np.random.Generator)
     return SE3.adjoint(far) @ np.hstack([frame @ span, own])
 
 
-WHY_FRICTION = "a resistance of zero makes no force and no heat, and what took that heat up stores nothing else"
-WHY_POSE = "no potential depends on these poses and nothing reads them: they follow from the joints"
-WHY_JOINT = "six degrees of freedom without spring, friction and drive do nothing: coordinates follow from the bodies"
+WHY_FRICTION = "zero resistance gives no force and no heat, and the store of that heat takes up no other heat"
+WHY_POSE = "no potential depends on these poses and no part reads them: they follow from the joints"
+WHY_JOINT = (
+    "six degrees of freedom without spring, friction and drive have no effect: coordinates follow from the bodies"
+)
 WHY_GYROSCOPIC = "ad*_u p vanishes for every twist that the joints allow the body"
 
-DROP_FRICTION = Rule("drop friction that resists nothing", Strength.RELATION, WHY_FRICTION, _frictions, _friction)
-"""8.3 of the theory of simplifications: μ ≡ 0, and its environment."""
-DROP_POSE = Rule("drop a pose that nothing reads", Strength.RELATION, WHY_POSE, _potentials, _pose)
+DROP_FRICTION = Rule("remove friction of zero resistance", Strength.RELATION, WHY_FRICTION, _frictions, _friction)
+"""A friction with μ ≡ 0, and the environment of its heat."""
+DROP_POSE = Rule("remove an unused pose", Strength.RELATION, WHY_POSE, _potentials, _pose)
 """A body's pe, pkc and q if V is constant and the pose can be reconstructed."""
-DROP_JOINT = Rule("drop a joint that holds nothing", Strength.RELATION, WHY_JOINT, _relations, _joint)
+DROP_JOINT = Rule("remove a joint without effect", Strength.RELATION, WHY_JOINT, _relations, _joint)
 """Joints of six degrees of freedom without potential and friction."""
 DROP_GYROSCOPIC = Rule(
-    "drop gyroscopic forces that vanish", Strength.RELATION, WHY_GYROSCOPIC, _gyroscopes, _gyroscopic
+    "remove vanishing gyroscopic forces", Strength.RELATION, WHY_GYROSCOPIC, _gyroscopes, _gyroscopic
 )
 """lp where ad*_{dE(p)}(p) = 0 for all reachable p; an isotropic inertia or a plane motion is not enough in SE(3)."""

@@ -101,7 +101,7 @@ def _idle(draft: Draft, box: Path) -> Site | None:
         draft.remove([], _deserted(draft, columns))
         return StateMap()
 
-    return Site(NAME, box, Strength.RELATION, f"{box} repeats what others say of the same efforts", "", make)
+    return Site(NAME, box, Strength.RELATION, f"{box} repeats equations of others for the same efforts", "", make)
 
 
 def _deserted(draft: Draft, junctions: Iterable[Path]) -> list[Path]:
@@ -135,11 +135,11 @@ class _Fold:
         """Why, in words."""
         into = ", ".join(sorted({str(box) for box, _ in self.neighbours(draft)})) or "nothing"
         if self.target is None:
-            return f"the effort at {self.junction} is zero whatever happens: {into} needs no port there"
+            return f"the effort at {self.junction} is always zero: {into} needs no port there"
         d = self.matrix.shape
         if d[0] == d[1] and np.array_equal(self.matrix, np.eye(d[0])):
             return f"the effort at {self.junction} is that at {self.target}, and nothing is stored there"
-        return f"nothing is stored at {self.junction}: {into} may as well be seen from {self.target}"
+        return f"nothing is stored at {self.junction}: {into} can be connected to {self.target} by a constant matrix"
 
     def refusal(self, draft: Draft) -> str:
         """Why not, in words."""
@@ -154,11 +154,11 @@ class _Fold:
         around = self.neighbours(draft)
         alone = self.target is not None and not around and len(draft.on(self.target)) == 1
         if self.target is not None and alone and draft.junctions[self.target].exposed:
-            return f"nothing else lies on the outer port {self.target}"
+            return f"nothing else is connected to the outer port {self.target}"
         for box, port in around:
             process = draft.fillings[box]
             if process.interface[port].quantity.environment:
-                return f"{self.junction} carries what the environment takes up"
+                return f"{self.junction} carries heat for the environment"
             if process.kernel is not None and self.matrix.shape[1] > self.matrix.shape[0]:
                 return f"the compiled relation of {box} would be lost"
         return ""
@@ -218,8 +218,8 @@ def _ends(draft: Draft, start: Path) -> int:
 
 
 WHY = (
-    "behind it nothing is stored, nothing is read and no port is open: what lies there may as well be seen from before "
-    "it; and where the effort is zero whatever happens, as at the ground, nothing needs a port"
+    "nothing is stored, read or exposed at its inner junction, so the parts there are connected to the outer one by a "
+    "constant matrix; and junctions with zero effort, as at the ground, need no ports"
 )
 FOLD = Rule(NAME, Strength.RELATION, WHY, _places, _at)
 """Fold components that determine one effort from another."""

@@ -23,7 +23,7 @@ from ephs.semantics.verdict import Condition
 
 __all__ = ["MERGE"]
 
-NAME = "merge bodies that are joined rigidly"
+NAME = "merge rigidly connected bodies"
 REFERENCE = Reference()
 
 
@@ -99,7 +99,7 @@ class _Merge:
             if draft.junctions[body.pose].exposed or draft.reading(body.pose):
                 return f"the pose {body.pose} is read"
             if len(draft.on(body.pose)) != 2:
-                return f"more than a potential acts on the pose {body.pose}"
+                return f"other parts than a potential act on the pose {body.pose}"
         if readers := [b for b, _ in draft.reading(gone.momentum) if b != self.second.gyroscopic]:
             return f"{readers[0]} reads the momentum {gone.momentum}"
         if others := [b for b in self._own(draft) if isinstance(draft.fillings[b], Irreversible)]:
@@ -186,6 +186,6 @@ class _Merge:
         }
 
 
-WHY = "what is joined rigidly moves as one body: the twist of the other one is the first one's, seen from there"
+WHY = "rigidly connected bodies move as one: the twist of the second is that of the first, in its own frame"
 MERGE = Rule(NAME, Strength.TRAJECTORIES, WHY, _places, _at)
 """Fixed joints between bodies: their wrenches are lost, all else stays."""

@@ -67,7 +67,7 @@ class Reduction:
         return self.steps[-1].after if self.steps else 0
 
     def __str__(self) -> str:
-        rows = [("step", "unknowns", "leaves", "")]
+        rows = [("step", "unknowns", "preserves", "")]
         rows += [(s.name, f"{s.before} → {s.after}", str(s.strength), s.reason) for s in self.steps]
         widths = [max(len(row[i]) for row in rows) for i in range(3)]
         lines = [f"{self.name}: {self.before} unknowns of the equations as flattened, {self.after} in the end"]

@@ -43,12 +43,12 @@ def cite(solution: Solution) -> str:
     Parameters
     ----------
     solution
-        What `ephs.simulate` or `ephs.load_solution` gave. Where ``auto`` went on with another method, both are in.
+        Result of `ephs.simulate` or `ephs.load_solution`. If ``auto`` changed to another method, both are cited.
 
     Returns
     -------
     str
-        Entries with an empty line between. A method of one's own adds none: its author knows its sources.
+        Entries separated by empty lines. Methods of your own add none.
     """
     stats = solution.stats
     used = [*ALWAYS]

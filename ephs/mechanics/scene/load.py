@@ -78,25 +78,25 @@ def load(
     Parameters
     ----------
     path : a scene file (``.toml``), a URDF (``.urdf``), an MJCF (``.xml``) or an SDF (``.sdf``)
-    base : ``"fixed"`` or ``"free"``, how the root of a URDF meets the ground; other files say so themselves
-    adjust : take the nearest consistent state where the initial state does not close; the scene's
-        ``adjusted`` reports it
-    inertia : ``"strict"``, ``"warn"`` or ``"nearest"``: whether an inertia that no distribution of mass has is
-        refused, kept, or replaced by the nearest possible one; unless given, as the scene file says, and ``"warn"``
+    base : ``"fixed"`` or ``"free"``, connection of the root of a URDF with the ground; other files contain it
+    adjust : replace an inconsistent initial state by the nearest consistent one; the scene's
+        ``adjusted`` reports the change
+    inertia : ``"strict"``, ``"warn"`` or ``"nearest"``: whether an inertia without a possible mass distribution is
+        refused, kept, or replaced by the nearest possible one; default: as in the scene file, and ``"warn"``
         for other formats
-    contact : take limits of joints and contacts from models in other formats
+    contact : import limits of joints and contacts from models in other formats
 
     Warns
     -----
     SceneWarning
-        Once, of all inertias that were kept or replaced, and of frames that were moved so that loops can move.
+        Once, with all inertias that were kept or replaced, and all frames that were moved so that loops can move.
     ModelWarning
-        Once, of all that a model says and its scene does not.
+        Once, with all elements of a model that the scene does not have.
 
     Raises
     ------
     SceneError
-        With every fault that was found.
+        With all faults.
     """
     r = _Reading(base, adjust, inertia, Path(path).parent.resolve(), contact)
     if base not in ("fixed", "free"):

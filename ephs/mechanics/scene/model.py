@@ -51,7 +51,7 @@ class Scene:
     Attributes
     ----------
     source : the file that it came from, or None
-    adjusted : what an adjusting assembly moved, or None where everything closed
+    adjusted : changes made by the assembly, or None if the initial state was consistent
     """
 
     name: str

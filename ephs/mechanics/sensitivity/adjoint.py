@@ -64,11 +64,11 @@ def gradient(
 ) -> Gradient:
     """Σ weights · readings of a motion, by all parameters at once: reverse accumulation through its steps.
 
-    Steps are chosen by a run of `simulate`, end at the times besides, and are held; the state before each is kept, and
-    the step is run again on a tape when it is taken back. All of a step is differentiated, with the closing of loops
-    and the correction that keeps the balance of energy. Its time does not depend on the number of parameters, but for
-    each the model's tables are made anew. For few parameters and many readings take `sensitivity`. The gradient of a
-    sum of squares of residuals has twice the residuals as weights.
+    A run of `simulate` chooses the steps, which also end at the times; then they are kept. The state before each step
+    is stored; in the backward pass, the step is recorded on a tape and differentiated completely, with the closing of
+    loops and the correction of the energy balance. The time of the steps does not depend on the number of parameters;
+    the model's tables are built again for each. For few parameters and many signals use `sensitivity`. For the
+    gradient of a sum of squares, the weights are twice the residuals.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def gradient(
     Raises
     ------
     OptionError
-        A model, a reading or a method has no such gradient, or inputs are functions.
+        A model, a signal or a method has no such gradient, or inputs are functions.
     SimulationError
         The run failed.
     """

@@ -88,22 +88,22 @@ def fit(
     Parameters
     ----------
     data
-        ``"t"``: (n,) times in s; and name -> (n,) or (n, d) what was recorded, by the names of
+        ``"t"``: (n,) times in s; and name -> (n,) or (n, d) recorded signals, by the names of
         `ephs.mechanics.sensitivity.readings`: ``joints.pin.coordinate``, ``bodies.rod.position``,
-        ``markers.tip.position``, ``osc.pe.q``. Entries that are NaN were not recorded.
+        ``markers.tip.position``, ``osc.pe.q``. NaN marks missing entries.
     parameters
-        Paths, as for `sensitivity`; initial values among them.
+        Paths, as for `sensitivity`, including initial values.
     start
-        Where to begin; the model's own numbers where not given.
+        Path -> start value of the search; by default the model's own.
     bounds
-        Path -> (least, most). Masses, friction, stiffness, moments of inertia and the like are not negative where not
-        given, and all parameters of a system's components.
+        Path -> (least, most). By default masses, friction, stiffness, moments of inertia and the like, and all
+        parameters of a system's components, are not negative.
     sigma
-        Reading -> the standard deviation of its noise, 1 where not given: weights of unlike readings.
+        Signal -> standard deviation of its noise, 1 by default; the inverses are weights of the residuals.
     max_evaluations
-        Limit for motions to compute.
+        Largest number of computed motions.
     **run
-        For `sensitivity`: method, step, rtol, atol, t0, initial, inputs, reference.
+        Options of `sensitivity`: method, step, rtol, atol, t0, initial, inputs, reference.
 
     Raises
     ------

@@ -117,8 +117,8 @@ def sensitivity(
 ) -> Sensitivity:
     """The motion of a model with its derivatives by parameters: derivatives of the discrete steps.
 
-    Lengths of steps are chosen by a run of `simulate` and then held, so that what is differentiated is a smooth
-    function of the parameters: the derivative is that of the computed motion, to rounding.
+    A run of `simulate` chooses the step sizes, which are then kept. The computed motion is then a smooth function of
+    the parameters, and the result is its derivative, to rounding.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def sensitivity(
     Raises
     ------
     OptionError
-        The method has no tangent, or a path is none.
+        The method has no tangent, or a path does not exist.
     SimulationError
         The run failed.
     """

@@ -50,7 +50,7 @@ class SweepInterrupted(KeyboardInterrupt):
     """
 
     def __init__(self, partial: "xr.Dataset") -> None:
-        super().__init__("interrupted; what was computed is in .partial")
+        super().__init__("interrupted; the results so far are in .partial")
         self.partial = partial
 
 
@@ -68,12 +68,11 @@ def sweep(
     progress: Callable[[int, int, int], None] | None = None,
     **options: Any,
 ) -> "xr.Dataset":
-    """Run a model with many values of some of its numbers.
+    """Run a model with many values of its parameters or initial values.
 
-    Members are independent: each is what `ephs.simulate` gives of the model with its numbers, within rounding, and the
-    same bit for bit whoever runs it. Members of a scene that differ in numbers only, by the explicit methods and with
-    constant inputs, share one set of compiled tables, where outputs are coordinates and rates of joints that no loop is
-    cut at, heat and work.
+    Members are independent: each equals the run of `ephs.simulate` within rounding, and is the same bit for bit on any
+    worker. Members of a scene that differ in numbers only share one set of compiled tables, with explicit methods,
+    constant inputs, and these outputs: coordinates and rates of joints at which no loop is cut, heat and work.
 
     Parameters
     ----------
@@ -83,37 +82,37 @@ def sweep(
     until, t0
         End and start in s.
     save_at
-        (k,) instants to keep, in s; 101 even ones where None.
+        (k,) instants to keep, in s; by default 101 equidistant ones.
     outputs
-        Names of what is kept: ``joints.pin.coordinate``, ``bodies.crank.position``, ``thermal.housing.temperature``,
-        ``energy``, the path of a state. By default coordinates and rates of all joints, heat and work; of a system
+        Names of outputs: ``joints.pin.coordinate``, ``bodies.crank.position``, ``thermal.housing.temperature``,
+        ``energy``, the path of a state. By default coordinates and rates of all joints, heat and work; for a system
         all states.
     paired
-        Member k takes the k-th value of every path. Else all values of one are combined with all of the others.
+        Member k takes the k-th value of every path. By default all combinations of the values are run.
     workers
-        Threads; as many as there are cores where None.
+        Number of threads; by default the number of cores.
     client
-        A ``dask.distributed.Client`` to run on instead; members of a worker that is lost are run by others.
+        A ``dask.distributed.Client`` to use instead; members of a lost worker are run by other workers.
     progress
         Called as progress(done, members, failed) after every batch.
     options
-        Of `ephs.simulate`: method, rtol, atol, step, form, inputs, …
+        Options of `ephs.simulate`: method, rtol, atol, step, form, inputs, …
 
     Returns
     -------
     xarray.Dataset
-        Each output over the varied paths (or ``member``), ``t``, and its own places; joints' coordinates and rates
-        that are varied stand there as ``initial.joints.…``; ``status`` is ``"done"`` or the
-        reason of a failure, where values are NaN; ``steps`` and ``rejected`` are counts.
+        Each output over the varied paths (or ``member``), ``t``, and its own components. Varied initial coordinates
+        and rates of joints are called ``initial.joints.…``. ``status`` is ``"done"`` or the
+        reason of a failure, with NaN as outputs; ``steps`` and ``rejected`` are counts.
 
     Raises
     ------
     OptionError
-        An option is not known or not possible.
+        An option is unknown or not possible.
     SceneError, AssemblyError
-        There is no such path.
+        A path does not exist.
     SweepInterrupted
-        It was stopped; ``.partial`` holds what was run.
+        The sweep was stopped; ``.partial`` is the table of the members that were run.
     """
     axes = Axes.of(vary, paired=paired)
     unknown = [key for key in options if key not in _OPTIONS]

@@ -45,11 +45,11 @@ class Fibre(Protocol):
 @final
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """The relation of a system, as a value; every composite has one, also what cannot be simulated.
+    """The relation of a system; every composite has one, even if it cannot be simulated.
 
-    Call `at` for the subspace over a point of the base. Fill the box of a pattern with it, beside systems, primitives
-    or other relations, for the relation of the whole. Two of them are equal if they are made alike; whether they mean
-    the same is for `LinearRelation.distance` to say, point by point.
+    `at` returns the subspace over a point of the base. A relation can fill the box of a pattern, together with systems,
+    primitives or other relations; the result is the relation of the whole. Relations are equal if they are constructed
+    equally; `LinearRelation.distance` compares their meaning at a point.
 
     Parameters
     ----------

@@ -85,12 +85,12 @@ class CostWarning(UserWarning):
 
 @final
 class AuditError(SimulationError):
-    """A complete run that breaks a law.
+    """A complete run that violates a law.
 
     Attributes
     ----------
     findings
-        What was found.
+        The violated laws.
     partial
         The whole solution.
     """

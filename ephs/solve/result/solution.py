@@ -50,11 +50,11 @@ class Solution:
     stats
         Counts and times of the run.
     problem
-        What was solved; None where a file could not hold it.
+        The solved problem; None if a file could not store it.
     labels
         Names and units of the components of each state.
     inputs
-        What was prescribed at outer ports, as a file holds it; None where the problem says it.
+        Prescribed values at outer ports, for solutions from files; None if the problem has them.
     """
 
     def __init__(

@@ -117,7 +117,7 @@ def test_in_world_axes_a_round_inertia_is_enough():
 
 AXIS = TURNED
 ASIDE = SE3.exp(np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]))
-PLANE = "in a plane, too, the transport term"
+PLANE = "in planar motion, too, the transport term"
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_a_pose_goes_where_no_potential_depends_on_it():
     ("system", "words"),
     [
         (on_ground(rigid_body(1.0, BRICK), joint("spherical")), "its potential changes with the pose"),
-        (rigid_body(1.0, BRICK, NONE), "it could not be found again"),
+        (rigid_body(1.0, BRICK, NONE), "it could not be computed from the others"),
         (
             mbs_pattern()(
                 body1=rigid_body(1.0, BRICK, NONE), body2=rigid_body(1.0, BRICK, NONE), joint=joint("revolute")
