@@ -10,7 +10,7 @@ from ephs.mechanics.constraints.redundancy import explain
 from ephs.mechanics.methods.registry import METHODS, Method, chosen
 from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.motion.motion import SceneMotion
-from ephs.mechanics.motion.views import Names
+from ephs.mechanics.motion.views import view_of
 from ephs.mechanics.rewrite.folded import folded_problem
 from ephs.mechanics.runs.assembling import assembled, flat_joints
 from ephs.mechanics.runs.journaling import journaled
@@ -334,7 +334,7 @@ def problem_of_scene(
     scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
 ) -> Problem:
     """The initial value problem of a scene."""
-    view = Names(scene).view
+    view = view_of(scene)
     forces, wrenches, efforts = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)
