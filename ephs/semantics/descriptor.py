@@ -288,7 +288,7 @@ def _related(local: Relating, e: Array, lam: Array, read: Mapping[Path, Array]) 
 
 
 def descriptor_of(system: System) -> Descriptor:
-    """Descriptor form of a system; subsystems that fill many boxes are numbered once, others are flattened.
+    """Descriptor form of a system; subsystems of a shape that many have are numbered once, others are flattened.
 
     Raises
     ------
