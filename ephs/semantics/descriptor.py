@@ -7,6 +7,7 @@ power junction, the constraints, e = input. So it is square for every pattern.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from typing import final
 
 import numpy as np
@@ -181,8 +182,11 @@ class Descriptor:
 
     def _component_slots(self) -> Iterator[ComponentSlot]:
         n, states = self.numbering, self.states
-        dims, efforts = n.dims(n.junctions), self._efforts
-        at = list(zip(efforts[n.wires].tolist(), (efforts + dims)[n.wires].tolist(), strict=True))
+        dims: list[int] = n.dims(n.junctions).tolist()
+        numbers = iter(range(self.effort_size))
+        on = [tuple(islice(numbers, dim)) for dim in dims]  # shared by all components on a junction
+        wired: list[int] = n.wires.tolist()
+        at = [on[i] for i in wired]
         multipliers = starts(n.multipliers).tolist()
         reads: list[int] = n.reads.tolist()
         wire = read = 0
@@ -191,7 +195,7 @@ class Descriptor:
             if id(primitive) not in counts:
                 counts[id(primitive)] = len(primitive.bundle.ports), len(primitive.reads)
             wires, width = counts[id(primitive)]
-            index = tuple(i for first, last in at[wire : wire + wires] for i in range(first, last))
+            index = at[wire] if wires == 1 else tuple(chain.from_iterable(at[wire : wire + wires]))
             slots = tuple(states[i] for i in reads[read : read + width])
             yield ComponentSlot(path, primitive, index, slots, multiplier)
             wire, read = wire + wires, read + width
@@ -284,7 +288,7 @@ def _related(local: Relating, e: Array, lam: Array, read: Mapping[Path, Array]) 
 
 
 def descriptor_of(system: System) -> Descriptor:
-    """Descriptor form of a system; subsystems that fill many boxes are numbered once, others are flattened.
+    """Descriptor form of a system; subsystems of a shape that many have are numbered once, others are flattened.
 
     Raises
     ------

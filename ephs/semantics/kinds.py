@@ -1,11 +1,12 @@
 """The numbering of a nested system without flattening it: each kind of part once, its copies by index maps.
 
-Fillings that are one and the same object are of one kind. A kind is numbered on its own; a box that it fills adds its
-numbers to those of the level around, through a map of the kind's junctions and states to those of the level, and all
-boxes of one kind do so at once. The numbers are those of the flattened system.
+Fillings of one shape are of one kind: systems with the same pattern and fillings of the same shapes, components with
+the same ports, whatever their parameters. A kind is numbered on its own; a box that it fills adds its numbers to those
+of the level around, through a map of the kind's junctions and states to those of the level, and all boxes of one kind
+do so at once. The numbers are those of the flattened system.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import final
@@ -21,7 +22,7 @@ from ephs.semantics.system import Filling, System
 __all__ = ["number_by_kinds", "repeats"]
 
 WORTH = 8
-"""Kinds are numbered from so many components for each different filling on: a kind costs as much as some components."""
+"""Kinds are numbered from so many components for each of them on: a kind costs as much as some components."""
 COMPONENTS, WIRES, READS, STATES, JUNCTIONS = range(5)
 
 
@@ -37,7 +38,9 @@ class Kind:
     ----------
     ports
         The outer ports.
-    primitive, wires, reads, junctions, states
+    components
+        Their number.
+    wires, reads, junctions, states
         As of a `Numbering`.
     bearing
         (ports,) whether a component's power port lies on the port's junction, and it is a power port itself.
@@ -50,7 +53,7 @@ class Kind:
     """
 
     ports: tuple[Path, ...]
-    primitive: Index
+    components: int
     wires: Index
     reads: Index
     junctions: Index
@@ -68,13 +71,13 @@ class Kind:
     @property
     def composite(self) -> bool:
         """Whether more than one component is inside."""
-        return self.primitive.size > 1
+        return self.components > 1
 
     @property
     def counts(self) -> Index:
         """Numbers of components, wires, reads, states and junctions inside."""
-        found = (self.primitive, self.wires, self.reads, self.states, self.junctions)
-        return np.array([numbers.size for numbers in found], dtype=np.int64)
+        found = (self.wires, self.reads, self.states, self.junctions)
+        return np.array([self.components, *(numbers.size for numbers in found)], dtype=np.int64)
 
 
 @final
@@ -109,9 +112,11 @@ def number_by_kinds(system: System) -> Numbering | None:
         whole, outer = kinds.level(system, closed=True)
     except _NotStoredOnce:
         return None
+    primitives = Interned[Primitive]()
+    order = _index(_ordered(system, primitives, {}))
     return Numbering(
-        tuple(kinds.primitives.values), tuple(kinds.quantities.values),
-        whole.primitive, whole.wires, whole.reads, whole.junctions, outer, whole.states, _parts(whole),
+        tuple(primitives.values), tuple(kinds.quantities.values),
+        order, whole.wires, whole.reads, whole.junctions, outer, whole.states, _parts(whole),
     )  # fmt: skip
 
 
@@ -143,18 +148,52 @@ def _parts(whole: Kind) -> tuple[Parts, ...]:
 
 def repeats(system: System) -> bool:
     """Whether so much of a system is the same that kinds are worth it."""
-    counts: dict[int, int] = {}
-    return _count(system, counts) >= WORTH * len(counts)
+    shapes = _Shapes()
+    return shapes.sizes[shapes.of(system)] >= WORTH * len(shapes.sizes)
 
 
-def _count(filling: Filling, known: dict[int, int]) -> int:
-    """Number of components; each different filling is looked at once."""
+def _ordered(filling: Filling, primitives: Interned[Primitive], known: dict[int, list[int]]) -> list[int]:
+    """Numbers of a filling's components; each different filling is looked at once."""
     found = known.get(id(filling))
     if found is None:
-        inner = filling.fillings.values() if isinstance(filling, System) else ()
-        found = sum(_count(part, known) for part in inner) if isinstance(filling, System) else 1
+        if isinstance(filling, System):
+            found = [number for part in filling.fillings.values() for number in _ordered(part, primitives, known)]
+        else:
+            found = [primitives.number_of_object(filling)]
         known[id(filling)] = found
     return found
+
+
+@final
+class _Shapes:
+    """Consecutive numbers of shapes of fillings. Objects are recognised by identity: keep them alive.
+
+    Attributes
+    ----------
+    sizes
+        Number of components of each shape.
+    """
+
+    def __init__(self) -> None:
+        self.sizes: list[int] = []
+        self._by_id: dict[int, int] = {}
+        self._by_content: dict[Hashable, int] = {}
+
+    def of(self, filling: Filling) -> int:
+        """The shape of a filling."""
+        found = self._by_id.get(id(filling))
+        if found is None:
+            content: Hashable
+            if isinstance(filling, System):
+                inner = tuple((box, self.of(part)) for box, part in filling.fillings.items())
+                content, size = (id(filling.pattern), inner), sum(self.sizes[shape] for _, shape in inner)
+            else:
+                content, size = (id(filling.interface), None if isinstance(filling, Storage) else filling.reads), 1
+            found = self._by_content.setdefault(content, len(self.sizes))
+            if found == len(self.sizes):
+                self.sizes.append(size)
+            self._by_id[id(filling)] = found
+        return found
 
 
 class _NotStoredOnce(Exception):
@@ -166,15 +205,17 @@ class _Kinds:
     """The kinds that were met."""
 
     def __init__(self) -> None:
-        self.primitives, self.quantities = Interned[Primitive](), Interned[Quantity]()
+        self.quantities = Interned[Quantity]()
+        self.shapes = _Shapes()
         self._known: dict[int, Kind] = {}
 
     def of(self, filling: Filling) -> Kind:
         """The kind of a filling."""
-        found = self._known.get(id(filling))
+        shape = self.shapes.of(filling)
+        found = self._known.get(shape)
         if found is None:
             found = self.level(filling)[0] if isinstance(filling, System) else self._primitive(filling)
-            self._known[id(filling)] = found
+            self._known[shape] = found
         return found
 
     def _primitive(self, primitive: Primitive) -> Kind:
@@ -189,7 +230,7 @@ class _Kinds:
         reads = range(len(bundle.ports)) if storing else [place[port] for port in primitive.reads]
         return Kind(
             ports=ports,
-            primitive=_index([self.primitives.number_of_object(primitive)]),
+            components=1,
             wires=_index([place[port] for port in bundle.ports]),
             reads=_index(reads),
             junctions=_index([]),
@@ -237,14 +278,14 @@ class _Kinds:
             kind = c.kind
             junctions = _map(start[JUNCTIONS, c.box], kind.junctions.size, number[c.at])
             states = _map(start[STATES, c.box], kind.states.size, state[c.at[:, kind.first]])
-            blocks = (kind.primitive, junctions[:, kind.wires], states[:, kind.reads], kind.states, kind.junctions)
-            for i, block in enumerate(blocks):
+            blocks = (junctions[:, kind.wires], states[:, kind.reads], kind.states, kind.junctions)
+            for i, block in enumerate(blocks, WIRES):
                 arrays[i][start[i, c.box][:, None] + np.arange(block.shape[-1])] = block
         read = arrays[READS]
         if (read < 0).any() or (closed and (read >= total[STATES]).any()):
             raise _NotStoredOnce
         kind = Kind(
-            tuple(pattern.interface), arrays[COMPONENTS], arrays[WIRES], arrays[READS], arrays[JUNCTIONS],
+            tuple(pattern.interface), int(total[COMPONENTS]), arrays[WIRES], arrays[READS], arrays[JUNCTIONS],
             arrays[STATES], (bearing & power)[ports], classes.astype(np.int64), stores[found],
             tuple((c.kind, start[:, c.box].T) for c in copies if c.kind.composite),
         )  # fmt: skip
@@ -257,7 +298,7 @@ class _Kinds:
         wiring: dict[int, list[list[int]]] = {}
         kinds: dict[int, Kind] = {}
         for number, (box, filling) in enumerate(system.fillings.items()):
-            same = id(filling)
+            same = self.shapes.of(filling)
             if same not in kinds:
                 kinds[same], boxes[same], wiring[same] = self.of(filling), [], []
             ports = pattern.boxes[box].ports

@@ -163,7 +163,7 @@ class System:
     def descriptor(self) -> "Descriptor":
         """The square descriptor form, assembled without choosing causality.
 
-        A system that fills many boxes as one and the same object is numbered once, and all its copies by index maps.
+        Subsystems of one pattern with components of the same ports are numbered once, and all of them by index maps.
         """
         from ephs.semantics.descriptor import descriptor_of
 

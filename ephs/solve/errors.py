@@ -31,19 +31,11 @@ __all__ = [
 class Outcome(StrEnum):
     """Cause that ended a run, in words; `advice` is the remedy."""
 
-<<<<<<< HEAD
     DIVERGED = "the equations of the step have no solution near the state"
     SINGULAR = "the equations of the step are singular"
     CONTRADICTION = "a constraint contradicts the others"
     OPEN = "a loop that cannot be closed near the state"
     SHAKY = "a mechanism that is movable to first order only"
-=======
-    DIVERGED = "the step's equations have no solution nearby"
-    SINGULAR = "the step's equations stay singular"
-    CONTRADICTION = "a constraint contradicts the others"
-    OPEN = "a loop that does not close nearby"
-    SHAKY = "a mechanism that moves to first order only"
->>>>>>> docs2
     TURN = "a rotation of π or more in one step"
     TEMPERATURE = "an absolute temperature that is not positive"
     ENTROPY = "a component that destroys entropy"
@@ -62,11 +54,7 @@ class Outcome(StrEnum):
     UNWRITTEN = "the journal cannot be written"
     PROGRESS = "the progress function raised an exception"
     UNLAWFUL = "the result does not pass its audit"
-<<<<<<< HEAD
     MEMORY = "not enough memory"
-=======
-    MEMORY = "exhausted memory"
->>>>>>> docs2
     INTERRUPTED = "interrupted"
 
     @property
@@ -79,21 +67,12 @@ _ADVICE = {
     Outcome.DIVERGED: "take a smaller step",
     Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which omits redundant equations",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
-<<<<<<< HEAD
     Outcome.OPEN: "take a smaller step, or check prescribed motions: the mechanism may be at the end of its travel",
     Outcome.SHAKY: "change its geometry or add springs: rigid joints transmit no force across their line",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.ENTROPY: "correct the component's function; if it is right, take a smaller step",
     Outcome.LAWLESS: "take a smaller step, or natural; if that is refused too, correct the component",
-=======
-    Outcome.OPEN: "take a smaller step, or check the prescribed motions: the mechanism may be at the end of its travel",
-    Outcome.SHAKY: "change its geometry or hold it by springs: rigid joints carry no load across their line",
-    Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
-    Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
-    Outcome.ENTROPY: "correct the component's function there; if it is correct, take a smaller step",
-    Outcome.LAWLESS: "take a smaller step, or natural; correct the component if natural refuses it, too",
->>>>>>> docs2
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",
@@ -101,7 +80,6 @@ _ADVICE = {
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
     Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
     Outcome.MANY: "raise max_steps, or loosen rtol and atol",
-<<<<<<< HEAD
     Outcome.UNDETERMINED: "add a storage, friction or a constraint there, which determines it",
     Outcome.RESTLESS: "start nearer to one, or add a spring, a stop of the drive or an environment",
     Outcome.INPUT: "see the exception above this one, or return as many finite numbers as expected",
@@ -111,17 +89,6 @@ _ADVICE = {
     Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
     Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
     Outcome.INTERRUPTED: "the solution up to there is in .partial",
-=======
-    Outcome.UNDETERMINED: "add what determines it there: a storage, friction, or a constraint",
-    Outcome.RESTLESS: "start nearer to one, or hold the system by a spring, a stop of the drive, or an environment",
-    Outcome.INPUT: "see the exception above this one, or return the required number of finite numbers",
-    Outcome.EVENT: "see the exception above this one, or return a number everywhere",
-    Outcome.UNWRITTEN: "free disk space, then resume with the same journal",
-    Outcome.PROGRESS: "see the exception above this one",
-    Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
-    Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
-    Outcome.INTERRUPTED: "the results so far are in .partial",
->>>>>>> docs2
 }
 LARGEST = 1e150
 """Bound of states: squares of larger ones overflow."""

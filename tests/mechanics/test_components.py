@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.closing import closing
+from ephs.mechanics.elements.offset import frame_change
 from ephs.operad import Path, Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
@@ -63,7 +64,7 @@ def primitives():
         out[f"joint_friction {name}"] = components.joint_friction(of, factor @ factor.T)
     out["pkc"] = components.kinematic_coupling(Q.pose, Q.body_momentum, "q", "p")
     out["no_potential"] = components.no_potential(Q.pose, "q")
-    out["frame_change"] = components.frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
+    out["frame_change"] = frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
     out["point_spring"] = springs.point_spring(2.0, 1.0)
     out["point_damper"] = springs.point_damper(3.0)
     out["ground"] = components.ground()

@@ -69,6 +69,7 @@ GROUPS = {
         (
             "ephs/mechanics/elements/joints.py",
             "ephs/mechanics/elements/components.py",
+            "ephs/mechanics/elements/offset.py",
             "ephs/mechanics/constraints/directions.py",
             "ephs/semantics/derive/holonomic.py",
             "ephs/mechanics/elements/springs.py",

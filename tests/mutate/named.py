@@ -45,11 +45,11 @@ BREAKS = {
     ),
     "lp": Break("ephs/mechanics/elements/components.py", "[[-_product(column, p)", "[[_product(column, p)"),
     "chord of a rotation": Break("ephs/semantics/derive/charts.py", "chord = 0.5 *", "chord = 0.25 *"),
-    "o1": Break("ephs/mechanics/elements/components.py", "np.hstack([-carried,", "np.hstack([carried,"),
+    "o1": Break("ephs/mechanics/elements/offset.py", "np.hstack([-SE3.adjoint(", "np.hstack([SE3.adjoint("),
     "o1, not inverted": Break(
-        "ephs/mechanics/elements/components.py",
-        "carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))",
-        "carried = SE3.adjoint(np.asarray(offset, dtype=float))",
+        "ephs/mechanics/elements/offset.py",
+        "SE3.adjoint(SE3.inverse(np.array(offset)))",
+        "SE3.adjoint(np.array(offset))",
     ),
     "hc": Break(
         "ephs/mechanics/elements/components.py",

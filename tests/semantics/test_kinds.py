@@ -1,5 +1,7 @@
 """A system of repeated parts, numbered kind by kind, has the numbers of its flattening."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -57,7 +59,15 @@ def copied(draw, part):
         junctions[name] = junction(quantity, exposed, power)
     pairs = [(a, b) for a in of for b in of if a < b and of[a] == of[b]]
     links = draw(st.lists(st.sampled_from(pairs), max_size=2, unique=True)) if pairs else []
-    return System.of(Pattern(junctions, boxes, links), dict.fromkeys(boxes, part))
+    parts = {box: draw(st.sampled_from([part, remade(part)])) for box in boxes}
+    return System.of(Pattern(junctions, boxes, links), parts)
+
+
+def remade(filling):
+    """The same pattern, filled with other objects, as of a joint with other numbers."""
+    if isinstance(filling, System):
+        return System.of(filling.pattern, {box: remade(part) for box, part in filling.fillings.items()})
+    return replace(filling, trusted=True)
 
 
 @st.composite
@@ -80,6 +90,35 @@ def test_numbers_by_kinds_are_those_of_the_flattened_system(system):
         assert by_kinds.outer == plain.outer
         assert (by_kinds.states, by_kinds.junctions) == (plain.states, plain.junctions)
         assert by_kinds.components == plain.components
+
+
+def test_parts_that_differ_by_numbers_are_of_one_kind():
+    cells = [remade(CELL) for _ in range(20)]
+    level = chain(CELL, 20)
+    system = System.of(level.pattern, dict(zip(level.pattern.boxes, cells, strict=True)))
+    assert repeats(system)
+    found, flat = number_by_kinds(system), flat_numbers(system)
+    assert same(found, flat)
+    assert [id(found.primitives[i]) for i in found.primitive] == [id(flat.primitives[i]) for i in flat.primitive]
+    assert [part.components.shape for part in found.parts] == [(20, len(CELL.fillings))]
+
+
+def test_parts_that_read_other_ports_are_of_several_kinds():
+    interface = {"c": Q.charge, "f": Q.flux_linkage, "~x": Q.displacement, "~y": Q.displacement}
+    one = ephs.gyrator(interface, lambda x, y: [[0, x], [-x, 0]])
+    other = replace(one, reads=one.reads[::-1])
+    wire = Pattern.from_text(
+        "c: charge; f: flux_linkage; x: displacement, exposed; y: displacement, exposed; r(c, f, x=~x, y=~y); C(q=c);"
+        "L(b=f); u(q=x); v(q=y)"
+    )
+    rest = {"C": lib.capacitor(c=1.0), "L": lib.inductor(l=1.0), "u": lib.spring(k=1.0), "v": lib.spring(k=2.0)}
+    parts = [wire(r=each, **rest) for each in (one, other)]
+    whole = Pattern.from_text(
+        "a: displacement; b: displacement; c: displacement; d: displacement; p(x=a, y=b); q(x=c, y=d)"
+    )
+    system = whole(p=parts[0], q=parts[1])
+    assert parts[0].pattern is parts[1].pattern
+    assert same(number_by_kinds(system), flat_numbers(system))
 
 
 def test_a_system_wired_in_another_way_has_other_numbers():

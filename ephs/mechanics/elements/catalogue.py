@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.elements import beam, components, springs
 from ephs.mechanics.elements.closing import Q1, Q2, closing
+from ephs.mechanics.elements.offset import frame_change
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.catalogue import Part
 from ephs.semantics.primitives import Primitive
@@ -45,7 +46,7 @@ def _coupling(ports: Interface, _numbers: Numbers) -> Primitive:
 
 def _frame_change(ports: Interface, numbers: Numbers) -> Primitive:
     outer, inner = map(str, ports)
-    return components.frame_change(numbers["offset"], inner, outer)
+    return frame_change(numbers["offset"], inner, outer)
 
 
 def _friction(ports: Interface, numbers: Numbers) -> Primitive:

@@ -6,7 +6,7 @@ Each function makes one primitive from the one function that says what it is. Fi
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,6 @@ from ephs.semantics.verdict import proved
 
 __all__ = [
     "columns_of",
-    "frame_change",
     "gap_over",
     "gravity",
     "ground",
@@ -41,6 +40,7 @@ __all__ = [
     "kinetic",
     "lie_poisson",
     "no_potential",
+    "pair_coupling",
     "pair_spring",
     "potential",
     "relative",
@@ -167,6 +167,12 @@ def kinematic_coupling(q: Quantity, p: Quantity, q_port: str, p_port: str) -> Re
     return structures.coupling("pkc", power_ports(**{q_port: q, p_port: p}), trusted=True)
 
 
+@lru_cache(maxsize=256)
+def pair_coupling(of: Pair) -> Reversible:
+    """The same of a joint's relative pose and momentum; ports q_r, p_r."""
+    return kinematic_coupling(relative(of), joint_momentum(of), "q_r", "p_r")
+
+
 @cache
 def lie_poisson(group: str = "SE3") -> Reversible:
     """Gyroscopic forces p.f = −ad*_{p.e} p.x; port p, whose state it reads."""
@@ -191,21 +197,6 @@ def lie_poisson(group: str = "SE3") -> Reversible:
 def _product(row: Array, x: Any) -> Any:
     """Σ rowᵢ xᵢ over the entries that are not zero."""
     return sum((float(a) * b for a, b in zip(row, x, strict=True) if a), 0.0)
-
-
-def frame_change(offset: Array, inner: str, outer: str) -> Reversible:
-    """Momentum carried from a body's frame (port ``outer``) to a joint frame (port ``inner``) at a constant offset o.
-
-    inner.e = Ad_{o⁻¹} outer.e, outer.f = −Ad*_{o⁻¹} inner.f.
-    """
-    carried = SE3.adjoint(SE3.inverse(np.asarray(offset, dtype=float)))
-    interface = power_ports(**{outer: quantity.body_momentum, inner: quantity.body_momentum})
-    parameters = (("offset", tuple(np.asarray(offset, dtype=float).tolist())),)
-    constraint = np.hstack([-carried, np.eye(6)])
-    made = structures.constant_structure(
-        "frame_change", interface, np.zeros((12, 12)), constraint, parameters, trusted=True
-    )
-    return replace(made, notation=notation.frame_change)
 
 
 @cache
@@ -308,22 +299,31 @@ def joint_friction(
     mu
         (d, d) symmetric and non-negative, or a Python function of (coordinates, u_r, θ), which reads q_r.
     """
-    ports = {"p_r": PortType(joint_momentum(of), True), "s": PortType(quantity.entropy, True)}
     if not callable(mu):
-        matrix = np.array(mu, dtype=float).reshape(of.dim, of.dim)
-        entries = (("mu", tuple(matrix.ravel().tolist())),)
-        sound = bool(np.all(np.isfinite(matrix))) and _dissipates(matrix)
-        made = structures.dissipation(name, Directory(ports), matrix, parameters=entries, trusted=sound)
-        return replace(made, notation=notation.friction)
+        return _linear_friction(of, tuple(np.asarray(mu, dtype=float).ravel().tolist()), name)
     q_r = Path.of("q_r")
     resistance = mu
-    ports["q_r"] = PortType(relative(of), False)
+    ports = {
+        "p_r": PortType(joint_momentum(of), True),
+        "s": PortType(quantity.entropy, True),
+        "q_r": PortType(relative(of), False),
+    }
     made = structures.dissipation(
         name,
         Directory(ports),
         lambda x, u, theta: np.asarray(resistance(of.coordinates(x[q_r]), u, theta)).reshape(of.dim, of.dim),
         parameters=(("mu", getattr(mu, "__name__", "function")),),
     )
+    return replace(made, notation=notation.friction)
+
+
+@lru_cache(maxsize=256)
+def _linear_friction(of: Pair, mu: tuple[float, ...], name: str) -> Irreversible:
+    """The same with a constant μ, row by row; many joints of a mechanism have the same."""
+    matrix = np.array(mu).reshape(of.dim, of.dim)
+    sound = bool(np.all(np.isfinite(matrix))) and _dissipates(matrix)
+    ports = power_ports(p_r=joint_momentum(of), s=quantity.entropy)
+    made = structures.dissipation(name, ports, matrix, parameters=(("mu", mu),), trusted=sound)
     return replace(made, notation=notation.friction)
 
 
@@ -373,11 +373,13 @@ def thermal_node(capacity: float, temperature: float) -> Storage:
     return structures.exponential("thermal_node", capacity * temperature, capacity, entries, formula)
 
 
+@lru_cache(maxsize=256)
 def relative(of: Pair) -> Quantity:
     """The quantity of a joint's q_r."""
     return quantity.relative_pose(of.name, **dict(of.parameters))
 
 
+@lru_cache(maxsize=256)
 def joint_momentum(of: Pair) -> Quantity:
     """The quantity of a joint's p_r."""
     return quantity.joint_momentum(of.name, **dict(of.parameters))

@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.limit import limited_friction, limited_spring, stops
+from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -280,13 +281,12 @@ def _joint(
     driven: bool,
     stretch: Reversible | None = None,
 ) -> System:
-    q_r, p_r = components.relative(of), components.joint_momentum(of)
     parts: dict[str, Any] = {
-        "o1": components.frame_change(frame1, "p_j1", "p1"),
-        "o2": components.frame_change(frame2, "p_j2", "p2"),
+        "o1": frame_change(frame1, "p_j1", "p1"),
+        "o2": frame_change(frame2, "p_j2", "p2"),
         "hc": components.holonomic(of),
         "pe": energy,
-        "pkc": components.kinematic_coupling(q_r, p_r, "q_r", "p_r"),
+        "pkc": components.pair_coupling(of),
         "mf": friction,
     }
     if not heat:

@@ -19,12 +19,13 @@ from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.kept import once
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import nearest_of
 from ephs.solve.problem import State
 
-__all__ = ["BodyState", "JointState", "MarkerState", "Names", "StateView", "ThermalState"]
+__all__ = ["BodyState", "JointState", "MarkerState", "Names", "StateView", "ThermalState", "view_of"]
 
 Item = TypeVar("Item")
 AXIAL = frozenset({"revolute", "prismatic", "cylindrical", "screw"})
@@ -167,6 +168,11 @@ class Names:
     def view(self, states: State) -> "StateView":
         """The view of one instant's states by path."""
         return StateView(self, states)
+
+
+def view_of(scene: Scene) -> "Callable[[State], StateView]":
+    """Views of a scene's states; its names are collected for the first one."""
+    return lambda states: once(scene, "names of states", lambda: Names(scene)).view(states)
 
 
 @final

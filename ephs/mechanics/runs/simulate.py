@@ -10,7 +10,7 @@ from ephs.mechanics.constraints.redundancy import explain
 from ephs.mechanics.methods.registry import METHODS, Method, chosen
 from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.motion.motion import SceneMotion
-from ephs.mechanics.motion.views import Names
+from ephs.mechanics.motion.views import view_of
 from ephs.mechanics.rewrite.folded import folded_problem
 from ephs.mechanics.runs.assembling import assembled, flat_joints
 from ephs.mechanics.runs.journaling import journaled
@@ -99,7 +99,6 @@ def simulate(
     until, t0
         End and start in s. An end before the start runs backward in time; then no component may produce entropy.
     initial
-<<<<<<< HEAD
         Values of states by path. Other states start at the identity in a system, and as the scene says in a scene.
     method
         One of `ephs.mechanics.methods.registry.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
@@ -123,67 +122,27 @@ def simulate(
     events
         `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
         and end the run if they are terminal.
-=======
-        Values of states by path. Other states are at the identity in systems, and as in the file in scenes.
-    method
-        One of `ephs.mechanics.methods.registry.METHODS`, such as ``"natural"``, ``"natural4"``, ``"variational"``,
-        ``"radau"``, ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"ida"``; or a `Method` of your own; or ``"auto"``: natural
-        with ``step``; without it radau for systems on vector spaces, and for scenes explicit, and radau if stiff.
-    rtol, atol
-        Tolerances without ``step``: the error of a state x should be below ``atol + rtol·|x|``. atol is in the
-        state's unit, or in the mechanism's own units if these are far from 1 m, 1 kg and 1 s. Each may be
-        a mapping from kinds of quantities or paths to numbers, with ``"*"`` for all others.
-    step
-        Constant step in s: the grid is t₀ + k·step, the last step ends at ``until``. Default: chosen by rtol and atol.
-    max_step, min_step, max_steps
-        Limits of chosen steps in s, and of their number.
-    save_at
-        Times to keep; all steps if None.
-    form
-        ``"paper"``: the flattened equations, for natural methods; ``"folded"``: without transformers and the
-        junctions behind them, for natural methods; ``"reduced"``, the default: the smallest form of the method.
-    events
-        `ephs.Event` values or functions f(t, state) -> number. Their zeros are located and recorded in
-        ``sol.events``; events with ``stop`` end the run.
->>>>>>> docs2
     options
         Options of the method, such as ``{"rho": 0.8}`` of alpha.
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a
-<<<<<<< HEAD
         force in world axes; f is a constant, f(t), f(t, state), or `ephs.Sampled`. For a tuple of such names, f gives
         the numbers of all in order. The state is read by path, in a scene also by name: ``state.joints.pin.rate``; see
         `ephs.mechanics.motion.views.StateView`.
     jumps
         Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and restart
         on the other side. Functions are searched for further jumps; see `ephs.solve.probe`.
-=======
-        force in world axes; f is a constant, f(t), f(t, state), or `ephs.Sampled`. For a tuple of names, f returns
-        the numbers of all as one vector. States are read by path, those of scenes also by name, as
-        ``state.joints.pin.rate``; see `ephs.mechanics.motion.views.StateView`.
-    jumps
-        Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end and restart
-        there. Functions are searched for undeclared jumps; see `ephs.solve.probe`.
->>>>>>> docs2
     reference
         The reference environment of a system; a scene has its own.
     progress
         Called as progress(t, until, stats) a few times a second.
     journal
-<<<<<<< HEAD
         A file that records the run while it is running. After an interruption the same call resumes the run, with the
         same numbers as an uninterrupted run; `load_solution` reads the file.
     audit
         Treatment of findings of the run's audit: ``"fail"`` raises an `AuditError`, ``"warn"`` gives an
         `AuditWarning`, ``"off"`` only records them in ``sol.audit`` and the summary.
-=======
-        A file to which the run is written as it proceeds. After an interruption, the same call resumes, with the same
-        numbers as an uninterrupted run; `load_solution` reads the file.
-    audit
-        Consequence of findings of the audit: ``"fail"`` raises `AuditError`, ``"warn"`` warns with `AuditWarning`,
-        ``"off"`` only records them in ``sol.audit`` and the summary.
->>>>>>> docs2
 
     Raises
     ------
@@ -376,7 +335,7 @@ def problem_of_scene(
     scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
 ) -> Problem:
     """The initial value problem of a scene."""
-    view = Names(scene).view
+    view = view_of(scene)
     forces, wrenches, efforts = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)

@@ -1,4 +1,4 @@
-"""Relations whose numbers are matrices of any size: looped programs, compiled once for all of them.
+"""Relations whose numbers are matrices of any size, or a pose: programs compiled once for all of them.
 
 They have the arguments of `ephs.semantics.kernel_table`.
 """
@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, final
 
+from ephs.semantics.spaces import so3
+from ephs.semantics.spaces.vectors import apply, combine, hat, product, scale, transposed
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.kinds import pointer
 from ephs.semantics.stage.memory import Integers, Vector
@@ -101,7 +103,29 @@ def constant_structure(
     return 0
 
 
-FUNCTIONS: Final = (no_effort, quadratic, constant_structure)
+def frame_change(
+    on: Evaluator, dims: Integers, scal: Vector, p: Vector, x0: Vector, v: Vector, e: Vector, lam: Vector, f: Vector,
+    c: Vector, jac: Vector, work: Vector,
+) -> Integer:  # fmt: skip
+    """f = Cᵀ λ, 0 = C e with C = [−Ad_{o⁻¹}, 1]; p = o, a pose."""
+    place, back = [p[i] for i in range(4, 7)], transposed(so3.matrix([p[i] for i in range(4)]))
+    moment = [scale(-1.0, row) for row in product(back, hat(place))]
+    carried = [[*row, 0.0, 0.0, 0.0] for row in back] + [[*one, *two] for one, two in zip(moment, back, strict=True)]
+    twist, wrench = [e[i] for i in range(6)], [lam[i] for i in range(6)]
+    for i, (seen, pulled) in enumerate(zip(apply(carried, twist), combine(carried, wrench), strict=True)):
+        c[i] = e[6 + i] - seen
+        f[i], f[6 + i] = -1.0 * pulled, wrench[i]
+    for i in range(18):
+        for j in range(18):
+            jac[18 * i + j] = 0.0
+    for i in range(6):
+        for j in range(6):
+            jac[18 * j + 12 + i] = jac[18 * (12 + i) + j] = -1.0 * carried[i][j]
+        jac[18 * (6 + i) + 12 + i] = jac[18 * (12 + i) + 6 + i] = 1.0
+    return 0
+
+
+FUNCTIONS: Final = (no_effort, quadratic, constant_structure, frame_change)
 
 
 @cache

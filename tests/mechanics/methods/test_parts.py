@@ -13,6 +13,7 @@ import ephs
 from ephs import Pattern, junction, quantity
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
+from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.finding.frames import Unplaced, inertia_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
@@ -98,7 +99,7 @@ def test_weights_that_differ_are_forces_of_their_own():
     [
         ("rope", ROPE, {"p": "p", "x": "x"}, "acts on the twist of a body"),
         ("many", structures.quadratic("many", power_ports(p=MOMENTUM), np.eye(6), ()), {"p": "x"}, "no number|belongs"),
-        ("weld", components.frame_change([1, 0, 0, 0, 1, 0, 0], "p_j", "p"), {"p": "p", "p_j": "g"}, "without a joint"),
+        ("weld", frame_change([1, 0, 0, 0, 1, 0, 0], "p_j", "p"), {"p": "p", "p_j": "g"}, "without a joint"),
     ],
 )
 def test_what_has_no_place_is_refused_by_path(name, filling, ports, words):

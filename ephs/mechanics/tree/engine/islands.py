@@ -39,7 +39,8 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
     t, link = reduced.tables, found.bodies.link
     ends = [[-1 if body < 0 else link[body] for body in (t.first[i], t.second[i])] for i in range(len(reduced.edges))]
     groups = _joined(len(found.parts), ends)
-    barred: dict[int, list[Array]] = {group: [_of_gravity(reduced)] for group in groups}
+    weight = _of_gravity(reduced)
+    barred: dict[int, list[Array]] = {group: [weight] for group in groups}
     for i, (one, two) in enumerate(ends):
         if (one < 0) == (two < 0):
             continue

@@ -148,17 +148,18 @@ class _Finder:
         self.frames: dict[int, Frame] = {}
         self.links: list[Link] = []
         self._through: dict[int, int] = {}  # junction -> the offset by which it was reached
+        self._inertias: dict[int, Array | None] = {}  # by primitive, which equal bodies share
         self._shared = Counter(map(self._around, [*self._with(Role.POSE), *self._with(Role.KINETIC)]))
         self._of_joints = Counter(map(self._around, self._with(Role.JOINT)))
         self._beside: dict[int, list[tuple[int, int, bool]]] = {}
         for number in self._with(Role.OFFSET):
-            outer, inner = wiring.ports[number].values()
+            outer, inner = wiring.ports(number).values()
             self._beside.setdefault(outer, []).append((number, inner, True))
             self._beside.setdefault(inner, []).append((number, outer, False))
 
     def found(self) -> Frames:
         for number in self._with(Role.GROUND):
-            self._carry(next(iter(self.wiring.ports[number].values())), GROUND, number)
+            self._carry(next(iter(self.wiring.ports(number).values())), GROUND, number)
         bodies: set[int] = set()
         for number, role in enumerate(self.roles):
             if role in (Role.KINETIC, Role.COUPLING, Role.GYROSCOPIC):
@@ -170,7 +171,7 @@ class _Finder:
         relations = self._with(Role.JOINT)
         for number in relations:
             for port in ("p_j1", "p_j2"):
-                self._bare(self.wiring.ports[number][port], number)
+                self._bare(self.wiring.ports(number)[port], number)
         joints = tuple(joint for number in relations if (joint := self._joint(number)) is not None)
         self.placed |= set(self._with(Role.GROUND)) | set(self._with(Role.OFFSET))
         return Frames(
@@ -185,7 +186,7 @@ class _Finder:
         slot = self.wiring.components[number]
         for port, _, of in slot.primitive.bundle.items():
             if of == quantity.body_momentum:
-                return self.wiring.ports[number][str(port)]
+                return self.wiring.ports(number)[str(port)]
         return None
 
     def _carry(self, junction: int, link: int, number: int) -> None:
@@ -212,10 +213,12 @@ class _Finder:
         """The body whose momentum a junction is."""
         inertia, potential, pose, momentum, turning = np.zeros((6, 6)), -1, None, None, None
         mine: list[int] = []
-        for number, port in self.wiring.on[junction]:
+        for number, port in self.wiring.on(junction):
             role, slot = self.roles[number], self.wiring.components[number]
             if role is Role.KINETIC:
-                found = inertia_of(slot.primitive)
+                if id(slot.primitive) not in self._inertias:
+                    self._inertias[id(slot.primitive)] = inertia_of(slot.primitive)
+                found = self._inertias[id(slot.primitive)]
                 if found is None:
                     self._fault(number, "is no kinetic energy about a centre of mass")
                     continue
@@ -223,7 +226,7 @@ class _Finder:
             elif role is Role.GYROSCOPIC:
                 turning = number
             elif role is Role.COUPLING:
-                (at,) = (j for p, j in self.wiring.ports[number].items() if p != port)
+                (at,) = (j for p, j in self.wiring.ports(number).items() if p != port)
                 stored = self.wiring.stored(at)
                 if pose is not None or stored is None or self.roles[stored[0]] is not Role.POSE:
                     self._fault(number, "couples a body to no pose, or to a second one")
@@ -253,11 +256,11 @@ class _Finder:
 
     def _joint(self, number: int) -> LinkJoint | None:
         """The joint of a relation; None where it is not whole."""
-        wiring, ports = self.wiring, self.wiring.ports[number]
+        wiring, ports = self.wiring, self.wiring.ports(number)
         state, rate = wiring.components[number].reads[0], ports["p_r"]
         for other, port in wiring.neighbours(rate, number):
             if self.roles[other] is Role.COUPLING:
-                (at,) = (j for p, j in wiring.ports[other].items() if p != port)
+                (at,) = (j for p, j in wiring.ports(other).items() if p != port)
                 stored = wiring.stored(at)
                 if stored is not None and stored[1].path == state.path and self.roles[stored[0]] is Role.RELATIVE:
                     self.placed |= {number, other, stored[0]}

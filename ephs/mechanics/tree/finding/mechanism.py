@@ -18,6 +18,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN, exponential_law
@@ -203,7 +204,7 @@ def _tables(
     support, reach = np.zeros(count, dtype=np.int64), np.zeros(count)
     for i, (edge, kind) in enumerate(zip(edges, kinds, strict=True)):
         b, d = edge.pair.basis, edge.pair.dim
-        basis[i, :, :d], left[i, :d] = b, np.linalg.pinv(b)
+        basis[i, :, :d], left[i, :d] = b, left_inverse(edge.pair)
         if kind == CUT:
             found = _complement(b, loop_algebra(i, edges, parents, place, twists, frames[i]), length)
             rows[i] = len(found)

@@ -99,7 +99,7 @@ class _Reader:
         self.rates = {joint.rate: joint.pair.dim for joint in self.found.joints}
         for number, role in enumerate(self.roles):
             if role in (Role.HEAT, Role.ENVIRONMENT) and self._booked(number):
-                self.entropy[next(iter(self.wiring.ports[number].values()))] = len(self.entropies)
+                self.entropy[next(iter(self.wiring.ports(number).values()))] = len(self.entropies)
                 self.entropies[self.wiring.components[number].reads[0].path] = number
                 self.placed.add(number)
 
@@ -133,7 +133,7 @@ class _Reader:
 
     def _booked(self, number: int) -> bool:
         """Whether heat comes to a store of it by irreversible components only: then it is booked as energy."""
-        (junction,) = self.wiring.ports[number].values()
+        (junction,) = self.wiring.ports(number).values()
         others = (self.wiring.components[other].primitive for other, _ in self.wiring.neighbours(junction, number))
         return junction not in self.wiring.outer and all(isinstance(other, Irreversible) for other in others)
 
@@ -161,7 +161,7 @@ class _Reader:
         """Why nothing can be attached to a junction; None where it can."""
         if junction in self.found.frames:
             return "acts on the twist of a body; a joint's rate can be acted on"
-        on = {self.roles[number] for number, _ in self.wiring.on[junction]}
+        on = {self.roles[number] for number, _ in self.wiring.on(junction)}
         if on & {Role.POSE, Role.RELATIVE, Role.KINETIC, Role.JOINT} and junction not in self.rates:
             return "acts on the state of a body or a joint; a joint's rate can be acted on"
         return None
@@ -181,7 +181,7 @@ class _Reader:
             if self.roles[number] is not Role.FRICTION:
                 continue
             read = {state.path for state in self.wiring.components[number].reads}
-            *_, hot = self.wiring.ports[number].values()
+            *_, hot = self.wiring.ports(number).values()
             if friction >= 0 or read - {joint.state.path} or hot not in self.entropy:
                 continue
             friction, heat = number, self.entropy[hot]
@@ -250,7 +250,7 @@ class _Reader:
             if role is not Role.DRAG:
                 continue
             slot = self.wiring.components[number]
-            frame = self.found.frames[next(iter(self.wiring.ports[number].values()))]
+            frame = self.found.frames[next(iter(self.wiring.ports(number).values()))]
             pose = None if frame.link < 0 else self.found.links[frame.link].pose
             at_centre = np.array_equal(frame.offset, SE3.identity())
             if slot.reads and not (at_centre and pose is not None and slot.reads[0].path == pose.path):
@@ -270,7 +270,7 @@ class _Reader:
 
     def _heat(self, number: int) -> int:
         """Entropy of the node that a component heats."""
-        *_, junction = self.wiring.ports[number].values()
+        *_, junction = self.wiring.ports(number).values()
         if junction not in self.entropy:
             raise Unplaced(self.wiring.components[number].path, "heats what is no store of heat")
         return self.entropy[junction]
@@ -278,7 +278,7 @@ class _Reader:
     def _conduction(self) -> Iterator[tuple[int, int, int]]:
         for number, role in enumerate(self.roles):
             if role is Role.CONDUCTION:
-                ends = [self.entropy.get(junction, -1) for junction in self.wiring.ports[number].values()]
+                ends = [self.entropy.get(junction, -1) for junction in self.wiring.ports(number).values()]
                 if -1 in ends:
                     continue
                 self.placed.add(number)

@@ -73,8 +73,8 @@ class Roles:
 
 def offset_of(primitive: Primitive) -> np.ndarray | None:
     """(7,) the pose of the frame that a frame change leads to, in the frame of its first port; None of others."""
-    offset = dict(primitive.parameters).get("offset")
-    return None if offset is None else np.array(offset, dtype=float)
+    kernel = primitive.kernel
+    return np.array(kernel.parameters) if kernel is not None and kernel.name == "frame_change" else None
 
 
 def _role(primitive: Primitive) -> Role:
@@ -118,17 +118,16 @@ def _of_reversible(primitive: Reversible, kinds: list[str], on_bodies: list[bool
     if primitive.kernel is not None and primitive.kernel.name == "holonomic":
         whole = {"p_j1", "p_j2", "p_r"} == {str(port) for port in primitive.bundle.ports}
         return Role.JOINT if whole and not list(pulled_ports(primitive.kernel)) else Role.OTHER
+    if offset_of(primitive) is not None:
+        return Role.OFFSET if on_bodies == [True, True] else Role.OTHER
     if primitive.name == "lie_poisson" and on_bodies == [True]:
         return Role.GYROSCOPIC
     if primitive.reads or primitive.discrete is not None:
         return Role.OTHER
     skew, constraint = primitive.structure({})
     n = primitive.bundle.size
-    if all(on_bodies) and not np.any(skew):
-        if len(kinds) == 1 and np.array_equal(constraint, np.eye(6)):
-            return Role.GROUND
-        if len(kinds) == 2 and offset_of(primitive) is not None:
-            return Role.OFFSET
+    if on_bodies == [True] and not np.any(skew) and np.array_equal(constraint, np.eye(6)):
+        return Role.GROUND
     if kinds in (["pose", "momentum"], ["relative_pose", "momentum"]) and not constraint.size:
         half = np.eye(n // 2)
         zero = np.zeros_like(half)

@@ -4,8 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import final
 
+import numpy as np
+
 from ephs.operad import Path
 from ephs.semantics.descriptor import ComponentSlot, Descriptor, StateSlot
+from ephs.semantics.numbering import Index, starts
 from ephs.semantics.primitives import Storage
 
 __all__ = ["Wiring"]
@@ -18,40 +21,51 @@ class Wiring:
 
     Parameters
     ----------
-    ports
-        (components,) port -> junction.
-    on
-        Junction -> the components with a port there, each with the port.
+    names
+        (components,) ports of each.
+    wires, first
+        Junctions of all ports, one component after the other, and where those of each begin.
+    owners, begin
+        Components with a port on each junction, one junction after the other, and where those of each begin.
     outer
         Junction -> the outer port that it is.
     """
 
     components: tuple[ComponentSlot, ...]
-    ports: tuple[dict[str, int], ...]
-    on: dict[int, list[tuple[int, str]]]
+    names: tuple[tuple[str, ...], ...]
+    wires: Index
+    first: Index
+    owners: Index
+    begin: Index
     outer: dict[int, Path]
 
     @staticmethod
     def of(descriptor: Descriptor) -> "Wiring":
         """The incidence of a descriptor's system."""
-        components, wires = descriptor.components, iter(descriptor.numbering.wires.tolist())
-        ports: list[dict[str, int]] = []
-        on: dict[int, list[tuple[int, str]]] = {}
-        known: dict[int, tuple[str, ...]] = {}
-        for number, slot in enumerate(components):
-            names = known.get(id(slot.primitive))
-            if names is None:
-                names = known[id(slot.primitive)] = tuple(map(str, slot.primitive.bundle.ports))
-            mine = {port: next(wires) for port in names}
-            ports.append(mine)
-            for port, junction in mine.items():
-                on.setdefault(junction, []).append((number, port))
+        n, components = descriptor.numbering, descriptor.components
+        each = [tuple(map(str, primitive.bundle.ports)) for primitive in n.primitives]
+        names = tuple(each[i] for i in n.primitive.tolist())
+        count = np.array([len(ports) for ports in each], dtype=np.int64)[n.primitive]
+        owners = np.repeat(np.arange(count.size), count)[np.argsort(n.wires, kind="stable")]
+        begin = np.append(0, np.cumsum(np.bincount(n.wires, minlength=n.junctions.size)))
         outer = [slot.path for slot in descriptor.outer]
-        return Wiring(components, tuple(ports), on, dict(zip(descriptor.numbering.outer.tolist(), outer, strict=True)))
+        return Wiring(
+            components, names, n.wires, starts(count), owners, begin, dict(zip(n.outer.tolist(), outer, strict=True))
+        )
+
+    def ports(self, number: int) -> dict[str, int]:
+        """Ports of a component, each with its junction."""
+        names, at = self.names[number], self.first[number]
+        return dict(zip(names, self.wires[at : at + len(names)].tolist(), strict=True))
+
+    def on(self, junction: int) -> list[tuple[int, str]]:
+        """The components with a port on a junction, each with the port."""
+        owners = dict.fromkeys(self.owners[self.begin[junction] : self.begin[junction + 1]].tolist())
+        return [(number, port) for number in owners for port, at in self.ports(number).items() if at == junction]
 
     def stored(self, junction: int) -> tuple[int, StateSlot] | None:
         """The storage on a junction with its state there; None where nothing is stored."""
-        for number, port in self.on.get(junction, []):
+        for number, port in self.on(junction):
             slot = self.components[number]
             if isinstance(slot.primitive, Storage):
                 return number, slot.reads[list(slot.primitive.bundle.ports).index(Path.of(port))]
@@ -59,4 +73,4 @@ class Wiring:
 
     def neighbours(self, junction: int, besides: int) -> Iterator[tuple[int, str]]:
         """The components on a junction with their ports there, but for one component."""
-        return ((number, port) for number, port in self.on.get(junction, []) if number != besides)
+        return ((number, port) for number, port in self.on(junction) if number != besides)
