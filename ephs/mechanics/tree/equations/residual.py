@@ -61,16 +61,10 @@ class Residual:
         usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
         tree = packed(parts, self._ground @ gravity, planar=False, among=STANDARD if usual else ())
         chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
-        moving = np.flatnonzero(t.dim)
-        friction = forces.part[:, 1]
-        heat = np.where(friction >= 0, forces.part[:, 2], -1)
-        edge = np.column_stack(
-            [forces.edge[:, :3], t.code[moving], t.dim[moving], t.q_size[moving], forces.edge[:, [4, 6]],
-             forces.part[:, :2], heat]
-        ).astype(np.int64)  # fmt: skip
-        kinds = kinds_of([*edge[:, [3, 5, 4]].tolist(), *cut[:, [2, 5, 3]].tolist()])
+        tables, code = forces.tables(), t.code[np.flatnonzero(t.dim)].astype(np.int64)
+        kinds = kinds_of([*np.column_stack([code, forces.edge[:, [5, 3]]]).tolist(), *cut[:, [2, 5, 3]].tolist()])
         self.program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
-        self.laws = Laws(forces, edge.ravel(), len(reduced.made), scal)
+        self.laws = Laws(forces, len(reduced.made), scal)
         self.attached = Attached(reduced, scal, supply)
         self.counts: list[int] = [*cut[cut[:, 2] != TIE, 8].tolist(), *[1] * len(reduced.attaching.ties)]
         self.n, self.m, self.ns = reduced.freedoms, sum(self.counts), t.node.size
@@ -80,16 +74,15 @@ class Residual:
         self.cut_rates = slice(self.rows.stop, self.rows.stop + c)
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
         self.entropy_rates = slice(self.cut_changes.stop, self.cut_changes.stop + self.ns)
-        n, m, ends, bodies = self.n, self.m, 2 * int(cut[:, 8].sum()), found.bodies
+        n, m, ends = self.n, self.m, 2 * int(cut[:, 8].sum())
         self.arrays: dict[str, Any] = {
             "integers": tree.integers, "reals": tree.reals, "gravity": tree.gravity,
             "memory": np.zeros((tree.size + 1) * self.program.width), "cut": cut.ravel(),
             "cut_numbers": numbers.ravel(), "chart": chart.ravel(), "places": np.zeros((tree.size + 1, PLACE)),
             "motions": np.zeros((len(cut), Relative.real_width)), "end": np.arange(ends),
-            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": edge.ravel(),
-            "edge_numbers": np.hstack([forces.frame, forces.left]).ravel(), "law": self.laws.law,
-            "body": np.array(bodies.link, dtype=np.int64), "body_frame": _frames(bodies.inside),
-            "warming": self.laws.warming, "passage": np.ascontiguousarray(t.conduction[:, 1:]).ravel(),
+            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": tables["acting"],
+            "code": code, "law": self.laws.law, "body": tables["body"], "warming": self.laws.warming,
+            "passage": tables["conduction"],
             "flow": self.laws.flow, "tie": self.attached.tie, "tied": self.attached.tied,
             "beyond": np.zeros(len(self.attached.tied)), "pulls": np.zeros(self.nv),
             "base": np.zeros(reduced.coordinates), "v": np.zeros(self.nv),
@@ -104,7 +97,7 @@ class Residual:
             "residual": np.zeros(self.entropy_rates.stop), "action": np.zeros(2 * n + 2 * c + self.ns),
             "rigid": np.zeros(n),
         }  # fmt: skip
-        self.size = tree.size
+        self.size, self._frames = tree.size, forces.body_frame
         calls = self.program.program.compiled()
         self._calls = {name: self.bound(calls, name) for name in calls}
         loops, self._worst = loop_program(self.program.kinds).compiled(), np.zeros(1)
@@ -153,7 +146,7 @@ class Residual:
 
     def pose(self, body: int) -> Array:
         """(7,) of a body in the world, where `place` has been."""
-        place, frame = self.arrays["places"][self._bodies.link[body]], self.arrays["body_frame"][body]
+        place, frame = self.arrays["places"][self._bodies.link[body]], self._frames[body]
         turn = self._ground.T @ place[:9].reshape(3, 3)
         at = self._ground.T @ place[9:12] + turn @ frame[9:]
         return np.concatenate([matrix_to_quaternion(turn @ frame[:9].reshape(3, 3)), at])
@@ -176,7 +169,7 @@ class Residual:
 
     def inside(self, body: int, twist: Array) -> Array:
         """(…, 6) twists of a body in its frame, from those of its link."""
-        frame = self.arrays["body_frame"][body]
+        frame = self._frames[body]
         turn, at = frame[:9].reshape(3, 3), frame[9:]
         turning, moving = twist[..., :3], twist[..., 3:]
         return np.concatenate([turning @ turn, (moving + np.cross(turning, at)) @ turn], axis=-1)
@@ -248,8 +241,3 @@ class Residual:
         self._calls["action"]()
         out = self.outs["action"]
         return out[: self.n].copy(), out[self.n : 2 * self.n].copy()
-
-
-def _frames(poses: Any) -> Array:
-    """(poses, 12): rows of R, and p."""
-    return np.array([[*quaternion_to_matrix(x[:4]).ravel(), *x[4:]] for x in poses]).reshape(-1, 12)
