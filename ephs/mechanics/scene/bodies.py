@@ -113,7 +113,7 @@ class Joint(Element):
         "rest": Number(others=1, each=0),
         "drive": Number(energy=1, others=-1, each=0),
         "rate": Number(time=-1, others=1, each=0),
-        "armature": Number(energy=1, time=2, first=-2),
+        "armature": Number(energy=1, time=2, first=-2, least=NON_NEGATIVE),
     }
     name: str
     kind: str

@@ -7,7 +7,7 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.element import Element, Measured, Number
+from ephs.mechanics.scene.element import NON_NEGATIVE, Element, Measured, Number
 
 __all__ = ["Beam", "Load", "Strain"]
 
@@ -85,7 +85,7 @@ class Load(Element):
     numbers: ClassVar[Mapping[str, Number]] = {
         "force": Number(energy=1, length=-1, count=3),
         "moment": Number(energy=1, count=3),
-        "ramp": Number(time=1),
+        "ramp": Number(time=1, least=NON_NEGATIVE),
     }
     name: str
     body: str

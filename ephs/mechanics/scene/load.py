@@ -138,10 +138,11 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
-    conduction = resolve.resolve_conduction(document, names, faults)
-    markers = resolve.resolve_markers(document, names, faults)
+    conduction = resolve.resolve_plain("conduction", document, names, faults)
+    thermal = resolve.resolve_plain("thermal", document, names, faults)
+    markers = resolve.resolve_plain("markers", document, names, faults)
     surfaces = resolve_surfaces(document, names, path.parent, faults)
-    loads = resolve.resolve_loads(document, names, faults)
+    loads = resolve.resolve_plain("loads", document, names, faults)
     if faults:
         return None
     drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
@@ -160,7 +161,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         placed,
         coupled,
         springs,
-        resolve.resolve_thermal(document) | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
+        thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
         conduction | {name: x for rod in rods.values() for name, x in rod.conduction.items()},
         parts,
         str(path),

@@ -4,7 +4,7 @@ All semantic faults of a file but those of assembly are found here.
 """
 
 from collections.abc import Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, final
 
@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.attached import Conduction, ThermalNode
+from ephs.mechanics.scene.element import Element
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
-from ephs.mechanics.scene.flexible import Load, Strain
+from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Marker, Spring, World, frozen
+from ephs.mechanics.scene.model import ELEMENTS, ENVIRONMENT, GROUND, Joint, Spring, World, frozen
 from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
@@ -87,6 +87,16 @@ class Names:
     thermal: Set[str]
     unknown_parts: Set[str]
 
+    def check_all(self, kind: type[Element], table: Checked[Any], key: str, faults: list[Fault]) -> None:
+        """Append a fault for each unknown reference among the keys of an element's table."""
+        for part, of in kind.names.items():
+            if of in ("body", "node") and part in type(table.entry).model_fields and table.sound(part):
+                given, what = getattr(table.entry, part), "body" if of == "body" else "thermal"
+                several = [(given, f"{key}.{part}")] if isinstance(given, str) else []
+                several = several or [(name, f"{key}.{part}[{i}]") for i, name in enumerate(given or ())]
+                for name, place in several:
+                    self.check(name, place, what, faults)
+
     def check(self, name: str, key: str, what: str, faults: list[Fault]) -> None:
         """Append a fault where a reference is unknown; ``what`` is body or thermal."""
         fixed, known = (GROUND, self.bodies) if what == "body" else (ENVIRONMENT, self.thermal)
@@ -134,8 +144,7 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
     """A joint with everything checked but its closure; None where its type or place is not usable."""
     entry, key = table.entry, f"joints.{name}"
     _check_ends(table, key, names, faults)
-    if table.sound("heat"):
-        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    names.check_all(Joint, table, key, faults)
     if not table.sound("type"):
         return None
     if entry.type not in joint_types():
@@ -207,61 +216,33 @@ def resolve_spring(name: str, table: Checked[SpringEntry], names: Names, faults:
     """A spring."""
     entry, key = table.entry, f"springs.{name}"
     _check_ends(table, key, names, faults)
-    if table.sound("heat"):
-        names.check(entry.heat, f"{key}.heat", "thermal", faults)
-    return Spring(
-        name,
-        entry.bodies[0],
-        entry.bodies[1],
-        frozen(entry.at1),
-        frozen(entry.at2),
-        entry.stiffness,
-        entry.length,
-        entry.damping,
-        entry.heat,
-    )
+    names.check_all(Spring, table, key, faults)
+    return Spring(name=name, body1=entry.bodies[0], body2=entry.bodies[1], **attributes(Spring, entry))
 
 
-def resolve_thermal(document: Document) -> dict[str, ThermalNode]:
-    """The thermal nodes."""
-    tables = document.sections["thermal"]
-    return {name: ThermalNode(name, t.entry.capacity, t.entry.temperature) for name, t in tables.items()}
+def attributes(kind: type[Element], entry: Any, joints: int = 0) -> dict[str, Any]:
+    """The attributes of an element that are keys of its table, as it has them; ``joints``: to how many it is tied."""
+    given: dict[str, Any] = {}
+    for key in {each.name for each in fields(kind)} & set(type(entry).model_fields):  # pyright: ignore[reportArgumentType]
+        value, number = getattr(entry, key), kind.numbers.get(key)
+        if number is not None and number.shape(joints) and value is not None:
+            value = frozen(np.atleast_1d(np.asarray(value, dtype=float)))
+        given[key] = tuple(value) if isinstance(value, list) else value
+    return given
 
 
-def resolve_markers(document: Document, names: Names, faults: list[Fault]) -> dict[str, Marker]:
-    """The markers, their bodies checked."""
-    found: dict[str, Marker] = {}
-    for name, table in document.sections["markers"].items():
-        if table.sound("body"):
-            names.check(table.entry.body, f"markers.{name}.body", "body", faults)
-        found[name] = Marker(name, table.entry.body, frozen(table.entry.at))
-    return found
-
-
-def resolve_loads(document: Document, names: Names, faults: list[Fault]) -> dict[str, Load]:
-    """The loads, their bodies checked."""
-    found: dict[str, Load] = {}
-    for name, table in document.sections["loads"].items():
-        entry, key = table.entry, f"loads.{name}.body"
-        if table.sound("body"):
-            names.check(entry.body, key, "body", faults)
-            if entry.body == GROUND:
-                faults.append(fault("load ground", key, shown(entry.body)))
-        found[name] = Load(name, entry.body, frozen(entry.force), frozen(entry.moment), entry.follower, entry.ramp)
-    return found
-
-
-def resolve_conduction(document: Document, names: Names, faults: list[Fault]) -> dict[str, Conduction]:
-    """The conductions, their ends checked."""
-    found: dict[str, Conduction] = {}
-    for name, table in document.sections["conduction"].items():
-        entry, key = table.entry, f"conduction.{name}.between"
-        if table.sound("between"):
-            for i, end in enumerate(entry.between):
-                names.check(end, f"{key}[{i}]", "thermal", faults)
-            if entry.between[0] == entry.between[1]:
-                faults.append(fault("same ends", key, f'"{entry.between[0]}" twice'))
-        found[name] = Conduction(name, (entry.between[0], entry.between[1]), entry.conductance)
+def resolve_plain(section: str, document: Document, names: Names, faults: list[Fault]) -> dict[str, Any]:
+    """The elements of a section whose tables have their attributes for keys, what they name checked."""
+    kind: Any = ELEMENTS[section]
+    found: dict[str, Any] = {}
+    for name, table in document.sections[section].items():
+        key = f"{section}.{name}"
+        names.check_all(kind, table, key, faults)
+        found[name] = kind(name=name, **attributes(kind, table.entry))
+        if section == "loads" and table.sound("body") and table.entry.body == GROUND:
+            faults.append(fault("load ground", f"{key}.body", shown(GROUND)))
+        if section == "conduction" and table.sound("between") and len(set(table.entry.between)) == 1:
+            faults.append(fault("same ends", f"{key}.between", f'"{table.entry.between[0]}" twice'))
     return found
 
 

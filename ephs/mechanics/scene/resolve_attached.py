@@ -1,7 +1,6 @@
 """Tables of motors, gears, cylinders, gas springs and actuators, checked and resolved."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from ephs.mechanics.scene.attached import ATTACHED, Actuator, Attachment, Gear
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.model import Joint, Scene, frozen
-from ephs.mechanics.scene.resolve import Names
+from ephs.mechanics.scene.resolve import Names, attributes
 
 __all__ = ["resolve_attached"]
 
@@ -38,8 +37,7 @@ def _resolved(
 ) -> Attachment | None:
     kind: Any = ATTACHED[section]
     entry, key = table.entry, f"{section}.{name}"
-    if table.sound("heat") and kind is not Actuator:
-        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    names.check_all(kind, table, key, faults)
     several = kind in (Gear, Actuator)
     if not table.sound("joints", "joint"):
         return None
@@ -47,14 +45,7 @@ def _resolved(
     of = _joints(kind, key, tied, joints, several=several, faults=faults)
     if table.spoiled:
         return None
-    given: dict[str, Any] = {}
-    for each in fields(kind):
-        if each.name not in ("name", *(("heat",) if kind is Actuator else ())):
-            value: Any = getattr(entry, each.name)
-            number = kind.numbers.get(each.name)
-            if number is not None and number.shape(len(tied)) and value is not None:
-                value = frozen(np.atleast_1d(np.asarray(value, dtype=float)))
-            given[each.name] = tuple(tied) if each.name == "joints" else value
+    given = attributes(kind, entry, len(tied))
     if several:
         count = len(tied) - (kind is Gear)
         if kind is Actuator and given["ratio"].size == 1:

@@ -4,9 +4,10 @@ Rows J x = target are turned to A = J L⁻ᵀ with the mass matrix M = L Lᵀ an
 by QR with pivoting. So rank is decided in the mass metric, and never on the square of a matrix.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import final
+from typing import Any, final
 
 from ephs.semantics.linear.dense import backward, cholesky, copy, dot, forward, norm, subtract
 from ephs.semantics.spaces.rank import EXPLICIT, REGULAR, ROUNDED
@@ -230,54 +231,6 @@ def solve(on: Evaluator, factor: Matrix, x: Vector) -> None:
     backward(on, factor, x)
 
 
-def _orthonormalise(
-    on: Evaluator,
-    row: Matrix,
-    terms: Vector,
-    factor: Matrix,
-    scaled: Matrix,
-    plain: Matrix,
-    triangle: Matrix,
-    chosen: Integers,
-    count: Integer,
-) -> Integer:
-    return orthonormalise(on, Rows(row, terms, factor, scaled, plain, triangle, chosen), count)
-
-
-def _correct(
-    on: Evaluator,
-    row: Matrix,
-    terms: Vector,
-    factor: Matrix,
-    scaled: Matrix,
-    plain: Matrix,
-    triangle: Matrix,
-    chosen: Integers,
-    rank: Integer,
-    target: Vector,
-    step: Vector,
-    out: Vector,
-) -> None:
-    correct(on, Rows(row, terms, factor, scaled, plain, triangle, chosen), rank, target, step, out)
-
-
-def _multipliers(
-    on: Evaluator,
-    row: Matrix,
-    terms: Vector,
-    factor: Matrix,
-    scaled: Matrix,
-    plain: Matrix,
-    triangle: Matrix,
-    chosen: Integers,
-    count: Integer,
-    rank: Integer,
-    step: Vector,
-    out: Vector,
-) -> None:
-    multipliers(on, Rows(row, terms, factor, scaled, plain, triangle, chosen), count, rank, step, out)
-
-
 @cache
 def row_program() -> Program:
     """Return the program of these functions; rows are handed over as the fields of `Rows`, in order."""
@@ -285,11 +238,15 @@ def row_program() -> Program:
         "row": matrix(), "terms": vector(), "factor": matrix(), "scaled": matrix(), "plain": matrix(),
         "triangle": matrix(), "chosen": indices(),
     }  # fmt: skip
+
+    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
+        return Entry.bundled(function, {**rows, **kinds}, (rows, Rows))
+
     return Program(
         "constraint_rows",
         cholesky=Entry(cholesky, a=matrix(), factor=matrix()),
         solve=Entry(solve, factor=matrix(), x=vector()),
-        orthonormalise=Entry(_orthonormalise, **rows, count=integer()),
-        correct=Entry(_correct, **rows, rank=integer(), target=vector(), step=vector(), out=vector()),
-        multipliers=Entry(_multipliers, **rows, count=integer(), rank=integer(), step=vector(), out=vector()),
+        orthonormalise=entry(orthonormalise, count=integer()),
+        correct=entry(correct, rank=integer(), target=vector(), step=vector(), out=vector()),
+        multipliers=entry(multipliers, count=integer(), rank=integer(), step=vector(), out=vector()),
     )

@@ -1,7 +1,7 @@
 """Entry functions of programs: a staged function, the kinds of its arguments, and the functions derived from it."""
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter
@@ -42,6 +42,30 @@ class Entry:
             raise StageError(
                 "parameters", where=self.name, expected=", ".join(names) or "none", found=", ".join(kinds) or "none"
             )
+
+    @staticmethod
+    def bundled(
+        function: Callable[..., Any], kinds: Mapping[str, "Kind | Any"],
+        *made: tuple[Iterable[str], Callable[..., Any]],
+    ) -> "Entry":  # fmt: skip
+        """Return an entry function with arguments of these kinds, some of which the function takes as one.
+
+        Parameters
+        ----------
+        function
+            Takes after the evaluator what is made of arguments, then the other arguments, in order.
+        *made
+            Names of arguments, and what makes one thing of them.
+        """
+
+        names, bundles = tuple(kinds), tuple((tuple(names), make) for names, make in made)
+
+        def run(on: Evaluator, *arguments: Any) -> Any:
+            given = dict(zip(names, arguments, strict=True))
+            parts = [make(*[given.pop(name) for name in taken]) for taken, make in bundles]
+            return function(on, *parts, *given.values())
+
+        return Entry(_taking(run, function.__qualname__, names), **kinds)
 
     @property
     def name(self) -> str:
@@ -134,11 +158,7 @@ class Entry:
             return self.function(taping, *[_resolved(argument, taping) for argument in own])
 
         kinds = {name: taped(kind) for name, kind in self.kinds.items()} | TAPE
-        run.__qualname__ = self.name
-        run.__signature__ = inspect.Signature(
-            [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("on", *kinds)]
-        )
-        return Entry(run, **kinds)
+        return Entry(_taking(run, self.name, kinds), **kinds)
 
     def given(self, **values: Any) -> "Entry":
         """Return this function for some arguments known while staging, unrolled over them.
@@ -175,16 +195,20 @@ class Entry:
                 ],
             )
 
-        names = [name for name in self.kinds if name not in parts]
-        run.__qualname__ = self.name
-        run.__signature__ = inspect.Signature(
-            [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in ("on", *names)]
-        )
-        return Entry(run, **{name: self.kinds[name] for name in names})
+        rest = {name: kind for name, kind in self.kinds.items() if name not in parts}
+        return Entry(_taking(run, self.name, rest), **rest)
 
     def _known(self, names: tuple[str, ...]) -> None:
         if unknown := [name for name in names if name not in self.kinds]:
             raise StageError("unknown", where=self.name, found=", ".join(unknown), expected=", ".join(self.kinds))
+
+
+def _taking(run: Callable[..., Any], name: str, names: Iterable[str]) -> Callable[..., Any]:
+    """A function of any arguments, with a name and the names of its arguments."""
+    run.__qualname__ = name
+    parameters = [Parameter(each, Parameter.POSITIONAL_OR_KEYWORD) for each in ("on", *names)]
+    run.__signature__ = inspect.Signature(parameters)  # pyright: ignore[reportFunctionMemberAccess]
+    return run
 
 
 def _resolved(argument: Any, on: Taped) -> Any:

@@ -3,9 +3,9 @@
 The state of the method is a value; advancing it is compiled, and gives one row of results a step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from ephs.solve.sparse import Index
 __all__ = [
     "Chunk",
     "Decided",
+    "Loop",
     "Natural",
     "NaturalState",
     "has_choice",
@@ -101,8 +102,15 @@ class Chunk:
 
 
 @final
-class _Loop:
+class Loop:
     """The compiled loop over steps, bound to arrays of its own.
+
+    Parameters
+    ----------
+    bind
+        Called with the memory of a state (x, z, previous, sums), of (h, θ₀, π₀), of inputs, and of results.
+    stages
+        Shape of what there is for each stage of a step: none at order 2.
 
     Attributes
     ----------
@@ -112,22 +120,21 @@ class _Loop:
         States, energies and ledgers, a row for each step that was taken last.
     """
 
-    def __init__(self, model: Model, order: Order, memory: Memory, room: int) -> None:
-        components = model.tables.kind.size
-        self.order, self.room, self._scal, self._inputs = order, room, model.scal(0.0), model.input_values()
-        sizes = (model.descriptor.point_size, model.unknowns, (BEFORE, model.unknowns), 4 + components)
-        self._state = [np.zeros(size) for size in sizes]
-        self.rows = [np.zeros((room, width)) for width in (sizes[0], components, 5)]
+    def __init__(
+        self, model: Model, order: Order, room: int, bind: Callable[..., Any], stages: tuple[int, ...] = ()
+    ) -> None:
+        components, n = model.tables.kind.size, model.unknowns
+        self.order, self.room, self._scal = order, room, model.scal(0.0)
+        self._inputs = np.tile(model.input_values(), (*stages, 1))
+        size, before = model.descriptor.point_size, BEFORE * max((1, *stages))
+        self._state = [np.zeros(shape) for shape in (size, (*stages, n), (before, n), 4 + components)]
+        self.rows = [np.zeros((room, width)) for width in (size, components, 5)]
         self._outcome = np.zeros(4, dtype=np.int64)
-        x, z, previous, sums = self._state
-        self._call = natural_program().compiled()["advance"].bind(
-            parts_of(model.tables), parts_of(order), parts_of(memory), x, z, previous, self._scal, self._inputs, sums,
-            *self.rows, self._outcome, 0,
-        )  # fmt: skip
+        self._call = bind(self._state, self._scal, self._inputs, (*self.rows, self._outcome, 0))
 
     def run(self, state: Sequence[Array], h: float, inputs: Array, steps: int) -> tuple[int, int, int, int]:
         """Take steps in place of a state (x, z, previous, sums): status, component, steps done, iterations."""
-        self._scal[0], self._inputs[: inputs.size] = h, inputs
+        self._scal[0], self._inputs[..., : inputs.shape[-1]] = h, inputs
         for own, given in zip(self._state, state, strict=True):
             own[:] = given
         self._call(steps)
@@ -168,7 +175,7 @@ class Natural:
         self._unsettled = 0
         self._dropped: Index | None = None
         self._decided: Decided | None = None
-        self._bound: _Loop | None = None
+        self._bound: Loop | None = None
         self._stored = Stored(model)
 
     def init(self, x: Array) -> NaturalState:
@@ -288,10 +295,17 @@ class Natural:
             self._memory = replace(self._memory, factors=np.zeros(self.analysis.fill))
         return self.analysis
 
-    def _loop(self, order: Order, steps: int) -> "_Loop":
+    def _loop(self, order: Order, steps: int) -> Loop:
         """The compiled loop in an order, with room for so many steps."""
         if self._bound is None or self._bound.order is not order or self._bound.room < steps:
-            self._bound = _Loop(self.model, order, self._memory, steps)
+            parts = parts_of(self.model.tables), parts_of(order), parts_of(self._memory)
+
+            def bind(state: Sequence[Array], scal: Array, inputs: Array, results: Sequence[Any]) -> Any:
+                x, z, previous, sums = state
+                advance = natural_program().compiled()["advance"]
+                return advance.bind(*parts, x, z, previous, scal, inputs, sums, *results)
+
+            self._bound = Loop(self.model, order, steps, bind)
         return self._bound
 
     def _settle(self, taken: int) -> None:

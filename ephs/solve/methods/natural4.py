@@ -6,7 +6,7 @@ composing as it does at order 2. A composition of steps of order 2 would have to
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from ephs.solve.methods.gauss import gauss_program
 from ephs.solve.methods.natural import (
     Chunk,
     Decided,
+    Loop,
     NaturalState,
     has_choice,
     of_status,
@@ -50,7 +51,6 @@ from ephs.solve.methods.scheme import (
     WEIGHTS,
     Groups,
     GroupsOf,
-    Stages,
     StagesOf,
 )
 from ephs.solve.methods.stored import Stored
@@ -64,47 +64,6 @@ INSTANT = 1e-7
 """The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
 AS_BEFORE, AT_START, WITHIN = 0, 1, 2
 """Origin of a step's order of elimination: a step before it, at its start, by its unknowns."""
-
-
-@final
-class _Loop:
-    """The compiled loop over steps of one model, bound to arrays of its own.
-
-    Attributes
-    ----------
-    order, room
-        The order of elimination, and how many steps there is room for.
-    rows
-        States, energies and ledgers, a row for each step that was taken last.
-    """
-
-    def __init__(self, model: Model, order: Order, groups: Groups, memory: Memory, stages: Stages, room: int) -> None:
-        components, n = model.tables.kind.size, model.unknowns
-        self.order, self.room, self._scal = order, room, model.scal(0.0)
-        self._inputs = np.zeros((STAGES, model.input_values().size))
-        self._state = [
-            np.zeros(model.descriptor.point_size), np.zeros((STAGES, n)), np.zeros((BEFORE * STAGES, n)),
-            np.zeros(4 + components),
-        ]  # fmt: skip
-        self.rows = [np.zeros((room, width)) for width in (self._state[0].size, components, 5)]
-        self._outcome = np.zeros(4, dtype=np.int64)
-        x, z, previous, sums = self._state
-        self._call = gauss_program().compiled()["advance"].bind(
-            parts_of(model.tables), parts_of(groups), parts_of(order), parts_of(memory), parts_of(stages), x, z,
-            previous, self._scal, model.scal(0.0), model.scal(INSTANT), self._inputs, SCHEME.ravel(), sums, *self.rows,
-            self._outcome, 0,
-        )  # fmt: skip
-
-    def run(self, state: Sequence[Array], h: float, inputs: Array, steps: int) -> tuple[int, int, int, int]:
-        """Take steps in place of a state (x, z, previous, sums): status, component, steps done, iterations."""
-        self._scal[0], self._inputs[:, : inputs.shape[1]] = h, inputs
-        for own, given in zip(self._state, state, strict=True):
-            own[:] = given
-        self._call(steps)
-        for own, given in zip(self._state, state, strict=True):
-            given[:] = own
-        status, component, done, iterations = self._outcome.tolist()
-        return status, component, done, iterations
 
 
 @final
@@ -144,7 +103,7 @@ class Natural4:
             change=np.zeros(k * n), dense=np.zeros(k * n), pivot=np.zeros(k * n), one=np.zeros(8),
         )  # fmt: skip
         self._order: Order | None = None
-        self._bound: _Loop | None = None
+        self._bound: Loop | None = None
         self._dropped: Index | None = None
         self._decided: Decided | None = None
         self._inputs, self._tried = np.zeros(0), AS_BEFORE
@@ -239,10 +198,21 @@ class Natural4:
             self._decide(found["x"], found["z"], found["h"], snapshot["inputs"], snapshot["tried"])
         self._dropped, self.changes = snapshot["dropped"], snapshot["changes"]
 
-    def _loop(self, o: Order, steps: int) -> _Loop:
+    def _loop(self, o: Order, steps: int) -> Loop:
         """The compiled loop in an order, with room for so many steps."""
         if self._bound is None or self._bound.order is not o or self._bound.room < steps:
-            self._bound = _Loop(self.model, o, self._groups, self._memory, self._scratch, steps)
+            model = self.model
+            parts = map(parts_of, (model.tables, self._groups, o, self._memory, self._scratch))
+            scals = model.scal(0.0), model.scal(INSTANT)
+
+            def bind(state: Sequence[Array], scal: Array, inputs: Array, results: Sequence[Any]) -> Any:
+                x, z, previous, sums = state
+                advance = gauss_program().compiled()["advance"]
+                return advance.bind(
+                    *parts, x, z, previous, scal, *scals, inputs, SCHEME.ravel(), sums, *results
+                )  # fmt: skip
+
+            self._bound = Loop(model, o, steps, bind, (STAGES,))
         return self._bound
 
     def _decide(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> None:

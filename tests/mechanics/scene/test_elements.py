@@ -14,6 +14,7 @@ from ephs.mechanics.scene.element import OUTSIDE
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ELEMENTS, Joint, World
 from ephs.mechanics.scene.rescaled import rescaled
+from ephs.mechanics.scene.schema import SECTIONS
 from ephs.mechanics.scene.soundness import check_scene
 
 SCENES = sorted((Path(__file__).parents[3] / "scenes").glob("*.toml"))
@@ -35,6 +36,21 @@ def test_every_number_has_a_dimension(kind):
 def test_every_reference_says_of_what(kind):
     assert set(kind.names) <= {each.name for each in fields(kind)} - {"name"}
     assert set(kind.names.values()) <= set(OUTSIDE)
+
+
+def bounds(schema):
+    """Least numbers and whether they are excluded, of all that a key may be."""
+    found = [(schema[word], word != "minimum") for word in ("minimum", "exclusiveMinimum") if word in schema]
+    inner = [*schema.get("anyOf", ()), *([schema["items"]] if "items" in schema else ())]
+    return {*found, *(bound for each in inner for bound in bounds(each))}
+
+
+@pytest.mark.parametrize("section", ELEMENTS)
+def test_files_and_parameters_have_the_same_ranges(section):
+    properties = SECTIONS[section].model_json_schema()["properties"]
+    for key, number in ELEMENTS[section].numbers.items():
+        if key in properties:
+            assert bounds(properties[key]) == ({number.least} - {None}), key
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)

@@ -245,3 +245,22 @@ def test_threads_that_compile_a_program_at_once_get_the_same_code():
 
     with ThreadPoolExecutor(4) as threads:
         assert len(set(threads.map(compiled, range(4)))) == 1
+
+
+def test_arguments_are_bundled_into_one_thing():
+    """What is made of arguments comes first, the others in their order; the text is that of the plain function."""
+    kinds = {"x": vector(), "scale": real(), "parts": indices(), "out": vector()}
+
+    def bundled(on: Evaluator, made: tuple[Integers, Vector], x: Vector, scale: Real) -> None:
+        parts, out = made
+        out[0] = scale * x[parts[0]]
+
+    def plain(on: Evaluator, x: Vector, scale: Real, parts: Integers, out: Vector) -> None:
+        out[0] = scale * x[parts[0]]
+
+    one = Program("one", run=Entry.bundled(bundled, kinds, (("parts", "out"), lambda parts, out: (parts, out))))
+    two = Program("one", run=Entry(plain, **kinds))
+    assert one.text() == two.text()
+    out = np.zeros(1)
+    one.compiled()["run"](np.array([2.0, 3.0]), 5.0, np.array([1]), out)
+    assert out[0] == 15.0

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final, final
 
-from ephs.mechanics.tree.sweeps.acting import Component, Conduction, Node
-from ephs.mechanics.tree.sweeps.edges import Edge, Law
+from ephs.mechanics.tree.sweeps.acting import Acting, Component, Conduction, Node
+from ephs.mechanics.tree.sweeps.edges import Law
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -21,7 +21,6 @@ from ephs.semantics.stage import (
     Table,
     Variable,
     Vector,
-    indices,
     matrix,
     table,
     vector,
@@ -68,7 +67,7 @@ def _put(vector: Vector, k: Integer, value: Real) -> None:
     vector[k] = value
 
 
-def _spring(on: Evaluator, parts: _Components, edge: Edge, row: Vector) -> None:
+def _spring(on: Evaluator, parts: _Components, edge: Acting, row: Vector) -> None:
     dim = edge.dim
     parts.call(on, edge.spring)
 
@@ -80,7 +79,7 @@ def _spring(on: Evaluator, parts: _Components, edge: Edge, row: Vector) -> None:
 
 
 def _friction(
-    on: Evaluator, parts: _Components, edge: Edge, row: Vector, warmth: Real, made: Vector, heat: Vector
+    on: Evaluator, parts: _Components, edge: Acting, row: Vector, warmth: Real, made: Vector, heat: Vector
 ) -> None:
     dim, number = edge.dim, edge.friction
     component = parts.table[number]
@@ -114,14 +113,13 @@ def _friction(
 
 
 def _laws(
-    on: Evaluator, edge: Integers, law: Vector, node: Table[Node], passage: Table[Conduction],
+    on: Evaluator, edge: Table[Acting], law: Vector, node: Table[Node], passage: Table[Conduction],
     component: Table[Component], parameters: Vector, scal: Vector, s: Vector, warming: Matrix, flow: Matrix,
     made: Vector, heat: Vector, x: Vector, v: Vector, e: Vector, lam: Vector, f: Vector, c: Vector, jac: Vector,
     work: Vector,
 ) -> Integer:  # fmt: skip
     fault = on.counter(0)
     parts = _Components(component, parameters, scal, x, v, e, lam, f, c, jac, work, fault)
-    edges = Table(Edge, edge.cells, law.cells, edge.size // Edge.integer_width)
 
     def warm(k: Integer) -> None:
         warming[k, 0], warming[k, 1], warming[k, 2] = 0.0, 0.0, s[k]
@@ -134,7 +132,7 @@ def _laws(
         on.when(node[k].component >= 0, stored)
 
     def act(i: Integer) -> None:
-        one, row = edges[i], law.part(i * Law.real_width, Law.real_width)
+        one, row = edge[i], law.part(i * Law.real_width, Law.real_width)
         on.loop(one.size, lambda k: _put(x, k, row[Law.place.offset + k]))
 
         def clear(j: Integer) -> None:
@@ -160,7 +158,7 @@ def _laws(
     heat[0] = 0.0
     on.loop(made.size, lambda k: _put(made, k, 0.0))
     on.loop(node.size, warm)
-    on.loop(edges.size, act)
+    on.loop(edge.size, act)
     on.loop(flow.rows, pass_on)
     return fault.value
 
@@ -172,7 +170,7 @@ def laws_call() -> Call:
     Edges stand where `ephs.mechanics.tree.sweeps.edges.Edges.meet` put them.
     """
     kinds: dict[str, Any] = {
-        "edge": indices(), "law": vector(), "node": table(Node), "passage": table(Conduction),
+        "edge": table(Acting), "law": vector(), "node": table(Node), "passage": table(Conduction),
         "component": table(Component), "parameters": vector(), "scal": vector(3), "s": vector(), "warming": matrix(3),
         "flow": matrix(8), "made": vector(), "heat": vector(1),
     }  # fmt: skip

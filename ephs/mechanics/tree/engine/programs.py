@@ -1,6 +1,8 @@
 """Programs of all mechanisms' equations of motion, with loops or without."""
 
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 from ephs.mechanics.tree.engine.balance import held, measure
 from ephs.mechanics.tree.engine.motion import Mechanism
@@ -22,7 +24,6 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
-from ephs.semantics.stage.kinds import Kind
 from ephs.solve.march import (
     ERRORS,
     MEMORY,
@@ -41,113 +42,111 @@ from ephs.solve.march import (
 from ephs.solve.march.account import worth
 from ephs.solve.march.steps import attempt, book
 
-__all__ = ["motion_of_loops", "motion_of_trees", "motion_program", "stiff_program"]
+__all__ = ["motion_of_loops", "motion_of_trees", "motion_program", "of_motion", "stiff_program"]
 
 
-@cache
-def _of() -> dict[str, Kind]:
-    """Return the kinds of a mechanism's arguments, which all entry functions have first."""
-    return {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+_MOVING = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+"""Kinds of a mechanism's arguments, which all entry functions have first."""
+
+
+def of_motion(function: Callable[..., Any], *, looped: bool, **kinds: Any) -> Entry:
+    """Return an entry function of a mechanism."""
+
+    def moving(tables: Tables, work: Work) -> Mechanism:
+        return Mechanism(tables, work, looped)
+
+    return Entry.bundled(function, {**_MOVING, **kinds}, (_MOVING, moving))
 
 
 @cache
 def motion_program(*, looped: bool) -> Program:
     """Return the program: what is the same for all mechanisms; what is not it calls by addresses in their tables."""
 
-    def moving(tables: Tables, work: Work) -> Mechanism:
-        return Mechanism(tables, work, looped)
-
     def marched(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, memory: Memory, control: Table[Control],
+        on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
         account: Table[Account], steps: Integer,
     ) -> Integer:  # fmt: skip
-        return march(on, moving(tables, work), tableau, memory, control[0], account[0], steps)
+        return march(on, motion, tableau, memory, control[0], account[0], steps)
 
     def stages(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
-        start: Vector, k: Matrix, errors: Errors, last: Vector, y: Vector, q: Vector, h: Real,
+        on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
+        k: Matrix, errors: Errors, last: Vector, y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
-        return attempt(on, moving(tables, work), tableau, control[0], base, start, h, k, errors, last, y, q)
+        return attempt(on, motion, tableau, control[0], base, start, h, k, errors, last, y, q)
 
-    def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
-        return moving(tables, work).rates(on, base, y, q, out)[0]
+    def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
+        return motion.rates(on, base, y, q, out)[0]
 
-    def closed(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> Integer:
-        return close(on, moving(tables, work), q, r)
+    def project(on: Evaluator, motion: Mechanism, q: Vector, change: Vector) -> None:
+        motion.project(on, q, change)
 
-    def project(on: Evaluator, tables: Tables, work: Work, q: Vector, change: Vector) -> None:
-        moving(tables, work).project(on, q, change)
+    def velocities(on: Evaluator, motion: Mechanism, y: Vector, r: Vector, out: Vector) -> None:
+        motion.velocities(on, y, r, out)
 
-    def velocities(on: Evaluator, tables: Tables, work: Work, y: Vector, r: Vector, out: Vector) -> None:
-        moving(tables, work).velocities(on, y, r, out)
-
-    def counted(on: Evaluator, tables: Tables, work: Work, before: Vector, after: Vector) -> None:
-        moving(tables, work).count(on, before, after)
+    def counted(on: Evaluator, motion: Mechanism, before: Vector, after: Vector) -> None:
+        motion.count(on, before, after)
 
     def summed(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, k: Matrix, totals: Totals, h: Real, anchor: Real,
+        on: Evaluator, motion: Mechanism, tableau: Tableau, k: Matrix, totals: Totals, h: Real, anchor: Real,
         part: Integer,
     ) -> Integer:  # fmt: skip
-        return book(on, moving(tables, work), tableau, k, h, totals, anchor, on.same(part, 1))
+        return book(on, motion, tableau, k, h, totals, anchor, on.same(part, 1))
 
     def corrected(
-        on: Evaluator, tables: Tables, work: Work, account: Table[Account], start: Vector, y: Vector, q: Vector,
+        on: Evaluator, motion: Mechanism, account: Table[Account], start: Vector, y: Vector, q: Vector,
         allowed: Vector, h: Real,
     ) -> Integer:  # fmt: skip
-        status = moving(tables, work).correct(on, account[0], h, start, y, q, allowed)
+        status = motion.correct(on, account[0], h, start, y, q, allowed)
         account[0].size = worth(on, account[0])
         return status
 
-    def measured(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> None:
-        measure(on, moving(tables, work), q, r)
-
-    def energy(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, heats: Vector, out: Vector) -> Integer:
-        return held(on, moving(tables, work), q, r, heats, out)
-
-    def advance(on: Evaluator, tables: Tables, work: Work, base: Vector, v: Vector, q: Vector) -> None:
-        moving(tables, work).advance(on, base, v, q)
+    def advance(on: Evaluator, motion: Mechanism, base: Vector, v: Vector, q: Vector) -> None:
+        motion.advance(on, base, v, q)
 
     def evaluations(
-        on: Evaluator, tables: Tables, work: Work, q: Matrix, r: Matrix, out: Vector, rates: Matrix, repeats: Integer
+        on: Evaluator, motion: Mechanism, q: Matrix, r: Matrix, out: Vector, rates: Matrix, repeats: Integer
     ) -> None:
-        motion, totals = moving(tables, work), out.part(0, 2)
+        totals = out.part(0, 2)
 
         def one(k: Integer) -> None:
             motion.accelerate(on, q.row(k), r.row(k), rates.row(k), out, out, totals)
 
         on.loop(repeats, lambda _: on.loop(q.rows, one))
 
-    of, tried = _of(), {"tableau": group(Tableau, **TABLEAU)}
+    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
+        return of_motion(function, looped=looped, **kinds)
+
+    tried = {"tableau": group(Tableau, **TABLEAU)}
     entries = {
-        "march": Entry(
-            marched, **of, **tried, memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
+        "march": entry(
+            marched, **tried, memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
             steps=integer(),
         ),
-        "stages": Entry(
-            stages, **of, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(),
+        "stages": entry(
+            stages, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(),
             errors=group(Errors, **ERRORS), last=vector(),
             y=vector(), q=vector(), h=real(),
         ),
-        "rates": Entry(rates, **of, base=vector(), y=vector(), q=vector(), out=vector()),
-        "advance": Entry(advance, **of, base=vector(), v=vector(), q=vector()),
-        "velocities": Entry(velocities, **of, y=vector(), r=vector(), out=vector()),
-        "counted": Entry(counted, **of, before=vector(), after=vector()),
-        "summed": Entry(
-            summed, **of, tableau=tried["tableau"], k=matrix(), totals=group(Totals, **TOTALS), h=real(), anchor=real(),
+        "rates": entry(rates, base=vector(), y=vector(), q=vector(), out=vector()),
+        "advance": entry(advance, base=vector(), v=vector(), q=vector()),
+        "velocities": entry(velocities, y=vector(), r=vector(), out=vector()),
+        "counted": entry(counted, before=vector(), after=vector()),
+        "summed": entry(
+            summed, tableau=tried["tableau"], k=matrix(), totals=group(Totals, **TOTALS), h=real(), anchor=real(),
             part=integer(),
         ),
-        "corrected": Entry(
-            corrected, **of, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real()
+        "corrected": entry(
+            corrected, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real()
         ),
-        "measured": Entry(measured, **of, q=vector(), r=vector()),
-        "energy": Entry(energy, **of, q=vector(), r=vector(), heats=vector(), out=vector(3)),
-        "evaluations": Entry(
-            evaluations, **of, q=matrix(), r=matrix(), out=vector(), rates=matrix(), repeats=integer()
+        "measured": entry(measure, q=vector(), r=vector()),
+        "energy": entry(held, q=vector(), r=vector(), heats=vector(), out=vector(3)),
+        "evaluations": entry(
+            evaluations, q=matrix(), r=matrix(), out=vector(), rates=matrix(), repeats=integer()
         ),
     }  # fmt: skip
     if looped:
-        entries["close"] = Entry(closed, **of, q=vector(), r=vector())
-        entries["project"] = Entry(project, **of, q=vector(), change=vector())
+        entries["close"] = entry(close, q=vector(), r=vector())
+        entries["project"] = entry(project, q=vector(), change=vector())
     return Program("motion_of_loops" if looped else "motion_of_trees", **entries)
 
 
@@ -156,16 +155,16 @@ def stiff_program() -> Program:
     """Return the program of implicit steps of trees, many in one call."""
 
     def marched(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, memory: Memory, control: Table[Control],
+        on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
         account: Table[Account], stiff: Stiff, steps: Integer,
     ) -> Integer:  # fmt: skip
-        return march(on, Mechanism(tables, work, False), tableau, memory, control[0], account[0], steps, stiff)
+        return march(on, motion, tableau, memory, control[0], account[0], steps, stiff)
 
     return Program(
         "stiff_steps_of_trees",
-        march=Entry(
-            marched, **_of(), tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY), control=table(Control),
-            account=table(Account), stiff=group(Stiff, **STIFF), steps=integer(),
+        march=of_motion(
+            marched, looped=False, tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY),
+            control=table(Control), account=table(Account), stiff=group(Stiff, **STIFF), steps=integer(),
         ),
     )  # fmt: skip
 

@@ -2,16 +2,16 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
+from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired_tables
-from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
 from ephs.semantics.bundle import Array
-from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, group, vector
+from ephs.semantics.stage import Evaluator, Integer, Program, Vector, vector
 from ephs.solve.sparse import Index
 
 __all__ = ["RateSlopes", "rate_slopes"]
@@ -21,11 +21,10 @@ __all__ = ["RateSlopes", "rate_slopes"]
 def rate_slopes() -> Program:
     """Return the program of the rates of trees over dual numbers."""
 
-    def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
-        return Mechanism(tables, work, False).rates(on, base, y, q, out)[0]
+    def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
+        return motion.rates(on, base, y, q, out)[0]
 
-    of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
-    entry = Entry(rates, **of, base=vector(), y=vector(), q=vector(), out=vector())
+    entry = of_motion(rates, looped=False, base=vector(), y=vector(), q=vector(), out=vector())
     return Program(f"rates_of_trees_along_{DIRECTIONS}", rates=entry.tangent(directions=DIRECTIONS))
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from ephs.mechanics.tree.engine.attachment import laws_in
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
+from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.shutting import close
-from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import (
     Entry,
@@ -50,47 +50,43 @@ def step_program(*, looped: bool) -> Program:
     """Return the program of one step of a given length, and of its parts."""
 
     def step(
-        on: Evaluator, tables: Tables, work: Work, tableau: Tableau, control: Table[Control], base: Vector,
-        start: Vector, k: Matrix, last: Vector, account: Table[Account], allowed: Vector, y: Vector, q: Vector, h: Real,
+        on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
+        k: Matrix, last: Vector, account: Table[Account], allowed: Vector, y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
-        motion = Mechanism(tables, work, looped)
         status = on.counter(motion.rates(on, base, start, q, k.row(0))[0])
 
         def stages() -> None:
             status.value = attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
 
         def end() -> None:
-            status.value = _settled(on, motion, account[0], allowed, base, start, y, q, h)
+            status.value = settle(on, motion, account, allowed, base, start, y, q, h)
 
         on.when(on.same(status.value, 0), stages)
         on.when(on.same(status.value, 0), end)
         return status.value
 
-    def rates(on: Evaluator, tables: Tables, work: Work, base: Vector, start: Vector, q: Vector, k: Vector) -> Integer:
-        return Mechanism(tables, work, looped).rates(on, base, start, q, k)[0]
+    def rates(on: Evaluator, motion: Mechanism, base: Vector, start: Vector, q: Vector, k: Vector) -> Integer:
+        return motion.rates(on, base, start, q, k)[0]
 
     def settle(
-        on: Evaluator, tables: Tables, work: Work, account: Table[Account], allowed: Vector, base: Vector,
-        start: Vector, y: Vector, q: Vector, h: Real,
+        on: Evaluator, motion: Mechanism, account: Table[Account], allowed: Vector, base: Vector, start: Vector,
+        y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
-        return _settled(on, Mechanism(tables, work, looped), account[0], allowed, base, start, y, q, h)
+        return _settled(on, motion, account[0], allowed, base, start, y, q, h)
 
-    def shut(on: Evaluator, tables: Tables, work: Work, y: Vector, q: Vector) -> Integer:
-        return _closed(on, Mechanism(tables, work, looped), y, q)
+    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
+        return of_motion(function, looped=looped, **kinds)
 
-    of: dict[str, Any] = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
     balance: dict[str, Any] = {"account": table(Account), "allowed": vector()}
     return Program(
         "steps_of_loops" if looped else "steps_of_trees",
-        step=Entry(
-            step, **of, tableau=group(Tableau, **TABLEAU), control=table(Control), base=vector(), start=vector(),
+        step=entry(
+            step, tableau=group(Tableau, **TABLEAU), control=table(Control), base=vector(), start=vector(),
             k=matrix(), last=vector(), **balance, y=vector(), q=vector(), h=real(),
         ),
-        rates=Entry(rates, **of, base=vector(), start=vector(), q=vector(), k=vector()),
-        settle=Entry(
-            settle, **of, **balance, base=vector(), start=vector(), y=vector(), q=vector(), h=real()
-        ),
-        close=Entry(shut, **of, y=vector(), q=vector()),
+        rates=entry(rates, base=vector(), start=vector(), q=vector(), k=vector()),
+        settle=entry(settle, **balance, base=vector(), start=vector(), y=vector(), q=vector(), h=real()),
+        close=entry(_closed, y=vector(), q=vector()),
     )  # fmt: skip
 
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.laws import BUFFERS, laws_call
 from ephs.mechanics.tree.engine.tables import Forces
-from ephs.mechanics.tree.sweeps.edges import Edge, Law
+from ephs.mechanics.tree.sweeps.edges import Law
 from ephs.semantics.bundle import Array
-from ephs.solve.sparse import Index
 
 __all__ = ["Laws"]
 
@@ -21,8 +20,6 @@ class Laws:
     ----------
     forces
         Tables of the components.
-    edge
-        (edges · width,): records of `ephs.mechanics.tree.sweeps.edges.Edge`.
     makers
         How many components make entropy.
     scal
@@ -38,14 +35,14 @@ class Laws:
         (makers,) entropy a second, in W/K: that components make, of conductions what leaves their first store.
     """
 
-    def __init__(self, forces: Forces, edge: Index, makers: int, scal: Array) -> None:
+    def __init__(self, forces: Forces, makers: int, scal: Array) -> None:
         entropies, conductions = forces.node.size, len(forces.conduction)
-        self.law, self._s = np.zeros(edge.size // Edge.integer_width * Law.real_width), np.zeros(entropies)
+        self.law, self._s = np.zeros(len(forces.edge) * Law.real_width), np.zeros(entropies)
         self.warming, self.flow = np.zeros((entropies, 3)), np.zeros((conductions, 8))
         self.made, self._heat = np.zeros(makers), np.zeros(1)
-        tables, buffers = forces.tables(), [np.zeros(size) for size in BUFFERS.values()]
+        of, buffers = forces.tables(), [np.zeros(size) for size in BUFFERS.values()]
         self._call = laws_call().bind(
-            edge, self.law, tables["node"], tables["conduction"], forces.component, tables["parameters"], scal,
+            of["acting"], self.law, of["node"], of["conduction"], forces.component, of["parameters"], scal,
             self._s, self.warming, self.flow, self.made, self._heat, *buffers,
         )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """The dense equations of one mechanism: tables and memory of the staged program, and its functions on NumPy arrays."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, final
 
@@ -42,7 +43,8 @@ class _Plan:
     cut: Index
     numbers: Array
     forces: Forces
-    edge: Index
+    tables: Mapping[str, Any]
+    code: Index
     program: Residuals
 
 
@@ -55,15 +57,10 @@ def _plan(reduced: Reduced, gravity: Array) -> _Plan:
     usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
     tree = packed(parts, ground @ gravity, planar=False, among=STANDARD if usual else ())
     chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
-    moving = np.flatnonzero(t.dim)
-    heat = np.where(forces.part[:, 1] >= 0, forces.part[:, 2], -1)
-    edge = np.column_stack(
-        [forces.edge[:, :3], t.code[moving], t.dim[moving], t.q_size[moving], forces.edge[:, [4, 6]],
-         forces.part[:, :2], heat]
-    ).astype(np.int64)  # fmt: skip
-    kinds = kinds_of([*edge[:, [3, 5, 4]].tolist(), *cut[:, [2, 5, 3]].tolist()])
+    tables, code = forces.tables(), t.code[np.flatnonzero(t.dim)].astype(np.int64)
+    kinds = kinds_of([*np.column_stack([code, forces.edge[:, [5, 3]]]).tolist(), *cut[:, [2, 5, 3]].tolist()])
     program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
-    return _Plan(found.bodies, ground, tree, chart, cut, numbers, forces, edge.ravel(), program)
+    return _Plan(found.bodies, ground, tree, chart, cut, numbers, forces, tables, code, program)
 
 
 @final
@@ -93,9 +90,9 @@ class Residual:
 
     def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
         plan, t = once(reduced, ("residual", gravity.tobytes()), lambda: _plan(reduced, gravity)), reduced.tables
-        tree, cut, forces = plan.tree, plan.cut, plan.forces
+        tree, cut, forces, tables = plan.tree, plan.cut, plan.forces, plan.tables
         self._bodies, self._ground, self.program = plan.bodies, plan.ground, plan.program
-        self.laws = Laws(forces, plan.edge, len(reduced.made), scal)
+        self.laws = Laws(forces, len(reduced.made), scal)
         self.attached = Attached(reduced, scal, supply)
         self.counts: list[int] = [*cut[cut[:, 2] != TIE, 8].tolist(), *[1] * len(reduced.attaching.ties)]
         self.n, self.m, self.ns = reduced.freedoms, sum(self.counts), t.node.size
@@ -105,17 +102,16 @@ class Residual:
         self.cut_rates = slice(self.rows.stop, self.rows.stop + c)
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
         self.entropy_rates = slice(self.cut_changes.stop, self.cut_changes.stop + self.ns)
-        n, m, ends, bodies = self.n, self.m, 2 * int(cut[:, 8].sum()), plan.bodies
+        n, m, ends = self.n, self.m, 2 * int(cut[:, 8].sum())
         self.arrays: dict[str, Any] = {
             "integers": tree.integers, "reals": tree.reals, "gravity": tree.gravity,
             "memory": np.zeros((tree.size + 1) * self.program.width), "cut": cut.ravel(),
             "cut_numbers": plan.numbers.ravel(), "chart": plan.chart.ravel(),
             "places": np.zeros((tree.size + 1, PLACE)), "end": np.arange(ends),
             "motions": np.zeros((len(cut), Relative.real_width)),
-            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": plan.edge,
-            "edge_numbers": np.hstack([forces.frame, forces.left]).ravel(), "law": self.laws.law,
-            "body": np.array(bodies.link, dtype=np.int64), "body_frame": _frames(bodies.inside),
-            "warming": self.laws.warming, "passage": np.ascontiguousarray(t.conduction[:, 1:]).ravel(),
+            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": tables["acting"],
+            "code": plan.code, "law": self.laws.law, "body": tables["body"], "warming": self.laws.warming,
+            "passage": tables["conduction"],
             "flow": self.laws.flow, "tie": self.attached.tie, "tied": self.attached.tied,
             "beyond": np.zeros(len(self.attached.tied)), "pulls": np.zeros(self.nv),
             "base": np.zeros(reduced.coordinates), "v": np.zeros(self.nv),
@@ -130,7 +126,7 @@ class Residual:
             "residual": np.zeros(self.entropy_rates.stop), "action": np.zeros(2 * n + 2 * c + self.ns),
             "rigid": np.zeros(n),
         }  # fmt: skip
-        self.size = tree.size
+        self.size, self._frames = tree.size, forces.body_frame
         self._calls: dict[str, Any] = {}
         loops, self._worst = loop_program(self.program.kinds).compiled(), np.zeros(1)
         joint = [self.arrays[name] for name in ("cut", "cut_numbers", "motions", "q")]
@@ -184,7 +180,7 @@ class Residual:
 
     def pose(self, body: int) -> Array:
         """(7,) of a body in the world, where `place` has been."""
-        place, frame = self.arrays["places"][self._bodies.link[body]], self.arrays["body_frame"][body]
+        place, frame = self.arrays["places"][self._bodies.link[body]], self._frames[body]
         turn = self._ground.T @ place[:9].reshape(3, 3)
         at = self._ground.T @ place[9:12] + turn @ frame[9:]
         return np.concatenate([matrix_to_quaternion(turn @ frame[:9].reshape(3, 3)), at])
@@ -207,7 +203,7 @@ class Residual:
 
     def inside(self, body: int, twist: Array) -> Array:
         """(…, 6) twists of a body in its frame, from those of its link."""
-        frame = self.arrays["body_frame"][body]
+        frame = self._frames[body]
         turn, at = frame[:9].reshape(3, 3), frame[9:]
         turning, moving = twist[..., :3], twist[..., 3:]
         return np.concatenate([turning @ turn, (moving + np.cross(turning, at)) @ turn], axis=-1)
@@ -279,8 +275,3 @@ class Residual:
         self._call("action")()
         out = self.outs["action"]
         return out[: self.n].copy(), out[self.n : 2 * self.n].copy()
-
-
-def _frames(poses: Any) -> Array:
-    """(poses, 12): rows of R, and p."""
-    return np.array([[*quaternion_to_matrix(x[:4]).ravel(), *x[4:]] for x in poses]).reshape(-1, 12)

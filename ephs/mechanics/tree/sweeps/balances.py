@@ -11,7 +11,6 @@ from ephs.semantics.stage import (
     Entry,
     Evaluator,
     Integer,
-    Integers,
     Matrix,
     Program,
     Real,
@@ -216,15 +215,7 @@ def _put(vector: Vector, k: Integer, value: Real) -> None:
 def network_program() -> Program:
     """Return the program of all networks."""
 
-    def solve(
-        on: Evaluator, net: Integers, reals: Vector, parameters: Vector, scal: Vector, given: Vector, q: Vector,
-        s: Vector, warmth: Vector, made: Vector,
-    ) -> Integer:  # fmt: skip
-        return solve_network(on, Net.of(net, reals, parameters, scal, given), q, s, warmth, made)
+    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
+        return Entry.bundled(function, {**_PLACE, **kinds}, (_PLACE, Net.of))
 
-    def slopes(
-        on: Evaluator, net: Integers, reals: Vector, parameters: Vector, scal: Vector, given: Vector, out: Matrix
-    ) -> Integer:  # fmt: skip
-        return slopes_of(on, Net.of(net, reals, parameters, scal, given), out)
-
-    return Program("network", solve=Entry(solve, **_PLACE, **_ABOUT), slopes=Entry(slopes, **_PLACE, out=matrix()))
+    return Program("network", solve=entry(solve_network, **_ABOUT), slopes=entry(slopes_of, out=matrix()))

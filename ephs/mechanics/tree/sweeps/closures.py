@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.mechanics.tree.sweeps import cuts
-from ephs.mechanics.tree.sweeps.charts import Chart, Kind
+from ephs.mechanics.tree.sweeps.charts import Chart
 from ephs.mechanics.tree.sweeps.cuts import Cut, Place, Relative
 from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces.vectors import add, dot, scale
@@ -33,7 +33,6 @@ class Closures:
         (ends, 6).
     """
 
-    kinds: tuple[Kind, ...]
     cuts: Table[Cut]
     charts: Table[Chart]
     places: Matrix

@@ -7,11 +7,11 @@ order, which is all that the equations and their derivatives at that point need.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, final
+from typing import final
 
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting
 from ephs.mechanics.tree.sweeps.charts import Kind, visit_kind
-from ephs.mechanics.tree.sweeps.cuts import Place
-from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
+from ephs.mechanics.tree.sweeps.cuts import between, place_of
 from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces import se3, so3
 from ephs.semantics.spaces.staged_groups import STAGED
@@ -30,61 +30,17 @@ from ephs.semantics.spaces.vectors import (
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
+    Integers,
     Matrix,
     Real,
     Record,
     Table,
     Vector,
-    integer,
     real,
     reals,
 )
 
-__all__ = ["Edge", "Edges", "Law"]
-
-CUT: Final = 1
-"""Kind of edges that are cut joints; those before are joints of the tree, those after springs."""
-
-
-class Edge(Record):
-    """A joint, or a spring between bodies.
-
-    Attributes
-    ----------
-    kind
-        0: a joint of the tree, 1: a cut joint, 2: a spring, whose element is where its bodies put it.
-    first, second
-        Links of its bodies, −1 for the ground.
-    code, dim, size
-        Its group, degrees of freedom, and numbers of an element.
-    q_at, v_at
-        Where its element and its degrees of freedom start; of joints.
-    spring, friction
-        Components of its potential and its friction, −1: none.
-    heat
-        The entropy that takes the heat of its friction, −1: none.
-    inner_turn, inner_at, outer_turn, outer_at
-        Its first frame in the first link's, its second in the second's.
-    left
-        (BᵀB)⁻¹Bᵀ in its first ``dim`` rows.
-    """
-
-    kind = integer()
-    first = integer()
-    second = integer()
-    code = integer()
-    dim = integer()
-    size = integer()
-    q_at = integer()
-    v_at = integer()
-    spring = integer()
-    friction = integer()
-    heat = integer()
-    inner_turn = reals(3, 3)
-    inner_at = reals(3)
-    outer_turn = reals(3, 3)
-    outer_at = reals(3)
-    left = reals(6, 6)
+__all__ = ["Edges", "Law"]
 
 
 class Law(Record):
@@ -138,30 +94,19 @@ class Edges:
     ----------
     kinds
         The kinds of groups among them.
+    codes
+        The group of each.
     places
         (links + 1, 24): see `cuts.Place`.
     """
 
     kinds: tuple[Kind, ...]
-    edges: Table[Edge]
+    edges: Table[Acting]
+    codes: Integers
     laws: Table[Law]
     places: Matrix
 
-    def _place(self, on: Evaluator, link: Integer) -> Place:
-        row = on.select(link < 0, self.places.rows - 1, link)
-        return Place(NO_INTEGERS, 0, self.places.cells, self.places.start + row * self.places.columns)
-
-    def _between(self, on: Evaluator, edge: Edge) -> tuple[Rows, list[Real], list[Real]]:
-        """An edge's second frame in its first link, and its relative twist."""
-        near, far = self._place(on, edge.first), self._place(on, edge.second)
-        outer, at = edge.outer_turn, edge.outer_at
-        back = transposed(near.turn)
-        turn = product(back, product(far.turn, outer))
-        there = apply(back, add(sub(far.at, near.at), apply(far.turn, at)))
-        first = se3.twist_inward(turn, there, near.twist)
-        return turn, there, sub(se3.twist_inward(outer, at, far.twist), first)
-
-    def _visit(self, on: Evaluator, q: Vector, r: Vector, body: Callable[[Edge, Law, _Motion, Kind], None]) -> None:
+    def _visit(self, on: Evaluator, q: Vector, r: Vector, body: Callable[[Acting, Law, _Motion, Kind], None]) -> None:
         """Call body(edge, law, motion, kind) for all edges."""
 
         def one(i: Integer) -> None:
@@ -169,14 +114,17 @@ class Edges:
             motion = _Motion(on.scratch(7), on.scratch(6), on.scratch(12))
 
             def on_tree() -> None:
-                on.loop(edge.dim, lambda j: _put(motion.rate, j, r[edge.v_at + j]))
+                on.loop(edge.dim, lambda j: _put(motion.rate, j, r[edge.r_at + j]))
 
-            def between() -> None:
-                turn, at, twist = self._between(on, edge)
+            def across() -> None:
+                near, far = place_of(on, self.places, edge.first), place_of(on, self.places, edge.second)
+                outer, place = edge.outer_turn, edge.outer_at
+                turn, at = between(near, far, outer, place)
+                twist = sub(se3.twist_inward(outer, place, far.twist), se3.twist_inward(turn, at, near.twist))
                 _fill(motion.arm, [*turn[0], *turn[1], *turn[2], *at])
                 _fill(motion.rate, apply(edge.left, twist))
 
-            def relative() -> None:
+            def apart() -> None:
                 inner, (turn, at) = edge.inner_turn, motion.frame
                 found = so3.quaternion(on, product(transposed(inner), turn))
                 _fill(motion.element, [*found, *apply_transposed(inner, sub(at, edge.inner_at))])
@@ -184,16 +132,16 @@ class Edges:
             def stored() -> None:
                 on.loop(edge.size, lambda k: _put(motion.element, k, q[edge.q_at + k]))
 
-            on.when(edge.kind < CUT, on_tree, between)
-            on.when(edge.kind > CUT, relative, stored)
-            visit_kind(on, self.kinds, edge.code, edge.dim, lambda kind: body(edge, law, motion, kind))
+            on.when(on.same(edge.kind, ON_TREE), on_tree, across)
+            on.when(on.same(edge.kind, ON_BODIES), apart, stored)
+            visit_kind(on, self.kinds, self.codes[i], edge.dim, lambda kind: body(edge, law, motion, kind))
 
         on.loop(self.edges.size, one)
 
     def meet(self, on: Evaluator, q: Vector, r: Vector) -> None:
         """Put the point of each law where its edge is."""
 
-        def of(edge: Edge, law: Law, motion: _Motion, kind: Kind) -> None:
+        def of(edge: Acting, law: Law, motion: _Motion, kind: Kind) -> None:
             law.place = [motion.element[k] for k in range(7)]
             law.rate = [motion.rate[j] for j in range(6)]
 
@@ -212,7 +160,7 @@ class Edges:
     ) -> None:
         """Take pulls and drives off the forces on the tree's rates and the links' loads; add entropies made to heat."""
 
-        def one(edge: Edge, law: Law, motion: _Motion, kind: Kind) -> None:
+        def one(edge: Acting, law: Law, motion: _Motion, kind: Kind) -> None:
             dim, size = kind.dim, kind.size
             moved = STAGED[kind.code].increment(on, law.place[:size], [motion.element[k] for k in range(size)])
             faster = [motion.rate[j] - known for j, known in enumerate(law.rate[:dim])]
@@ -224,15 +172,15 @@ class Edges:
                 change = dot(law.made_by_place[:dim], moved) + dot(law.made_by_rate[:dim], faster)
                 heat[edge.heat] = heat[edge.heat] + (law.made + (change + law.made_by_warmth * warmer.value))
 
-            on.when(edge.heat >= 0, made)
+            on.when(edge.friction >= 0, made)
             for j in range(dim):
                 less = dot(stiffness[j][:dim], moved) + dot(damping[j][:dim], faster)
                 pull[j] = law.pull[j] - (less + softness[j] * warmer.value)
-            on.when(edge.kind <= CUT, lambda: _driven(on, pull, drive.part(edge.v_at, dim)))
+            on.when(edge.kind < ON_BODIES, lambda: _driven(on, pull, drive.part(edge.r_at, dim)))
 
             def on_tree() -> None:
                 for j in range(dim):
-                    force[edge.v_at + j] = force[edge.v_at + j] - pull[j]
+                    force[edge.r_at + j] = force[edge.r_at + j] - pull[j]
 
             def between() -> None:
                 wrench = combine(edge.left[:dim], [pull[j] for j in range(dim)])
@@ -240,7 +188,7 @@ class Edges:
                 _load(on, tree, edge.second, se3.wrench_outward(edge.outer_turn, edge.outer_at, scale(-1.0, wrench)))
                 _load(on, tree, edge.first, se3.wrench_outward(turn, at, wrench))
 
-            on.when(edge.kind < CUT, on_tree, between)
+            on.when(on.same(edge.kind, ON_TREE), on_tree, between)
 
         self._visit(on, q, r, one)
 

@@ -62,47 +62,34 @@ def loop_program(kinds: tuple[Kind, ...]) -> Program:
     def charted(chart: Integers) -> Table[Chart]:
         return Table(Chart, chart.cells, NO_REALS, chart.size // Chart.integer_width)
 
-    def rows(
-        on: Evaluator, cut: Integers, numbers: Vector, places: Matrix, motions: Matrix, end: Integers, value: Matrix,
-        covector: Matrix,
-    ) -> None:  # fmt: skip
-        cuts.rows(on, joints(cut, numbers), places, motions, end, value, covector)
+    def fit(on: Evaluator, cut: Table[Cut], motions: Matrix, q: Vector) -> None:
+        cuts.fit(on, kinds, cut, motions, q)
 
-    def poses(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix) -> None:
-        cuts.poses(on, joints(cut, numbers), motions)
+    def gaps(on: Evaluator, cut: Table[Cut], motions: Matrix, q: Vector, value: Matrix, worst: Vector) -> None:
+        worst[0] = cuts.gaps(on, kinds, cut, motions, q, value)
 
-    def fit(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, q: Vector) -> None:
-        cuts.fit(on, kinds, joints(cut, numbers), motions, q)
+    def advance(on: Evaluator, chart: Table[Chart], base: Vector, v: Vector, q: Vector) -> None:
+        charts.advance(on, kinds, chart, base, v, q)
 
-    def gaps(
-        on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, q: Vector, value: Matrix, worst: Vector
-    ) -> None:
-        worst[0] = cuts.gaps(on, kinds, joints(cut, numbers), motions, q, value)
-
-    def relative_rates(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, value: Matrix) -> None:
-        cuts.relative_rates(on, joints(cut, numbers), motions, value)
-
-    def across(on: Evaluator, cut: Integers, numbers: Vector, motions: Matrix, change: Matrix, value: Matrix) -> None:
-        cuts.across(on, joints(cut, numbers), motions, change, value)
-
-    def advance(on: Evaluator, chart: Integers, base: Vector, v: Vector, q: Vector) -> None:
-        charts.advance(on, kinds, charted(chart), base, v, q)
-
-    def move(on: Evaluator, chart: Integers, v: Vector, q: Vector) -> None:
-        charts.advance(on, kinds, charted(chart), q, v, q)
+    def move(on: Evaluator, chart: Table[Chart], v: Vector, q: Vector) -> None:
+        charts.advance(on, kinds, chart, q, v, q)
 
     def velocities(
-        on: Evaluator, chart: Integers, cut: Integers, numbers: Vector, motions: Matrix, v: Vector, r: Vector,
-        out: Vector,
-    ) -> None:  # fmt: skip
-        cuts.velocities(on, kinds, charted(chart), joints(cut, numbers), motions, v, r, out)
+        on: Evaluator, chart: Table[Chart], cut: Table[Cut], motions: Matrix, v: Vector, r: Vector, out: Vector
+    ) -> None:
+        cuts.velocities(on, kinds, chart, cut, motions, v, r, out)
+
+    made = ((("chart",), charted), (("cut", "numbers"), joints))
+
+    def entry(function: Callable[..., Any], arguments: dict[str, Any]) -> Entry:
+        return Entry.bundled(function, arguments, *(one for one in made if arguments.keys() >= set(one[0])))
 
     functions: dict[str, Callable[..., Any]] = {
-        "rows": rows, "poses": poses, "fit": fit, "gaps": gaps, "relative_rates": relative_rates, "across": across,
-        "advance": advance, "move": move, "velocities": velocities,
+        "rows": cuts.rows, "poses": cuts.poses, "fit": fit, "gaps": gaps, "relative_rates": cuts.relative_rates,
+        "across": cuts.across, "advance": advance, "move": move, "velocities": velocities,
     }  # fmt: skip
     name = "_".join(["loops", *(f"{kind.code}_{kind.dim}" for kind in kinds)])
-    return Program(name, **{name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()})
+    return Program(name, **{name: entry(function, ARGUMENTS[name]) for name, function in functions.items()})
 
 
 def common_loops() -> Program:

@@ -1,6 +1,6 @@
 """Looped programs of the sweeps, specialised for a class of mechanisms."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -180,30 +180,29 @@ class Sweeps:
         whole = Vector(covector.cells, covector.start, covector.rows * 6)
         return Rows(at, slot, row, flat, value, entry, whole, along, self._zeros)
 
+    def entry(
+        self, function: Callable[..., Any], kinds: Mapping[str, Any], *made: tuple[Iterable[str], Callable[..., Any]]
+    ) -> Entry:
+        """An entry function that takes the tree, the rows of its loops, and what else is made, of their arguments."""
+        known = ((MECHANISM, self.tree), (ROWS, self._rows))
+        return Entry.bundled(function, kinds, *(one for one in known if kinds.keys() >= one[0].keys()), *made)
+
     # ---- trees on which nothing but gravity and forces on the rates act ------------------------------------------
 
     def _free(self) -> dict[str, Entry]:
-        def accelerate(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, force: Vector, rate: Vector,
-        ) -> Integer:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
+        def accelerate(on: Evaluator, tree: Tree, q: Vector, r: Vector, force: Vector, rate: Vector) -> Integer:
             return accelerations(on, tree, q, r, rate, given_force(force))
 
-        def evaluations(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Matrix,
-            r: Matrix, rates: Matrix, repeats: Integer,
-        ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
-
+        def evaluations(on: Evaluator, tree: Tree, q: Matrix, r: Matrix, rates: Matrix, repeats: Integer) -> None:
             def one(k: Integer) -> None:
                 accelerations(on, tree, q.row(k), r.row(k), rates.row(k))
 
             on.loop(repeats, lambda _: on.loop(q.rows, one))
 
+        repeated = {"q": matrix(), "r": matrix(), "rates": matrix(), "repeats": integer()}
         return {
-            "accelerations": Entry(accelerate, **ARGUMENTS["accelerations"]),
-            "evaluations": Entry(evaluations, **MECHANISM, q=matrix(), r=matrix(), rates=matrix(), repeats=integer()),
+            "accelerations": self.entry(accelerate, ARGUMENTS["accelerations"]),
+            "evaluations": self.entry(evaluations, {**MECHANISM, **repeated}),
             **self._kept(),
         }
 
@@ -211,29 +210,18 @@ class Sweeps:
         """Quantities that corrections of a step read and move."""
         along = [k for k in range(6) if k not in self._zeros]
 
-        def held(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, momenta: Matrix, spin: Vector, out: Vector,
-        ) -> None:  # fmt: skip
-            energy(on, self.tree(size, integers, reals, memory, gravity), q, r, momenta, spin, out)
-
         def moved(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, island: Integers, bases: Vector, target: Vector, sums: Matrix, found: Vector, torque: Vector,
+            on: Evaluator, tree: Tree, q: Vector, r: Vector, island: Integers, bases: Vector, target: Vector,
+            sums: Matrix, found: Vector, torque: Vector,
         ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
             rigid(on, tree, q, r, island, bases, target, sums, found, torque, along)
 
-        return {"energy": Entry(held, **ARGUMENTS["energy"]), "rigid": Entry(moved, **ARGUMENTS["rigid"])}
+        return {"energy": self.entry(energy, ARGUMENTS["energy"]), "rigid": self.entry(moved, ARGUMENTS["rigid"])}
 
     # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
 
     def _general(self) -> dict[str, Entry]:
-        def move(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, lead: Vector, places: Matrix,
-        ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
+        def move(on: Evaluator, tree: Tree, q: Vector, r: Vector, lead: Vector, places: Matrix) -> None:
             outward(on, tree, q, r, lead)
 
             def show(i: Integer) -> None:
@@ -242,15 +230,10 @@ class Sweeps:
                 for k, x in enumerate([*turn, *state.at, *state.twist, *state.bias]):
                     places[i, k] = x
 
-            on.loop(size + 1, show)
+            on.loop(tree.size + 1, show)
 
-        def fold(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, q: Vector, force: Vector, wrench: Matrix,
-        ) -> Integer:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
-            rows, fault = self._rows(at, slot, row, flat, value, entry, covector, along), on.counter(0)
+        def fold(on: Evaluator, tree: Tree, rows: Rows, q: Vector, force: Vector, wrench: Matrix) -> Integer:
+            fault = on.counter(0)
 
             def one(i: Integer) -> None:
                 state = tree.states[i]
@@ -263,8 +246,8 @@ class Sweeps:
                 closing.carry_load(on, tree, rows, i)
 
             tree.each(on, one, down=True)
-            closing.eliminate(on, rows, size, None)
-            closing.eliminate_load(on, rows, size, None)
+            closing.eliminate(on, rows, tree.size, None)
+            closing.eliminate_load(on, rows, tree.size, None)
             return fault.value
 
         def outwards(on: Evaluator, tree: Tree, rows: Rows, q: Vector, rate: Vector, change: Matrix) -> None:
@@ -278,22 +261,7 @@ class Sweeps:
             tree.each(on, one)
             _show_changes(on, tree, change)
 
-        def unfold(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
-        ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
-            outwards(on, tree, self._rows(at, slot, row, flat, value, entry, covector, along), q, rate, change)
-
-        def resolve(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, q: Vector, rate: Vector, change: Matrix,
-        ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
-            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
-
+        def resolve(on: Evaluator, tree: Tree, rows: Rows, q: Vector, rate: Vector, change: Matrix) -> None:
             def unloaded(i: Integer) -> None:
                 tree.states[i].load = [0.0] * 6
 
@@ -302,40 +270,26 @@ class Sweeps:
                 load_inward(on, tree, q, no_force, i)
                 closing.carry_load(on, tree, rows, i)
 
-            on.loop(size, unloaded)
+            on.loop(tree.size, unloaded)
             tree.each(on, one, down=True)
-            closing.eliminate_load(on, rows, size, None)
+            closing.eliminate_load(on, rows, tree.size, None)
             outwards(on, tree, rows, q, rate, change)
 
-        def spread_out(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            x: Vector, change: Matrix,
-        ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
+        def spread_out(on: Evaluator, tree: Tree, q: Vector, x: Vector, change: Matrix) -> None:
             spread(on, tree, q, x)
             _show_changes(on, tree, change)
 
-        def power(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, q: Vector, r: Vector, force: Vector, out: Vector,
-        ) -> None:  # fmt: skip
-            tree = self.tree(size, integers, reals, memory, gravity)
-            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+        def power(on: Evaluator, tree: Tree, rows: Rows, q: Vector, r: Vector, force: Vector, out: Vector) -> None:
             out[0] = driven_power(on, tree, rows, q, r, force)
 
-        def dependent(
-            on: Evaluator, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
-            covector: Matrix, along: Matrix, largest: Vector,
-        ) -> Integer:  # fmt: skip
-            rows = self._rows(at, slot, row, flat, value, entry, covector, along)
+        def dependent(on: Evaluator, rows: Rows, largest: Vector) -> Integer:
             return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
 
         functions: dict[str, Callable[..., Any]] = {
-            "move": move, "fold": fold, "unfold": unfold, "resolve": resolve, "spread": spread_out, "power": power,
+            "move": move, "fold": fold, "unfold": outwards, "resolve": resolve, "spread": spread_out, "power": power,
             "dependent": dependent,
         }  # fmt: skip
-        entries = {name: Entry(function, **ARGUMENTS[name]) for name, function in functions.items()}
+        entries = {name: self.entry(function, ARGUMENTS[name]) for name, function in functions.items()}
         return entries | self._kept()
 
 

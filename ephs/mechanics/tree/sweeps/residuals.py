@@ -8,13 +8,14 @@ derivatives.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, final
+from typing import Any, Final, NamedTuple, final
 
 from ephs.mechanics.tree.sweeps import charts
+from ephs.mechanics.tree.sweeps.acting import Acting, Body, Conduction
 from ephs.mechanics.tree.sweeps.charts import Chart, Kind
 from ephs.mechanics.tree.sweeps.closures import Closures
 from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
-from ephs.mechanics.tree.sweeps.edges import Edge, Edges, Law
+from ephs.mechanics.tree.sweeps.edges import Edges, Law
 from ephs.mechanics.tree.sweeps.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
 from ephs.mechanics.tree.sweeps.loops import NO_REALS
 from ephs.mechanics.tree.sweeps.outward import outward
@@ -38,6 +39,7 @@ from ephs.semantics.stage import (
     indices,
     integer,
     matrix,
+    table,
     vector,
 )
 
@@ -48,24 +50,47 @@ LOOPS: Final[dict[str, Any]] = {
     "motions": matrix(Relative.real_width), "end": indices(), "value": matrix(4), "covector": matrix(6),
 }  # fmt: skip
 """The cut joints of a mechanism, charts of all joints, and memory: see `Closures`."""
-ACTING: Final[dict[str, Any]] = {
-    "edge": indices(), "edge_numbers": vector(), "law": vector(), "body": indices(), "body_frame": matrix(12),
-    "warming": matrix(3), "passage": indices(), "flow": matrix(8), "tie": indices(), "tied": matrix(),
+LAWS: Final[dict[str, Any]] = {"edge": table(Acting), "code": indices(), "law": vector()}
+"""Springs, friction and given forces: see `Edges`."""
+BESIDE: Final[dict[str, Any]] = {
+    "body": table(Body), "warming": matrix(3), "passage": table(Conduction), "flow": matrix(8),
+    "tie": indices(), "tied": matrix(),
 }  # fmt: skip
-"""Forces: see `Edges`; links and frames of bodies, on which wrenches are given; of each entropy the temperature over
-the environment's, its derivative, and the entropy there; of conductions two entropies each, what these lose, its
-derivatives by their temperatures, and the temperatures; of what is attached see `_attach`."""
 POINT: Final[dict[str, Any]] = {
     "base": vector(), "v": vector(), "q": vector(), "r": vector(), "s": vector(), "drive": vector(),
     "wrench": matrix(6), "warmth": vector(), "beyond": vector(), "pulls": vector(),
 }  # fmt: skip
-"""Point of evaluation: q is written; forces on all joints, wrenches on bodies; memory (entropies,), (ties,),
-(joints' degrees of freedom,)."""
 ACTIVE: Final = (
     "memory", "places", "motions", "value", "covector", "v", "q", "r", "s", "drive", "wrench", "warmth", "beyond",
     "pulls",
 )  # fmt: skip
 """Arguments that have derivatives, beside those that only one of the functions has."""
+
+
+class _Beside(NamedTuple):
+    """What acts beside laws of edges; ties are flows of what is attached."""
+
+    body: Table[Body]  # on which wrenches are given
+    warming: Matrix  # (entropies, 3): temperature over the environment's, its derivative, the entropy there
+    passage: Table[Conduction]
+    flow: Matrix  # (conductions, 8): what these lose, its derivatives by their temperatures, and the temperatures
+    tie: Integers  # (ties, 2): a rate, a temperature, nothing that changes, a state, an increment; its place
+    tied: Matrix  # (ties, 2 + ties): the flow about a point, what it depends on there, its derivatives
+
+
+class _Point(NamedTuple):
+    """Point of evaluation: q is written."""
+
+    base: Vector
+    v: Vector  # increments from the base
+    q: Vector
+    r: Vector
+    s: Vector
+    drive: Vector  # given forces on the degrees of freedom of all joints
+    wrench: Matrix  # (bodies, 6): given
+    warmth: Vector  # (entropies,): memory
+    beyond: Vector  # (ties,): memory, by how much what they depend on is off the point
+    pulls: Vector  # memory: forces on the degrees of freedom of all joints
 
 
 @final
@@ -118,34 +143,26 @@ class Residuals:
         ) -> Closures:  # fmt: skip
             joints = Table(Cut, cut.cells, numbers.cells, cut.size // Cut.integer_width)
             charts = Table(Chart, chart.cells, NO_REALS, chart.size // Chart.integer_width)
-            return Closures(kinds, joints, charts, places, motions, end, value, covector)
+            return Closures(joints, charts, places, motions, end, value, covector)
 
-        def edges(edge: Integers, numbers: Vector, law: Vector, places: Matrix) -> Edges:
-            count = edge.size // Edge.integer_width
-            laws = Table(Law, edge.cells, law.cells, count)
-            return Edges(charts.of_joints(kinds), Table(Edge, edge.cells, numbers.cells, count), laws, places)
+        def edges(edge: Table[Acting], code: Integers, law: Vector) -> Callable[[Matrix], Edges]:
+            laws = Table(Law, edge.integers, law.cells, edge.size)
+            return lambda places: Edges(charts.of_joints(kinds), edge, code, laws, places)
 
         def place(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            cut: Integers, cut_numbers: Vector, chart: Integers, places: Matrix, motions: Matrix, end: Integers,
-            value: Matrix, covector: Matrix, edge: Integers, edge_numbers: Vector, law: Vector, q: Vector, r: Vector,
-        ) -> None:  # fmt: skip
-            tree = sweeps.tree(size, integers, reals, memory, gravity)
+            on: Evaluator, tree: Tree, closing: Closures, edges: Callable[[Matrix], Edges], q: Vector, r: Vector
+        ) -> None:
             outward(on, tree, q, r)
             _at_rest(on, tree)
-            closures(cut, cut_numbers, chart, places, motions, end, value, covector).place(on, tree)
-            edges(edge, edge_numbers, law, places).meet(on, q, r)
+            closing.place(on, tree)
+            edges(closing.places).meet(on, q, r)
 
         def assemble(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            cut: Integers, cut_numbers: Vector, chart: Integers, places: Matrix, motions: Matrix, end: Integers,
-            value: Matrix, covector: Matrix, q: Vector, r: Vector, unit: Vector, mass: Matrix, factor: Matrix,
-            row: Matrix, terms: Vector, driven: Integer,
+            on: Evaluator, tree: Tree, closing: Closures, q: Vector, r: Vector, unit: Vector, mass: Matrix,
+            factor: Matrix, row: Matrix, terms: Vector, driven: Integer,
         ) -> Integer:  # fmt: skip
-            tree = sweeps.tree(size, integers, reals, memory, gravity)
             outward(on, tree, q, r)
             _at_rest(on, tree)
-            closing = closures(cut, cut_numbers, chart, places, motions, end, value, covector)
             closing.place(on, tree)
             masses(on, tree, q, unit, mass)
             found = cholesky(on, mass, factor)
@@ -168,21 +185,13 @@ class Residuals:
             closing.each_row(on, one)
             return found
 
-        def rigid(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, out: Vector,
-        ) -> None:  # fmt: skip
-            tree = sweeps.tree(size, integers, reals, memory, gravity)
+        def rigid(on: Evaluator, tree: Tree, q: Vector, r: Vector, out: Vector) -> None:
             outward(on, tree, q, r)
             _at_rest(on, tree)
             on.loop(out.size, lambda k: _put(out, k))
             needed_forces(on, tree, q, out)
 
-        def twists(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector, q: Vector,
-            r: Vector, unit: Vector, link: Integer, rows: Matrix,
-        ) -> None:  # fmt: skip
-            tree = sweeps.tree(size, integers, reals, memory, gravity)
+        def twists(on: Evaluator, tree: Tree, q: Vector, r: Vector, unit: Vector, link: Integer, rows: Matrix) -> None:
             outward(on, tree, q, r)
             on.loop(unit.size, lambda k: _put(unit, k))
 
@@ -195,132 +204,105 @@ class Residuals:
 
             on.loop(unit.size, column)
 
-        def acted(
-            on: Evaluator, tree: Tree, closing: Closures, acting: Edges, body: Integers, body_frame: Matrix,
-            warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix, q: Vector, r: Vector,
-            v: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector, beyond: Vector, pulls: Vector,
-            force: Vector, heat: Vector, cut: Vector,
-        ) -> None:  # fmt: skip
-            """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ; cut: rates."""
-            on.loop(force.size, lambda k: _put(force, k))
-            on.loop(heat.size, lambda k: _put(heat, k))
-
-            def warm(k: Integer) -> None:
-                warmth[k] = warming[k, 0] + warming[k, 1] * (s[k] - warming[k, 2])
-
-            def push(b: Integer) -> None:
-                link = body[b]
-                turn = [[body_frame[b, 3 * i + j] for j in range(3)] for i in range(3)]
-                at = [body_frame[b, 9 + k] for k in range(3)]
-
-                def put() -> None:
-                    state = tree.states[link]
-                    state.load = sub(state.load, wrench_outward(turn, at, [wrench[b, k] for k in range(6)]))
-
-                on.when(link >= 0, put)
-
-            def pass_on(k: Integer) -> None:
-                ends = [passage[2 * k], passage[2 * k + 1]]
-                warmer = [warmth[end] - flow[k, 6 + i] for i, end in enumerate(ends)]
-                for i, end in enumerate(ends):
-                    lost = flow[k, i] + (flow[k, 2 + 2 * i] * warmer[0] + flow[k, 3 + 2 * i] * warmer[1])
-                    heat[end] = heat[end] - lost
-
-            on.loop(warmth.size, warm)
-            on.loop(body.size, push)
-            _attach(on, tie, tied, (v, r, cut, s, warmth, drive), beyond, pulls, heat)
-            acting.act(on, tree, q, r, warmth, pulls, force, heat)
-            on.loop(flow.rows, pass_on)
-
         def residual(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            cut: Integers, cut_numbers: Vector, chart: Integers, places: Matrix, motions: Matrix, end: Integers,
-            value: Matrix, covector: Matrix, edge: Integers, edge_numbers: Vector, law: Vector, body: Integers,
-            body_frame: Matrix, warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix,
-            base: Vector, v: Vector, q: Vector, r: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector,
-            beyond: Vector, pulls: Vector, a: Vector, multiplier: Vector, out: Vector,
+            on: Evaluator, tree: Tree, closing: Closures, edges: Callable[[Matrix], Edges], beside: _Beside,
+            at: _Point, a: Vector, multiplier: Vector, out: Vector,
         ) -> None:  # fmt: skip
-            tree = sweeps.tree(size, integers, reals, memory, gravity)
-            closing = closures(cut, cut_numbers, chart, places, motions, end, value, covector)
-            n, m, c = r.size, value.rows, v.size - r.size
-            force, heat = out.part(0, n), out.part(n + m + 2 * c, s.size)
-            charts.advance(on, kinds, closing.charts, base, v, q)
-            outward(on, tree, q, r)
-            spread(on, tree, q, a)
+            n, m, c = at.r.size, closing.value.rows, at.v.size - at.r.size
+            force, heat = out.part(0, n), out.part(n + m + 2 * c, at.s.size)
+            charts.advance(on, kinds, closing.charts, at.base, at.v, at.q)
+            outward(on, tree, at.q, at.r)
+            spread(on, tree, at.q, a)
             closing.place(on, tree)
             rates = out.part(n + m, c)
             closing.along(on, rates, out.part(n + m + c, c), n)
-            acted(
-                on, tree, closing, edges(edge, edge_numbers, law, places), body, body_frame, warming, passage, flow,
-                tie, tied, q, r, v, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
-            )  # fmt: skip
+            _act(on, tree, edges(closing.places), beside, at, force, heat, rates)
             closing.push(on, tree, multiplier)
-            needed_forces(on, tree, q, force)
+            needed_forces(on, tree, at.q, force)
             armatures(on, tree, a, force)
 
             def accelerated(k: Integer) -> None:
-                out[n + k] = -value[k, 0]
+                out[n + k] = -closing.value[k, 0]
 
             on.loop(m, accelerated)
 
         def momenta(
-            on: Evaluator, size: Integer, integers: Integers, reals: Vector, memory: Vector, gravity: Vector,
-            cut: Integers, cut_numbers: Vector, chart: Integers, places: Matrix, motions: Matrix, end: Integers,
-            value: Matrix, covector: Matrix, edge: Integers, edge_numbers: Vector, law: Vector, body: Integers,
-            body_frame: Matrix, warming: Matrix, passage: Integers, flow: Matrix, tie: Integers, tied: Matrix,
-            base: Vector, v: Vector, q: Vector, r: Vector, s: Vector, drive: Vector, wrench: Matrix, warmth: Vector,
-            beyond: Vector, pulls: Vector, out: Vector,
+            on: Evaluator, tree: Tree, closing: Closures, edges: Callable[[Matrix], Edges], beside: _Beside,
+            at: _Point, out: Vector,
         ) -> None:  # fmt: skip
-            tree = sweeps.tree(size, integers, reals, memory, gravity)
-            closing = closures(cut, cut_numbers, chart, places, motions, end, value, covector)
-            n = r.size
-            c = v.size - n
-            momentum, force, heat = out.part(0, n), out.part(n, n), out.part(2 * n + 2 * c, s.size)
-            charts.advance(on, kinds, closing.charts, base, v, q)
-            outward(on, tree, q, r)
+            n = at.r.size
+            c = at.v.size - n
+            momentum, force, heat = out.part(0, n), out.part(n, n), out.part(2 * n + 2 * c, at.s.size)
+            charts.advance(on, kinds, closing.charts, at.base, at.v, at.q)
+            outward(on, tree, at.q, at.r)
             _at_rest(on, tree)
             closing.place(on, tree)
             weigh(on, tree)
             rates = out.part(2 * n, c)
             closing.along(on, rates, out.part(2 * n + c, c), n)
-            acted(
-                on, tree, closing, edges(edge, edge_numbers, law, places), body, body_frame, warming, passage, flow,
-                tie, tied, q, r, v, s, drive, wrench, warmth, beyond, pulls, force, heat, rates,
-            )  # fmt: skip
-            action(on, tree, q, r, momentum, force)
+            _act(on, tree, edges(closing.places), beside, at, force, heat, rates)
+            action(on, tree, at.q, at.r, momentum, force)
+
+        bundles = ((LOOPS, closures), (LAWS, edges), (BESIDE, _Beside), (POINT, _Point))
+
+        def entry(function: Callable[..., Any], **arguments: Any) -> Entry:
+            made = [(names, make) for names, make in bundles if arguments.keys() >= names.keys()]
+            return sweeps.entry(function, {**MECHANISM, **arguments}, *made)
 
         at: dict[str, Any] = {"q": vector(), "r": vector()}
-        whole: dict[str, Any] = {**MECHANISM, **LOOPS, **ACTING, **POINT}
+        whole: dict[str, Any] = {**LOOPS, **LAWS, **BESIDE, **POINT}
         return {
-            "place": Entry(place, **MECHANISM, **LOOPS, **dict(list(ACTING.items())[:3]), **at),
-            "assemble": Entry(
-                assemble, **MECHANISM, **LOOPS, **at, unit=vector(), mass=matrix(), factor=matrix(), row=matrix(),
-                terms=vector(), driven=integer(),
+            "place": entry(place, **LOOPS, **LAWS, **at),
+            "assemble": entry(
+                assemble, **LOOPS, **at, unit=vector(), mass=matrix(), factor=matrix(), row=matrix(), terms=vector(),
+                driven=integer(),
             ),
-            "rigid": Entry(rigid, **MECHANISM, **at, out=vector()),
-            "twists": Entry(twists, **MECHANISM, **at, unit=vector(), link=integer(), rows=matrix(6)),
-            "residual": Entry(residual, **whole, a=vector(), multiplier=vector(), out=vector()),
-            "action": Entry(momenta, **whole, out=vector()),
+            "rigid": entry(rigid, **at, out=vector()),
+            "twists": entry(twists, **at, unit=vector(), link=integer(), rows=matrix(6)),
+            "residual": entry(residual, **whole, a=vector(), multiplier=vector(), out=vector()),
+            "action": entry(momenta, **whole, out=vector()),
         }  # fmt: skip
 
 
-def _attach(
-    on: Evaluator, tie: Integers, tied: Matrix, point: tuple[Vector, ...], beyond: Vector, pulls: Vector, heat: Vector
+def _act(
+    on: Evaluator, tree: Tree, acting: Edges, beside: _Beside, at: _Point, force: Vector, heat: Vector, cut: Vector
 ) -> None:
-    """Write the forces of what drives and of what is attached to ``pulls``, and add to heat what it takes up.
+    """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ; cut: rates."""
+    on.loop(force.size, lambda k: _put(force, k))
+    on.loop(heat.size, lambda k: _put(heat, k))
+    warming, warmth, flow = beside.warming, at.warmth, beside.flow
 
-    Parameters
-    ----------
-    tie
-        (ties, 2): what each depends on, a rate, a temperature, nothing that changes, a state, an increment; its place.
-    tied
-        (ties, 2 + ties): the flow about a point, what it depended on there, its derivatives.
-    point
-        Increments from the point, rates of the tree and of cut joints, states, temperatures, forces that are given.
-    beyond
-        Memory: by how much what they depend on is off the point.
+    def warm(k: Integer) -> None:
+        warmth[k] = warming[k, 0] + warming[k, 1] * (at.s[k] - warming[k, 2])
+
+    def push(b: Integer) -> None:
+        body = beside.body[b]
+
+        def put() -> None:
+            state = tree.states[body.link]
+            state.load = sub(state.load, wrench_outward(body.turn, body.at, [at.wrench[b, k] for k in range(6)]))
+
+        on.when(body.link >= 0, put)
+
+    def pass_on(k: Integer) -> None:
+        ends = [beside.passage[k].one, beside.passage[k].two]
+        warmer = [warmth[end] - flow[k, 6 + i] for i, end in enumerate(ends)]
+        for i, end in enumerate(ends):
+            lost = flow[k, i] + (flow[k, 2 + 2 * i] * warmer[0] + flow[k, 3 + 2 * i] * warmer[1])
+            heat[end] = heat[end] - lost
+
+    on.loop(warmth.size, warm)
+    on.loop(beside.body.size, push)
+    _attach(on, beside, at, cut, heat)
+    acting.act(on, tree, at.q, at.r, warmth, at.pulls, force, heat)
+    on.loop(flow.rows, pass_on)
+
+
+def _attach(on: Evaluator, beside: _Beside, at: _Point, cut: Vector, heat: Vector) -> None:
+    """Write the forces of what drives and of what is attached to ``pulls``, and add to heat what it takes up; cut:
+    rates.
     """
-    v, r, cut, s, warmth, drive = point
+    tie, tied, beyond, pulls, r, drive = beside.tie, beside.tied, at.beyond, at.pulls, at.r, at.drive
 
     def start(j: Integer) -> None:
         pulls[j] = drive[j]
@@ -342,7 +324,7 @@ def _attach(
         def still(_: Integer) -> None:
             beyond[k] = 0.0
 
-        visit(k, rate, lambda j: off(warmth[j]), still, lambda j: off(s[j]), lambda j: off(v[j]))
+        visit(k, rate, lambda j: off(at.warmth[j]), still, lambda j: off(at.s[j]), lambda j: off(at.v[j]))
 
     def leave(k: Integer) -> None:
         flow = on.variable(tied[k, 0])

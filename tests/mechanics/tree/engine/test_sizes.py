@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.engine.programs import _of
+from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.semantics.stage import Entry, Program, real, vector
+from ephs.semantics.stage import Program, real, vector
 from ephs.solve.march.account import ROUNDING
 from ephs.testing import mechanisms
 from tests.mechanics.tree.engine.test_engine import SCENES
@@ -20,18 +19,18 @@ from tests.mechanics.tree.engine.test_engine import SCENES
 EPS = float(np.finfo(float).eps)
 
 
-def sized(on, tables, work, y0, y1, out):
-    Mechanism(tables, work, False).sizes(on, y0, y1, out)
+def sized(on, motion, y0, y1, out):
+    motion.sizes(on, y0, y1, out)
 
 
-def rounded(on, tables, work, anchor, y, out):
-    out[0] = Mechanism(tables, work, False).rounding(on, anchor, y)
+def rounded(on, motion, anchor, y, out):
+    out[0] = motion.rounding(on, anchor, y)
 
 
 PROGRAM = Program(
     "sizes_of_steps",
-    sizes=Entry(sized, **_of(), y0=vector(), y1=vector(), out=vector()),
-    rounding=Entry(rounded, **_of(), anchor=real(), y=vector(), out=vector(1)),
+    sizes=of_motion(sized, looped=False, y0=vector(), y1=vector(), out=vector()),
+    rounding=of_motion(rounded, looped=False, anchor=real(), y=vector(), out=vector(1)),
 )
 
 
