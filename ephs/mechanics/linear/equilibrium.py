@@ -120,7 +120,8 @@ def _keeps(of: Attachment) -> bool:
 def _of_scene(scene: Scene) -> Equilibrium:
     from ephs.mechanics.dynamics import dynamics
 
-    if own := [f"{section}.{name}" for section, name, each in scene.all_attachments() if _keeps(each)]:
+    own = [f"{section}.{name}" for section, name, each in scene.all_attachments() if _keeps(each)]
+    if own := own + [f"tendons.{name}" for name, each in scene.all_tendons() if each.stiffness]:
         found = f"a scene with {own[0]}"
         raise OptionError("model", found, "a scene without attachments with states, or its system")
     moving = [name for name, joint in scene.all_joints() if joint.motion is not None and joint.motion.fastest(0.0, 1.0)]

@@ -1,7 +1,7 @@
-"""Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators; stores of heat, conduction."""
+"""Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, final
 
@@ -12,13 +12,11 @@ __all__ = [
     "ATTACHED",
     "Actuator",
     "Attachment",
-    "Conduction",
     "Cylinder",
     "GasSpring",
     "Gear",
     "Motor",
     "Number",
-    "ThermalNode",
 ]
 
 Array = NDArray[np.float64]
@@ -98,7 +96,8 @@ class Attachment(ABC):
 
     def values(self) -> dict[str, tuple[Any, tuple[int, ...]]]:
         """Its numbers with their required shapes, without omitted ones."""
-        given = {key: (getattr(self, key), number.shape(len(self.tied))) for key, number in self.numbers.items()}
+        count = len(self.tied) or 1
+        given = {key: (getattr(self, key), number.shape(count)) for key, number in self.numbers.items()}
         return {key: pair for key, pair in given.items() if pair[0] is not None}
 
     def rescaled(self, length: float, mass: float, time: float, joints: Sequence[float]) -> Self:
@@ -317,12 +316,12 @@ class GasSpring(Attachment):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuator(Attachment):
-    """A control as forces on joints: an input by name, for motors without dynamics.
+    """A control as forces on joints, or on the length of a tendon: an input by name, for motors without dynamics.
 
     Attributes
     ----------
     ratio
-        Force on each joint by the control, N m or N.
+        Force on each joint, or on the length, by the control, N m or N.
     limits
         (2,) least and largest control; None for none.
     """
@@ -336,6 +335,7 @@ class Actuator(Attachment):
     ratio: Array
     limits: Array | None
     heat: str = "environment"
+    tendon: str | None = None
 
     @property
     def tied(self) -> tuple[str, ...]:
@@ -346,10 +346,11 @@ class Actuator(Attachment):
         return False
 
     def seen(self, path: str, heat: str) -> Self:
-        return replace(self, name=path + self.name, joints=tuple(path + each for each in self.joints))
+        tendon = None if self.tendon is None else path + self.tendon
+        return replace(self, name=path + self.name, joints=tuple(path + each for each in self.joints), tendon=tendon)
 
     def __str__(self) -> str:
-        return f"{' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
+        return f"{self.tendon or ' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
 
 
 ATTACHED: Mapping[str, type[Attachment]] = {
@@ -360,37 +361,6 @@ ATTACHED: Mapping[str, type[Attachment]] = {
     "actuators": Actuator,
 }
 """Kinds of attachments, by their sections of scene files."""
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class ThermalNode:
-    """A body of uniform temperature: capacity in J/K, initial temperature in K.
-
-    One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the
-    ``reference`` in K.
-    """
-
-    name: str
-    capacity: float
-    temperature: float
-    pull: float = 0.0
-    reference: float = 0.0
-
-    def temperature_of(self, states: Callable[[str], Any]) -> Any:
-        """θ = θ₁ exp((s − κ e)/C) in K, of its states by name: numbers or arrays."""
-        s = states("s") - self.pull * states("e") if self.pull else states("s")
-        return self.temperature * np.exp(s / self.capacity)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Conduction:
-    """Heat conduction between two thermal nodes, or one and the environment; conductance in W/K."""
-
-    name: str
-    between: tuple[str, str]
-    conductance: float
 
 
 def _frozen(values: Array) -> Array:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.attached import ATTACHED, Conduction, ThermalNode
-from ephs.mechanics.scene.flexible import Beam, Load, Strain
+from ephs.mechanics.scene.attached import ATTACHED
+from ephs.mechanics.scene.flexible import Beam, Load, Strain, Tendon
 from ephs.mechanics.scene.model import Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -29,6 +30,7 @@ _ARRAYS = {
     Surface: {"frame"},
     Strain: {"stiffness", "rest"},
     Load: {"force", "moment"},
+    Tendon: {"points"},
     **{kind: {key for key, of in kind.numbers.items() if of.shape(2)} for kind in ATTACHED.values()},
 }
 _PARTS = {
@@ -42,6 +44,7 @@ _PARTS = {
     "contacts": Contact,
     "beams": Beam,
     "loads": Load,
+    "tendons": Tendon,
     **ATTACHED,
     "parts": Scene,
 }
@@ -119,6 +122,8 @@ def _scene(data: dict[str, Any]) -> Scene:
                 name: entry | {"surfaces": tuple(entry["surfaces"]), "law": _law(entry["law"])}
                 for name, entry in entries.items()
             }
+        if cls is Tendon:
+            entries = {name: entry | {"bodies": tuple(entry["bodies"])} for name, entry in entries.items()}
         if cls is Beam:
             several = ("ends", "outline", "lengths")
             entries = {

@@ -328,6 +328,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "at1": _attribute("springs", "at1"),
         "at2": _attribute("springs", "at2"),
     },
+    "tendons": {key: _attribute("tendons", key, NON_NEGATIVE) for key in ("stiffness", "length", "damping")},
     **{
         section: {key: _attribute(section, key, number.least) for key, number in kind.numbers.items()}
         for section, kind in ATTACHED.items()

@@ -1,12 +1,13 @@
-"""Resolved beams and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
+"""Resolved beams, tendons and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FREE_END", "Beam", "Load", "Strain"]
+__all__ = ["FREE_END", "Beam", "Load", "Strain", "Tendon"]
 
 Array = NDArray[np.float64]
 FREE_END = "free"
@@ -63,6 +64,42 @@ class Beam:
     def joints(self) -> list[str]:
         """The joints that are its elements."""
         return [f"{self.name}-{i}" for i in range(1, self.elements + 1)]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Tendon:
+    """A tendon without mass, straight from point to point of bodies, through which it slides.
+
+    Attributes
+    ----------
+    bodies : what carries its points, in their order
+    points : (n, 3) in the bodies' centre-of-mass frames (ground: world), m
+    stiffness, length, damping : of the whole: N/m, m without force, N s/m
+    slack : whether it exerts no elastic force where it is shorter
+    heat : where the heat of damping goes
+    """
+
+    name: str
+    bodies: tuple[str, ...]
+    points: Array
+    stiffness: float
+    length: float
+    damping: float
+    slack: bool
+    heat: str
+
+    @property
+    def segments(self) -> list[tuple[tuple[str, Array], tuple[str, Array]]]:
+        """The (body, point) at both ends of each segment between two different bodies."""
+        spots = list(zip(self.bodies, self.points, strict=True))
+        return [(one, two) for one, two in pairwise(spots) if one[0] != two[0]]
+
+    @property
+    def inside(self) -> float:
+        """Length of the segments within bodies, m."""
+        spots = zip(self.bodies, self.points, strict=True)
+        return sum(float(np.linalg.norm(q - p)) for (a, p), (b, q) in pairwise(spots) if a == b)
 
 
 @final

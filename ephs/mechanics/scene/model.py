@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ephs.mechanics.scene import attached
 from ephs.mechanics.scene.adjustment import Adjustment
-from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain
+from ephs.mechanics.scene.flexible import FREE_END, Beam, Load, Strain, Tendon
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -180,8 +181,8 @@ class Scene:
     bodies: Mapping[str, Body]
     joints: Mapping[str, Joint] = field(default_factory=dict)
     springs: Mapping[str, Spring] = field(default_factory=dict)
-    thermal: Mapping[str, attached.ThermalNode] = field(default_factory=dict)
-    conduction: Mapping[str, attached.Conduction] = field(default_factory=dict)
+    thermal: Mapping[str, ThermalNode] = field(default_factory=dict)
+    conduction: Mapping[str, Conduction] = field(default_factory=dict)
     parts: Mapping[str, "Scene"] = field(default_factory=dict)
     source: str | None = None
     adjusted: Adjustment | None = None
@@ -190,6 +191,7 @@ class Scene:
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
+    tendons: Mapping[str, Tendon] = field(default_factory=dict)
     motors: Mapping[str, attached.Motor] = field(default_factory=dict)
     gears: Mapping[str, attached.Gear] = field(default_factory=dict)
     cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
@@ -300,6 +302,13 @@ class Scene:
             for load in scene.loads.values():
                 yield path + load.name, replace(load, name=path + load.name, body=_seen(path, load.body))
 
+    def all_tendons(self) -> Iterator[tuple[str, Tendon]]:
+        """Every tendon with its dotted name; its bodies and heat sink are dotted too."""
+        for path, scene in self._scenes():
+            for t in scene.tendons.values():
+                bodies = tuple(_seen(path, body) for body in t.bodies)
+                yield path + t.name, replace(t, name=path + t.name, bodies=bodies, heat=_seen(path, t.heat))
+
     def attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
         """Section, name and value of every attachment of this level: motors, gears, cylinders, actuators, …"""
         for section in attached.ATTACHED:
@@ -313,13 +322,13 @@ class Scene:
             for section, name, each in scene.attachments():
                 yield section, path + name, each.seen(path, _seen(path, each.heat))
 
-    def all_thermal(self) -> Iterator[tuple[str, attached.ThermalNode]]:
+    def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""
         for path, scene in self._scenes():
             for node in scene.thermal.values():
                 yield path + node.name, replace(node, name=path + node.name)
 
-    def all_conduction(self) -> Iterator[tuple[str, attached.Conduction]]:
+    def all_conduction(self) -> Iterator[tuple[str, Conduction]]:
         """Every conduction with its dotted name, as `all_joints`."""
         for path, scene in self._scenes():
             for c in scene.conduction.values():
@@ -363,22 +372,9 @@ def free_joint(body: Body) -> Joint:
     identity."""
     zero = frozen(np.zeros(6))
     return Joint(
-        name=body.name,
-        kind="free",
-        body1=GROUND,
-        body2=body.name,
-        frame1=IDENTITY_POSE,
-        frame2=IDENTITY_POSE,
-        pitch=0.0,
-        friction=frozen(np.zeros((6, 6))),
-        stiffness=zero,
-        rest=zero,
-        heat=ENVIRONMENT,
-        drive=zero,
-        motion=None,
-        coordinate=body.pose,
-        rate=body.twist,
-    )
+        body.name, "free", GROUND, body.name, IDENTITY_POSE, IDENTITY_POSE, 0.0, frozen(np.zeros((6, 6))),
+        stiffness=zero, rest=zero, heat=ENVIRONMENT, drive=zero, motion=None, coordinate=body.pose, rate=body.twist,
+    )  # fmt: skip
 
 
 def _joint_seen(path: str, j: J) -> J:

@@ -179,6 +179,7 @@ def _things(scene: Scene, kind: str) -> Mapping[str, Any]:
         "bodies": scene.all_bodies,
         "joints": scene.all_joints,
         "springs": scene.all_springs,
+        "tendons": scene.all_tendons,
         "thermal": scene.all_thermal,
         "conduction": scene.all_conduction,
         "contacts": scene.all_contacts,

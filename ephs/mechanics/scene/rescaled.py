@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ephs.mechanics.scene.attached import ATTACHED, Attachment
-from ephs.mechanics.scene.flexible import Load, Strain
+from ephs.mechanics.scene.flexible import Load, Strain, Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import Array, Body, Joint, Scene, Spring, frozen
 from ephs.mechanics.scene.surfaces import Surface
@@ -64,9 +64,14 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
 
     def attached(x: Attachment) -> Attachment:
         of = map(scene.joint, x.tied)
-        return x.rescaled(
-            length, mass, time, [float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of]
-        )
+        units = [float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of]
+        return x.rescaled(length, mass, time, units or [length])
+
+    def tendon(t: Tendon) -> Tendon:
+        return replace(
+            t, points=frozen(t.points * length), stiffness=t.stiffness * mass / time**2, length=t.length * length,
+            damping=t.damping * mass / time,
+        )  # fmt: skip
 
     def load(x: Load) -> Load:
         force = energy / length
@@ -100,6 +105,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
         },
         **{kind: {name: attached(x) for name, x in getattr(scene, kind).items()} for kind in ATTACHED},
         loads={name: load(x) for name, x in scene.loads.items()},
+        tendons={name: tendon(t) for name, t in scene.tendons.items()},
         markers={name: replace(m, at=frozen(m.at * length)) for name, m in scene.markers.items()},
         surfaces={name: surface(s) for name, s in scene.surfaces.items()},
         contacts={name: replace(c, law=c.law.rescaled(length, mass, time)) for name, c in scene.contacts.items()},

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.attached import Conduction, ThermalNode
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Load, Strain
@@ -24,6 +23,7 @@ from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
 from ephs.mechanics.scene.text import MESHES
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 from ephs.mechanics.shapes.dry import Dry
 from ephs.solve.motion_law import MotionLaw
 

@@ -11,7 +11,7 @@ from warnings import warn
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import ATTACHED
+from ephs.mechanics.scene.attached import ATTACHED, Actuator
 from ephs.mechanics.scene.errors import ModelWarning, legible
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
@@ -42,6 +42,13 @@ def check_scene(scene: Scene) -> None:
         ("body", bodies, [each.body for _, each in (*scene.all_markers(), *scene.all_surfaces())]),
         ("surface", dict(scene.all_surfaces()), [name for _, c in scene.all_contacts() for name in c.surfaces]),
         ("thermal node", nodes, [contact.heat for _, contact in scene.all_contacts()]),
+        ("body", bodies, [body for _, tendon in scene.all_tendons() for body in tendon.bodies]),
+        ("thermal node", nodes, [tendon.heat for _, tendon in scene.all_tendons()]),
+        (
+            "tendon",
+            dict(scene.all_tendons()),
+            [x.tendon for _, _, x in scene.all_attachments() if isinstance(x, Actuator) and x.tendon],
+        ),
         ("body", bodies, [load.body for _, load in scene.all_loads()]),
         ("body", bodies, [node for _, beam in scene.all_beams() for node in beam.nodes]),
         ("joint", dict(scene.all_joints()), [name for _, beam in scene.all_beams() for name in beam.joints]),
@@ -120,6 +127,9 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, dict[str, tuple[Any, tuple[int,
         yield name, {key: (number, ()) for key, number in contact.law.numbers}
     for _, name, each in scene.all_attachments():
         yield name, each.values()
+    for name, tendon in scene.all_tendons():
+        numbers = {"stiffness": tendon.stiffness, "length": tendon.length, "damping": tendon.damping}
+        yield name, {"points": (tendon.points, (len(tendon.bodies), 3))} | {key: (x, ()) for key, x in numbers.items()}
     for name, load in scene.all_loads():
         yield name, {"force": (load.force, (3,)), "moment": (load.moment, (3,)), "ramp": (load.ramp, ())}
 
@@ -164,7 +174,7 @@ def _strain(j: Joint) -> dict[str, tuple[Any, tuple[int, ...]]]:
 
 def _check_names(scene: Scene) -> None:
     kinds = ("bodies", "joints", "springs", "thermal", "conduction", "markers", "surfaces", "contacts")
-    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", *ATTACHED)):
+    for things in (getattr(scene, kind) for kind in (*kinds, "beams", "loads", "tendons", *ATTACHED)):
         for name, thing in things.items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")
