@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.tree.equations.equations import Equations
 
 STIFFNESS, DAMPING, LENGTH = 100.0, 2.0, 1.5
@@ -181,6 +182,17 @@ def test_documents_parts_and_units_keep_tendons(tmp_path):
     assert ended(scene, "rk87", {"actuators.cable": 9.0})[0][0] == pytest.approx(
         pulled.joint("left.pin").coordinate[-1, 0], abs=1e-6
     )
+
+
+def test_a_tiny_mechanism_does_as_a_large_one(tmp_path):
+    scene = loaded(tmp_path, CABLE)
+    tiny = rescaled(scene, 1e-5, 1e-12, 1e-3)  # by whose actuators one control is as much
+    one = ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
+    other = ephs.simulate(tiny, 3e-4, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
+    for name in ("pin", "elbow"):
+        assert other.joint(name).coordinate[-1] == pytest.approx(one.joint(name).coordinate[-1], abs=1e-8)
+    at = "tendons.cable.spring.q"
+    assert 1e5 * other[at].ravel()[-1] == pytest.approx(one[at].ravel()[-1], rel=1e-8)
 
 
 def test_the_length_is_a_state_where_it_stores_energy(tmp_path):
