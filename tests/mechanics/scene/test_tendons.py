@@ -10,6 +10,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.tree.equations.equations import Equations
+from ephs.operad import Path
 
 STIFFNESS, DAMPING, LENGTH = 100.0, 2.0, 1.5
 ARM = """
@@ -203,6 +204,24 @@ def test_the_length_is_a_state_where_it_stores_energy(tmp_path):
     assert whole[-1] == pytest.approx(length(*angles), rel=1e-10)
 
 
-def test_equilibria_are_of_the_system(tmp_path):
-    with pytest.raises(ValueError, match=r"tendons\.cable.*or its system"):
-        ephs.equilibrium(loaded(tmp_path, CABLE))
+def test_at_rest_tension_balances_weight(tmp_path):
+    """Forces are weights and k (ℓ − L) times the gradients of heights and length, by complex steps."""
+    found = ephs.equilibrium(loaded(tmp_path, CABLE))
+    angles = np.array([found.model.joint(name).coordinate[0] for name in ("pin", "elbow")])
+
+    def energy(a, b):
+        heights = -0.5 * np.sin(a), -np.sin(a) - 0.5 * np.sin(a + b)
+        return 9.81 * (heights[0] + 0.5 * heights[1]) + 0.5 * STIFFNESS * (length(a, b) - LENGTH) ** 2
+
+    slopes = [energy(*(angles + step)).imag / 1e-20 for step in 1e-20j * np.eye(2)]
+    assert np.abs(slopes).max() < 1e-9 * STIFFNESS
+    assert found.states[Path.of("tendons.cable.spring.q")][0] + np.sqrt(0.05) == pytest.approx(
+        length(*angles), rel=1e-12
+    )
+    still = ephs.simulate(found.model, 0.1, method="rk87", audit="off")
+    assert np.abs(still.joint("pin").coordinate[-1] - angles[0]) < 1e-9
+
+
+def test_loads_beside_sprung_tendons_have_no_static_path(tmp_path):
+    with pytest.raises(ValueError, match=r"tendons\.cable and loads"):
+        ephs.equilibrium(loaded(tmp_path, CABLE + '[loads.push]\nbody = "hand"\nforce = [0.0, 0.0, 1.0]\n'))
