@@ -248,3 +248,14 @@ def _share():
     """The rate of a shaft is the sum of two rates."""
     ports = {"p": Q.angular_momentum, "b": Q.angular_momentum, "c": Q.angular_momentum}
     return ephs.constraint(ports, [[1.0, -1.0, -1.0]], name="share")
+
+
+def test_balances_hold_where_all_but_the_largest_terms_nearly_vanish():
+    """A taut tendon's force and tension are equal but for 1e-13 of them: what rounding leaves is no fault."""
+    system, start, _ = tied_arm()
+    eq = equations_of(system, start, {"x": (-1.6e-13, False)})
+    state = eq.start(0.0)
+    y = eq.vector(state)
+    still = eq.rates(0.0, state.q, y)[eq.nv : eq.nv + eq.n].copy()
+    y[eq.nv : eq.nv + eq.n] = [-2.2e-13, -1.2e-13]
+    assert np.allclose(eq.rates(0.0, state.q, y)[eq.nv : eq.nv + eq.n], still, rtol=1e-12)
