@@ -54,6 +54,7 @@ def _of_scene(scene: "Scene") -> list[str]:
     ]
     rest: dict[str, Iterable[str]] = {
         "springs": (name for name, _ in scene.all_springs()),
+        "tendons": (name for name, _ in scene.all_tendons()),
         "beams": (name for name, _ in scene.all_beams()),
         "contacts": (name for name, _ in scene.all_contacts()),
         "thermal nodes": (name for name, _ in scene.all_thermal()),

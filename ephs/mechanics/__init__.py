@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.joints import universal_joint as universal_joint
     from ephs.mechanics.elements.motor import armature as armature
     from ephs.mechanics.elements.motor import motor as motor
+    from ephs.mechanics.elements.tendon import tendon as tendon
     from ephs.mechanics.motion.inside import Inside as Inside
     from ephs.mechanics.rewrite.stabilised import stabilised as stabilised
 
@@ -38,6 +39,7 @@ _HOME = {
     "joint_pattern": "ephs.mechanics.elements.joints",
     "mbs_pattern": "ephs.mechanics.elements.joints",
     "spring_damper": "ephs.mechanics.elements.joints",
+    "tendon": "ephs.mechanics.elements.tendon",
     "thermoelastic": "ephs.mechanics.elements.beam",
     "stabilised": "ephs.mechanics.rewrite.stabilised",
     "universal_joint": "ephs.mechanics.elements.joints",

@@ -137,7 +137,10 @@ class _Drawn:
             parent = "/ground" if joint.body1 == GROUND else _node(joint.body1)
             metal = add_joint(server, f"{parent}/joint {name}", joint, self.stage.symbol_size(joint, size))
             warm += [_Warm(joint.heat, drawn, "color", METAL) for drawn in metal] if self.stage.heat else []
-        coils = {name: add_spring(server, f"/springs/{name}", size) for name in self.stage.springs}
+        coils = {
+            name: add_spring(server, f"/springs/{name}", size * spring.coiled)
+            for name, spring in self.stage.springs.items()
+        }
         warm += [
             _Warm(self.stage.springs[name].heat, coil, "colors", METAL)
             for name, coil in coils.items()

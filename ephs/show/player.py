@@ -139,6 +139,7 @@ def _spring(spring: Any, names: list[str]) -> dict[str, Any]:
     return {
         "ends": [[-1 if b == GROUND else names.index(b), np.asarray(at, dtype=float).tolist()] for b, at in ends],
         "heat": spring.heat,
+        "coiled": spring.coiled,
     }
 
 

@@ -1,4 +1,4 @@
-"""Schematic of a mechanism: shaded bodies, symbols of joints, coils of springs, a scale bar, as marks in a plane.
+"""Schematic of a mechanism: shaded bodies, symbols of joints, springs and tendons, a scale bar, as marks in a plane.
 
 Marks are polygons and lines in metres; matplotlib or an SVG file draws them.
 """
@@ -9,6 +9,7 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.show.lines import lines_of
 from ephs.show.motion import Array, best_side, point_of, rotate
 from ephs.show.palette import GREY, INK, PAPER
 from ephs.show.solids import Solid, held_at, solids_of
@@ -94,7 +95,7 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None) -> Ske
         (3,) from the mechanism to the eye; by default the side on which its places are seen best.
     """
     out = Sketch()
-    joints, springs = dict(scene.all_joints()), dict(scene.all_springs())
+    joints, springs = dict(scene.all_joints()), lines_of(scene)
     solids = solids_of(scene)
     ends = {name: _ends(spring, poses) for name, spring in springs.items()}
     places = {name: point_of(poses.get(j.body1, _STILL), np.asarray(j.frame1)[4:]) for name, j in joints.items()}
@@ -116,8 +117,9 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None) -> Ske
             out.area(face, 0.4, colour, colour)
         for edge in edges:
             out.line(edge, 0.7)
-    for start, end in ends.values():
-        out.line(np.column_stack(_coil(start @ view, end @ view, 0.018 * size)), 1.0)
+    for name, (start, end) in ends.items():
+        radius = 0.018 * size * springs[name].coiled
+        out.line(np.column_stack(_coil(start @ view, end @ view, radius)), 1.0)
     for draw in (_supports, _symbol):
         for name, joint in joints.items():
             frame = np.asarray(joint.frame1)

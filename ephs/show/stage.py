@@ -1,4 +1,4 @@
-"""Contents of an animation: bodies, joints and springs with their motion, sizes and overlays."""
+"""Contents of an animation: bodies, joints, springs and tendons with their motion, sizes and overlays."""
 
 from dataclasses import dataclass
 from typing import Any, final
@@ -6,6 +6,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.errors import ShowError
+from ephs.show.lines import Line, lines_of
 from ephs.show.motion import Array, Film, film, point_of
 from ephs.show.overlays import GROUND, Heat, Loads, heat_of, loads_of, strain_of
 from ephs.show.solids import Solid, solids_of
@@ -20,8 +21,10 @@ class Stage:
 
     Attributes
     ----------
-    joints, springs, bodies : dict
+    joints, bodies : dict
         Of the scene, by name.
+    springs : dict of str to Line
+        Springs, and segments of tendons.
     solids : dict of str to Solid
         Surfaces of the bodies.
     frames : Film
@@ -31,7 +34,7 @@ class Stage:
     """
 
     joints: dict[str, Any]
-    springs: dict[str, Any]
+    springs: dict[str, Line]
     bodies: dict[str, Any]
     solids: dict[str, Solid]
     frames: Film
@@ -90,7 +93,7 @@ def stage_of(
     frames = film(sol, list(bodies), fps, duration)
     return Stage(
         joints,
-        dict(scene.all_springs()),
+        lines_of(scene),
         bodies,
         solids_of(scene),
         frames,

@@ -115,7 +115,8 @@ def add_joint(server: Any, node: str, joint: Any, size: float) -> list[Any]:
 
 
 def add_spring(server: Any, node: str, size: float) -> Any:
-    """Draw a coil of unit length along z, to be placed, turned and stretched; `size` is that of the scene, m."""
+    """Draw a coil of unit length along z, to be placed, turned and stretched; `size` is that of the scene, m, 0 for a
+    straight line."""
     turns = np.linspace(0.0, 16 * math.pi, 193)
     radius = 0.016 * size * np.clip(np.minimum(turns, turns[-1] - turns) / math.pi, 0.0, 1.0)
     heights = 0.08 + 0.84 * turns / turns[-1]

@@ -7,9 +7,9 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
-from ephs.mechanics.scene.attached import Conduction, ThermalNode
 from ephs.mechanics.scene.geometry import coupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Body, Joint, Scene, Spring, World, frozen
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.testing.primitives import generators

@@ -12,6 +12,7 @@ import ephs
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.closing import closing
 from ephs.mechanics.elements.offset import frame_change
+from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Path, Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
@@ -67,6 +68,8 @@ def primitives():
     out["frame_change"] = frame_change(SE3.exp(np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.0])), "p_j1", "p1")
     out["point_spring"] = springs.point_spring(2.0, 1.0)
     out["point_damper"] = springs.point_damper(3.0)
+    out["point_stretch"] = springs.point_stretch()
+    out["tension_spring"], out["slack_spring"] = tension_spring(3.0, 1.0), tension_spring(3.0, 1.0, slack=True)
     out["ground"] = components.ground()
     out["thermal_node"] = components.thermal_node(50.0, 300.0)
     out["ideal_gas"] = library.ideal_gas(c1=2.0, c2=1.5, v0=1.0, c=1.5)
@@ -327,6 +330,15 @@ def test_a_temperature_below_zero_is_refused(name):
     assert draw.compiled()[0] == TEMPERATURE
     with pytest.raises(StructureError, match="temperature"):
         draw.plain(draw.z)
+
+
+@pytest.mark.parametrize("e", [[0.0] * 6 + [1.0], [1.0] * 7])
+def test_a_stretch_without_length_has_no_direction(e):
+    draw = Draw(PRIMITIVES["point_stretch"], 0, 0.0)
+    for value in draw.x.values():
+        value[4:] = 0.0
+    draw.e = np.array(e)
+    assert draw.compiled()[0] == DOMAIN
 
 
 def test_a_spring_without_length_has_no_direction():

@@ -13,7 +13,7 @@ from referencing import Registry, Resource
 import ephs
 from ephs import Pattern, PatternError, SemanticsError, System, junction, library
 from ephs import quantity as Q
-from ephs.mechanics import beam_element, joint, mbs_pattern, rigid_body, spring_damper, stabilised
+from ephs.mechanics import beam_element, joint, mbs_pattern, rigid_body, spring_damper, stabilised, tendon
 from ephs.mechanics.elements.catalogue import PARTS
 from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
@@ -173,6 +173,7 @@ MECHANICS = [
         damping=0.1,
         expands=True,
     ),
+    *(tendon([([0, 0, 0], [0, 0, 1.0])], 3.0, 1.0, slack=slack) for slack in (False, True)),
     alone(ephs.mechanics.thermoelastic(capacity=3.0, temperature=310.0, pull=0.4, reference=300.0)),
     stabilised(mbs_pattern()(body1=ROUND, body2=ROUND, joint=joint("revolute"))),
     alone(ephs.mechanics.elements.components.ground()),

@@ -8,6 +8,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.show.lines import lines_of
 from ephs.show.sketch import sketch
 from ephs.show.stage import stage_of
 from ephs.show.still import HIGHEST, WIDTH, still_svg
@@ -59,3 +60,15 @@ def test_the_outline_of_a_system_is_where_the_scene_is():
     for name, _ in scene.all_bodies():
         np.testing.assert_allclose(own.frames.poses[f"bodies.{name}"][-1, 4:], known.body(name).position[-1], atol=1e-6)
     assert own.loads is not None and own.size() > 1.0
+
+
+def test_tendons_are_drawn_straight_from_point_to_point(tmp_path):
+    text = "format = 1\n[bodies.a]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\nposition = [1.0, 0.0, 0.0]\n"
+    text += '[tendons.t]\nbodies = ["ground", "a", "a", "ground"]\nstiffness = 1.0\n'
+    text += "points = [[0.0, 0.0, 1.0], [0.0, 0.1, 0.0], [0.0, -0.1, 0.0], [2.0, 0.0, 1.0]]\n"
+    (tmp_path / "scene.toml").write_text(text)
+    lines = lines_of(ephs.load(tmp_path / "scene.toml"))
+    assert [(line.body1, line.body2, line.coiled) for line in lines.values()] == [
+        ("ground", "a", False), ("a", "a", False), ("a", "ground", False)
+    ]  # fmt: skip
+    assert lines["t-2"].at1.tolist() == [0.0, 0.1, 0.0]

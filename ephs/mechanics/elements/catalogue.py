@@ -8,6 +8,7 @@ import numpy as np
 from ephs.mechanics.elements import beam, components, springs
 from ephs.mechanics.elements.closing import Q1, Q2, closing
 from ephs.mechanics.elements.offset import frame_change
+from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.catalogue import Part
 from ephs.semantics.primitives import Primitive
@@ -100,11 +101,14 @@ PARTS: tuple[Part, ...] = (
     Part("pair_spring", "pair_spring", _pair_spring),
     Part("point_damper", "point_damper", lambda _, numbers: springs.point_damper(numbers["damping"])),
     Part("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
+    Part("point_stretch", "point_stretch", lambda _ports, _numbers: springs.point_stretch()),
+    Part("slack_spring", "slack_spring", lambda _, n: tension_spring(n["stiffness"], n["length"], slack=True)),
     Part(
         "velocity_relation",
         "velocity_relation",
         lambda ports, _: components.holonomic(_pair(ports, "q_r"), on_group=False),
     ),
+    Part("tension_spring", "tension_spring", lambda _, n: tension_spring(n["stiffness"], n["length"])),
     Part("thermal_node", "thermal_node", lambda _, n: components.thermal_node(n["capacity"], n["temperature"])),
     Part("thermoelastic", "thermoelastic", _thermoelastic),
 )

@@ -1,6 +1,7 @@
-"""Springs and dampers between two points: their components."""
+"""Springs and dampers between two points, and the rate of their distance: components."""
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,13 @@ from ephs.mechanics.elements import notation
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics import structures
 from ephs.semantics.checks import STATEMENTS
-from ephs.semantics.forms import stored
-from ephs.semantics.primitives import Irreversible, Storage, power_ports
+from ephs.semantics.forms import coupled, stored
+from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import choose
 from ephs.semantics.verdict import proved
 
-__all__ = ["point_damper", "point_spring"]
+__all__ = ["point_damper", "point_spring", "point_stretch"]
 
 RELATIVE = quantity.relative_pose("free")
 
@@ -72,9 +73,7 @@ def point_damper(damping: float) -> Irreversible:
 
 def distance_resistance(pose: Any, u: Any, damping: float) -> Any:
     """c n nᵀ (6, 6) of the direction n of a relative pose's position, in turning axes; of the velocity where r = 0."""
-    r = pose[4:]
-    square = r @ r
-    along = quaternion_to_matrix(pose[:4]).T @ r
+    along, square = _along(pose)
     speed = u[3:] @ u[3:]
     out = [[0.0] * 6 for _ in range(6)]
     for i in range(3):
@@ -82,3 +81,40 @@ def distance_resistance(pose: Any, u: Any, damping: float) -> Any:
             still = choose(speed, u[3 + i] * u[3 + j] / speed, 0.0)
             out[3 + i][3 + j] = damping * choose(square, along[i] * along[j] / square, still)
     return out
+
+
+@cache
+def point_stretch() -> Reversible:
+    """The distance of two points at its rate n·u_r, n = (0, Rᵀ r/|r|): e.f = −n p_r.e, p_r.f = n e.e; reads q_r.
+
+    The effort of e is the tension in N. Where r = 0 it is undefined.
+    """
+
+    def structure(q_r: Any) -> Any:
+        along, square = _along(q_r)
+        length = np.sqrt(square)
+        row = [0.0, 0.0, 0.0, *(x / length for x in along)]
+        return [*([0.0] * 6 + [n] for n in row), [*(-n for n in row), 0.0]], None
+
+    ports = Directory(
+        {
+            "p_r": PortType(quantity.joint_momentum("free"), True),
+            "e": PortType(quantity.displacement, True),
+            "q_r": PortType(RELATIVE, False),
+        }
+    )
+    return coupled(
+        "point_stretch",
+        ports,
+        structure,
+        proof=lambda: proved(
+            "L = [[0, n], [−nᵀ, 0]], n even in q_r, which reads q and −q alike", *STATEMENTS["reversible"]
+        ),
+        trusted=True,
+    )
+
+
+def _along(pose: Any) -> tuple[Any, Any]:
+    """Rᵀ r (3,), the position of a relative pose in turning axes, and r·r."""
+    r = pose[4:]
+    return quaternion_to_matrix(pose[:4]).T @ r, r @ r

@@ -46,6 +46,7 @@ class Draft:
         self._joint_names: dict[str, str] = {}
         self._gears: dict[str, dict[str, Any]] = {}
         self._actuators: dict[str, dict[str, Any]] = {}
+        self._tendons: dict[str, dict[str, Any]] = {}
         self._springs: dict[str, dict[str, Any]] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
         self._left: dict[str, dict[str, None]] = {}
@@ -188,11 +189,23 @@ class Draft:
             "stiffness": stiffness, "length": length, "damping": damping,
         }  # fmt: skip
 
-    def actuate(self, name: str, ratio: Mapping[str, float], limits: Sequence[float] | None) -> None:
-        """A control that acts as forces on joints of one degree of freedom."""
-        found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
+    def tendon(self, name: str, links: Sequence[str], points: Sequence[Array], **numbers: Any) -> str:
+        """A tendon through points (3,), each in its link's frame; its name."""
+        own = self._own(name, self._tendons)
+        at = [_plain(self._at(link, pose(x))[4:]) for link, x in zip(links, points, strict=True)]
+        self._tendons[own] = {"bodies": [self._names[link] for link in links], "points": at, **numbers}
+        return own
+
+    def actuate(
+        self, name: str, ratio: Mapping[str, float] | float, limits: Sequence[float] | None, tendon: str = ""
+    ) -> None:
+        """A control that acts as forces on joints of one degree of freedom, or on the length of a tendon."""
+        found: dict[str, Any] = {"tendon": tendon, "ratio": ratio}
+        if isinstance(ratio, Mapping):
+            found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
         more = {} if limits is None or limits[0] >= limits[1] else {"limits": list(map(float, limits))}
-        self._actuators[self._own(name, self._actuators)] = found | more
+        others = {each: table for each, table in self._tendons.items() if each != tendon}
+        self._actuators[self._own(name, self._actuators | others)] = found | more
 
     def shape(self, link: str, kind: str, value: Any, place: Array, **more: Any) -> None:
         """Something to draw on a link."""
@@ -241,6 +254,7 @@ class Draft:
             **({"springs": self._springs} if self._springs else {}),
             **({"gears": self._gears} if self._gears else {}),
             **({"actuators": self._actuators} if self._actuators else {}),
+            **({"tendons": self._tendons} if self._tendons else {}),
             **({"surfaces": self._surfaces, "contacts": self._contacts} if self._contacts else {}),
         }
 

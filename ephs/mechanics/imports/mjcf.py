@@ -88,8 +88,7 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         _joints(model, b, names, threads, draft)
         shapes(model, b, names.bodies[b], source, draft)
     contacts(model, names, draft)
-    tendons(model, names, draft)
-    actuators(model, names, draft)
+    actuators(model, names, tendons(model, names, draft), draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
 

@@ -1,7 +1,7 @@
 """Actuators and tendons of a compiled MJCF.
 
 An actuator's force on its length l is gain · control + b₀ + b₁ l + b₂ dl/dt. The first term is an actuator of the
-scene; the others are a spring, friction, and a constant force on its joints.
+scene; the others are a spring, friction, and a constant force on its joints or along its tendon.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_names import Names
-from ephs.mechanics.imports.mjcf_routes import route_of
+from ephs.mechanics.imports.mjcf_routes import Route, route_of
 
 __all__ = ["actuators", "tendons"]
 
@@ -27,20 +27,24 @@ class Line:
     length: float
 
 
-def tendons(model: Any, names: Names, draft: Draft) -> None:
-    """Springs and dampers of fixed tendons, and of those from site to site."""
+def tendons(model: Any, names: Names, draft: Draft) -> dict[int, str]:
+    """Springs and dampers of fixed tendons, and of those from site to site; number -> name of the scene's tendons."""
+    found: dict[int, str] = {}
     mujoco: Any = import_module("mujoco")
     off, flags = mujoco.mjtDisableBit, model.opt.disableflags
     for t in range(model.ntendon):
-        name, line, route = str(model.tendon(t).name) or f"tendon_{t + 1}", _of_tendon(model, t), route_of(model, t)
+        name, line, route = _named(model, t), _of_tendon(model, t), route_of(model, t)
         stiffness = 0.0 if flags & off.mjDSBL_SPRING else float(model.tendon_stiffness[t].flat[0])
         damping = 0.0 if flags & off.mjDSBL_DAMPER else float(model.tendon_damping[t].flat[0])
         low, high = model.tendon_lengthspring[t].tolist()
-        taut = stiffness if low == high else 0.0
+        slack = route is not None and low == 0.0 < high
+        taut = stiffness if low == high or slack else 0.0
         if route is None:
             known = _pull(name, line, taut, low, damping, names, draft)
         else:
-            known = route.pull(name, taut, low, damping, names, draft)
+            made = route.pull(name, taut, high, damping, names, draft, slack=slack and bool(taut))
+            known = made is not None
+            found |= {t: made} if made else {}
         if not known:
             draft.leave("tendons", name)
         if np.any(model.tendon_stiffnesspoly[t]):
@@ -49,16 +53,19 @@ def tendons(model: Any, names: Names, draft: Draft) -> None:
             draft.leave("damping that is not linear of", name)
         if model.tendon_armature[t]:
             draft.leave("armature of", name)
-        if stiffness and low != high:
+        if stiffness and not taut:
             draft.leave("slack of", name)
         if model.tendon_limited[t]:
             draft.leave("limits of", name)
         if model.tendon_frictionloss[t]:
             draft.leave("dry friction of", name)
+    return found
 
 
-def actuators(model: Any, names: Names, draft: Draft) -> None:
-    """Actuators on joints with one degree of freedom and on fixed tendons."""
+def actuators(model: Any, names: Names, ropes: dict[int, str], draft: Draft) -> None:
+    """Actuators on joints with one degree of freedom and on tendons; ``ropes``: number -> name of the scene's tendons,
+    to which those are added that are needed.
+    """
     mujoco: Any = import_module("mujoco")
     through, gains, biases, dynamics = mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn
     for a in range(model.nu):
@@ -71,28 +78,46 @@ def actuators(model: Any, names: Names, draft: Draft) -> None:
             in (dynamics.mjDYN_NONE, dynamics.mjDYN_FILTER, dynamics.mjDYN_FILTEREXACT)
         )
         line: Line | None = None
+        route: Route | None = None
         if kind in (through.mjTRN_JOINT, through.mjTRN_JOINTINPARENT) and not np.any(gear[1:]):
             if names.kinds[target] in ("revolute", "prismatic"):
                 line = Line((target,), (1.0,), float(model.qpos0[model.jnt_qposadr[target]]))
         elif kind == through.mjTRN_TENDON:
-            line = _of_tendon(model, target)
-        if not lawful or line is None or not all(draft.knows(names.joints[j]) for j in line.joints):
+            line, route = _of_tendon(model, target), route_of(model, target)
+        known = route is not None or (line is not None and all(draft.knows(names.joints[j]) for j in line.joints))
+        if not lawful or not known:
             draft.leave("actuators", name)
             continue
-        line = Line(line.joints, tuple(float(gear[0]) * x for x in line.coefficients), float(gear[0]) * line.length)
+        by = float(gear[0])
+        if line is not None:
+            line = Line(line.joints, tuple(by * x for x in line.coefficients), by * line.length)
         affine = int(model.actuator_biastype[a]) == biases.mjBIAS_AFFINE
         constant, by_length, by_rate = (float(x) if affine else 0.0 for x in model.actuator_biasprm[a, :3])
         rest = -constant / by_length if by_length else 0.0
-        if not _pull(name, line, -by_length, rest, -by_rate, names, draft) or (constant and not by_length):
+        if route is None:
+            sprung = _pull(name, line, -by_length, rest, -by_rate, names, draft)
+        else:
+            spring = (-by_length * by**2, rest / by if by else 0.0, -by_rate * by**2)
+            sprung = route.pull(f"{name}_bias", *spring, names, draft) is not None
+        if not sprung or (constant and not by_length):
             draft.leave("bias of", name)
         gain = float(model.actuator_gainprm[a, 0])
         limits = model.actuator_ctrlrange[a].tolist() if model.actuator_ctrllimited[a] else None
-        ratio = {names.joints[j]: gain * x for j, x in zip(line.joints, line.coefficients, strict=True)}
-        draft.actuate(name, ratio, limits)
+        if route is not None:
+            if target not in ropes:
+                ropes[target] = route.tendon(_named(model, target), names, draft)
+            draft.actuate(name, gain * by / route.divisor, limits, ropes[target])
+        elif line is not None:
+            shares = {names.joints[j]: gain * x for j, x in zip(line.joints, line.coefficients, strict=True)}
+            draft.actuate(name, shares, limits)
         if model.actuator_forcelimited[a]:
             draft.leave("limits of the force of", name)
         if int(model.actuator_dyntype[a]) != dynamics.mjDYN_NONE:
             draft.leave("activation of", name)
+
+
+def _named(model: Any, t: int) -> str:
+    return str(model.tendon(t).name) or f"tendon_{t + 1}"
 
 
 def _of_tendon(model: Any, t: int) -> Line | None:

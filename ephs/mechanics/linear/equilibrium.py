@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.scene.attached import Attachment, Cylinder, GasSpring, Gear, Motor
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
@@ -123,6 +124,10 @@ def _of_scene(scene: Scene) -> Equilibrium:
     if own := [f"{section}.{name}" for section, name, each in scene.all_attachments() if _keeps(each)]:
         found = f"a scene with {own[0]}"
         raise OptionError("model", found, "a scene without attachments with states, or its system")
+    sprung = [f"tendons.{name}" for name, each in scene.all_tendons() if each.stiffness]
+    if sprung and any(True for _ in scene.all_loads()):
+        found = f"a scene with {sprung[0]} and loads"
+        raise OptionError("model", found, "a scene with only one of both, or its system")
     moving = [name for name, joint in scene.all_joints() if joint.motion is not None and joint.motion.fastest(0.0, 1.0)]
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")
@@ -165,7 +170,8 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
 
     from ephs.mechanics.linear.scene import freedoms_of, unbalanced
 
-    state, shift, before = model.state0, 0.0, np.inf
+    lengths = _lengths(model)
+    state, shift, before = _followed(model, model.state0, lengths), 0.0, np.inf
     best, stalled = np.inf, 0
     for step in range(STEPS):
         free = freedoms_of(model, state)
@@ -181,7 +187,8 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         before = left
         M = Z.T @ by.force_a @ Z
         force = M @ _still(model, state)[free.which]
-        K = -M @ (by.acceleration_q @ Z)[free.which]
+        pulled = by.acceleration_s[:, list(lengths)] @ by.entropy_r[list(lengths)]
+        K = -M @ ((by.acceleration_q + pulled) @ Z)[free.which]
         values, ways = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
         size = np.abs(values)
         flat = size <= ELIMINATION * size.max(initial=0.0)
@@ -190,8 +197,28 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         stretch = push / np.where(flat, max(float(size.max(initial=0.0)), TINY), size + shift * size.max(initial=0.0))
         change = Z @ (ways @ stretch)
         change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
-        state = _nearest(model, state, change)
+        state = _followed(model, _nearest(model, state, change), lengths)
     raise _none(*_culprit(model, state))
+
+
+def _lengths(model: "Dynamics") -> dict[int, list[Path]]:
+    """Places of tendons' lengths among the entropies, and the relative poses of their segments."""
+    found: dict[int, list[Path]] = {}
+    for name, tendon in model.scene.all_tendons():
+        at = component_path("tendons", name)
+        if tendon.stiffness:
+            segments = [at / f"segment{k}" / "pe" / "q_r" for k in range(1, len(tendon.segments) + 1)]
+            found[model.layout.entropies.index(at / "spring" / "q")] = segments
+    return found
+
+
+def _followed(model: "Dynamics", state: "State", lengths: Mapping[int, list[Path]]) -> "State":
+    """The state with tendons as long as they are where the joints put their points."""
+    q, r, s = model.layout.split(state.array)
+    states = model.states(state)
+    for place, segments in lengths.items():
+        s[place] = sum(float(np.linalg.norm(states[path][4:])) for path in segments)
+    return model.unpack(np.concatenate([q, r, s])) if lengths else state
 
 
 def _nearest(model: "Dynamics", state: "State", change: Array) -> "State":

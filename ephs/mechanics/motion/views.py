@@ -11,11 +11,11 @@ from typing import Generic, TypeVar, final
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import ThermalNode
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.kinematics import Link, twist
 from ephs.mechanics.scene.model import GROUND, Marker, Scene
 from ephs.mechanics.scene.state import Snapshot
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.operad import Path
 from ephs.semantics.bundle import Array

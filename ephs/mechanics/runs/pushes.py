@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.runs.signals import View, signal
 from ephs.mechanics.scene.attached import Actuator
 from ephs.mechanics.scene.attaching import supplies_of
-from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.build import component_path, tension_port
 from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.operad import Path
@@ -40,7 +40,7 @@ def sum_of(one: Signal, other: Signal) -> Signal:
 def scene_signals(
     scene: Scene, inputs: Mapping[Any, Any], view: View
 ) -> tuple[dict[str, Signal], dict[str, Signal], dict[Path, Signal]]:
-    """Forces on joints, wrenches on bodies, efforts of supplies, by name: loads and user inputs.
+    """Forces on joints, wrenches on bodies, by name, and signals at other outer ports: loads and user inputs.
 
     A key may be a tuple of names, whose input gives the numbers of all of them in a row.
 
@@ -51,7 +51,7 @@ def scene_signals(
     """
     forces: dict[str, Signal] = {}
     wrenches: dict[str, Signal] = {}
-    efforts: dict[Path, Signal] = {}
+    others: dict[Path, Signal] = {}
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
     attached = {f"{section}.{name}": each for section, name, each in scene.all_attachments()}
@@ -66,18 +66,24 @@ def scene_signals(
         kind, _, name = key.partition(".")
         if supplied.get(key):
             parts = (part_of(given, slice(k, k + 1)) for k in range(len(supplied[key])))
-            efforts |= {s.outer: replace(part, effort=True) for s, part in zip(supplied[key], parts, strict=True)}
+            others |= {s.outer: replace(part, effort=True) for s, part in zip(supplied[key], parts, strict=True)}
             continue
         if kind in ("joints", "actuators"):
             of = attached.get(key)
-            shares = _shares(of, given) if isinstance(of, Actuator) else {name: given}
+            if isinstance(of, Actuator) and of.tendon is not None:
+                port, (share,) = tension_port(of.tendon), _shares(of, given)
+                others[port] = sum_of(others[port], share) if port in others else share
+                continue
+            shares = (
+                dict(zip(of.joints, _shares(of, given), strict=True)) if isinstance(of, Actuator) else {name: given}
+            )
             for joint, share in shares.items():
                 forces[joint] = sum_of(forces[joint], share) if joint in forces else share
             continue
         if kind == "markers":
             name, given = markers[name].body, _at_marker(markers[name], given)
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
-    return forces, wrenches, efforts
+    return forces, wrenches, others
 
 
 def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> Iterator[tuple[str, Signal]]:
@@ -97,8 +103,8 @@ def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> 
             yield one, part_of(shared, slice(int(first), int(last)))
 
 
-def _shares(of: Actuator, control: Signal) -> dict[str, Signal]:
-    """Force on each joint of an actuator, of its control within its limits."""
+def _shares(of: Actuator, control: Signal) -> list[Signal]:
+    """Force on each joint of an actuator, or on the length of its tendon, of its control within its limits."""
     low, high = (-np.inf, np.inf) if of.limits is None else of.limits.tolist()
 
     def share(ratio: float) -> Signal:
@@ -106,7 +112,7 @@ def _shares(of: Actuator, control: Signal) -> dict[str, Signal]:
             return Signal(ratio * np.clip(control.at(0.0, {}), low, high))
         return replace(control, value=lambda t, state: ratio * np.clip(control.at(t, state), low, high))
 
-    return {joint: share(ratio) for joint, ratio in zip(of.joints, of.ratio.tolist(), strict=True)}
+    return [share(ratio) for ratio in of.ratio.tolist()]
 
 
 @final

@@ -336,7 +336,7 @@ def problem_of_scene(
 ) -> Problem:
     """The initial value problem of a scene."""
     view = view_of(scene)
-    forces, wrenches, efforts = scene_signals(scene, inputs or {}, view)
+    forces, wrenches, others = scene_signals(scene, inputs or {}, view)
     system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
     state = initial_state(scene)
     if initial:
@@ -351,7 +351,7 @@ def problem_of_scene(
                     "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
                 )
             signals[port] = sum_of(signals[port], extra) if port in signals else extra
-    signals |= efforts
+    signals |= others
     signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
     world = scene.world
     problem = Problem(

@@ -6,8 +6,6 @@ and is imported where it is used.
 
 from ephs.mechanics.scene.adjustment import Adjustment as Adjustment
 from ephs.mechanics.scene.adjustment import Displacement as Displacement
-from ephs.mechanics.scene.attached import Conduction as Conduction
-from ephs.mechanics.scene.attached import ThermalNode as ThermalNode
 from ephs.mechanics.scene.errors import Fault as Fault
 from ephs.mechanics.scene.errors import ModelWarning as ModelWarning
 from ephs.mechanics.scene.errors import SceneError as SceneError
@@ -17,3 +15,5 @@ from ephs.mechanics.scene.model import Joint as Joint
 from ephs.mechanics.scene.model import Scene as Scene
 from ephs.mechanics.scene.model import Spring as Spring
 from ephs.mechanics.scene.model import World as World
+from ephs.mechanics.scene.thermal import Conduction as Conduction
+from ephs.mechanics.scene.thermal import ThermalNode as ThermalNode

@@ -1,9 +1,9 @@
-"""Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators; stores of heat, conduction."""
+"""Attachments of a scene's mechanism: motors, gears, cylinders, gas springs, actuators."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,10 @@ __all__ = [
     "ATTACHED",
     "Actuator",
     "Attachment",
-    "Conduction",
     "Cylinder",
     "GasSpring",
     "Gear",
     "Motor",
-    "ThermalNode",
 ]
 
 Array = NDArray[np.float64]
@@ -232,17 +230,17 @@ class GasSpring(Attachment):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuator(Attachment):
-    """A control as forces on joints: an input by name, for motors without dynamics.
+    """A control as forces on joints, or on the length of a tendon: an input by name, for motors without dynamics.
 
     Attributes
     ----------
     ratio
-        Force on each joint by the control, N m or N.
+        Force on each joint, or on the length, by the control, N m or N.
     limits
         (2,) least and largest control; None for none.
     """
 
-    names: ClassVar[Mapping[str, str]] = {"joints": "joint", "heat": "node"}
+    names: ClassVar[Mapping[str, str]] = {"joints": "joint", "tendon": "tendon", "heat": "node"}
     numbers: ClassVar[Mapping[str, Number]] = {
         "ratio": Number(energy=1, others=-1, each=0),
         "limits": Number(count=2),
@@ -252,13 +250,14 @@ class Actuator(Attachment):
     ratio: Array
     limits: Array | None
     heat: str = "environment"
+    tendon: str | None = None
 
     @property
     def warms(self) -> bool:
         return False
 
     def __str__(self) -> str:
-        return f"{' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
+        return f"{self.tendon or ' – '.join(self.joints)}, {', '.join(f'{x:g}' for x in self.ratio)}"
 
 
 ATTACHED: Mapping[str, type[Attachment]] = {
@@ -269,42 +268,3 @@ ATTACHED: Mapping[str, type[Attachment]] = {
     "actuators": Actuator,
 }
 """Kinds of attachments, by their sections of scene files."""
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class ThermalNode(Element):
-    """A body of uniform temperature: capacity in J/K, initial temperature in K.
-
-    One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the
-    ``reference`` in K.
-    """
-
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "capacity": Number(energy=1, least=POSITIVE),
-        "temperature": Number(least=POSITIVE),
-        "pull": Number(energy=1, length=-1),
-        "reference": Number(),
-    }
-    name: str
-    capacity: float
-    temperature: float
-    pull: float = 0.0
-    reference: float = 0.0
-
-    def temperature_of(self, states: Callable[[str], Any]) -> Any:
-        """θ = θ₁ exp((s − κ e)/C) in K, of its states by name: numbers or arrays."""
-        s = states("s") - self.pull * states("e") if self.pull else states("s")
-        return self.temperature * np.exp(s / self.capacity)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Conduction(Element):
-    """Heat conduction between two thermal nodes, or one and the environment; conductance in W/K."""
-
-    names: ClassVar[Mapping[str, str]] = {"between": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {"conductance": Number(energy=1, time=-1, least=NON_NEGATIVE)}
-    name: str
-    between: tuple[str, str]
-    conductance: float

@@ -17,7 +17,6 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.attached import Conduction, ThermalNode
 from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.entries import Checked, shown
 from ephs.mechanics.scene.errors import Fault, fault
@@ -29,6 +28,7 @@ from ephs.mechanics.scene.resolve import JointDraft, Names
 from ephs.mechanics.scene.schema_touching import ContactLawEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import TINY

@@ -17,11 +17,13 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.elements.beam import thermoelastic
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
-from ephs.mechanics.scene.attached import Actuator, ThermalNode
+from ephs.mechanics.scene.attached import Actuator
 from ephs.mechanics.scene.attaching import SUPPLIED, starts_of, supplies, supplies_of, system_of
 from ephs.mechanics.scene.made import Made, spring_system
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.scene.tendons import tendon_ports, tendon_starts, tendon_system
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
@@ -40,6 +42,7 @@ __all__ = [
     "scene_inputs",
     "scene_names",
     "scene_system",
+    "tension_port",
     "wrench_port",
 ]
 
@@ -53,6 +56,11 @@ def component_path(kind: str, name: str) -> Path:
 def wrench_port(body: str) -> Path:
     """The outer port at which a wrench acts on a body."""
     return _at("momenta", body)
+
+
+def tension_port(tendon: str) -> Path:
+    """The outer port at which a force acts on a tendon's length."""
+    return _at("tensions", tendon)
 
 
 def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
@@ -106,6 +114,9 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         at = component_path(section, name)
         found = starts_of(each, [scene.joint(tied) for tied in each.tied])
         out |= {Path([*at, *path.split(".")]): value.copy() for path, value in found.items()}
+    for name, tendon in scene.all_tendons():
+        at = component_path("tendons", name)
+        out |= {Path([*at, *path.split(".")]): value for path, value in tendon_starts(tendon, poses).items()}
     between = [
         (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
         for name, s in scene.all_springs()
@@ -140,8 +151,11 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Signal]:
-    """Prescribed drives as flows, motions and supplies as efforts, at the ports of `drive_ports` and `supplies`."""
+    """Prescribed drives as flows, motions and supplies as efforts, at the ports of `drive_ports` and `supplies`; of
+    tendons no force but their own.
+    """
     out = {supply.outer: Signal(supply.value, effort=True) for supply in supplies(scene)}
+    out |= {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
     for _, j in scene.all_joints():
         if _is_driven(j):
             for port, where in drive_ports(j):
@@ -238,6 +252,12 @@ class _Builder:
         self.junctions[path] = junction(SUPPLIED[path[0]], exposed=True)
         return str(path)
 
+    def tension(self, tendon: str) -> str:
+        """The exposed junction at which forces act on a tendon's length."""
+        path = tension_port(tendon)
+        self.junctions[path] = junction(quantity.momentum, exposed=True)
+        return str(path)
+
     def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
         """A box with its filling."""
         self.boxes[path], self.fillings[path] = dict(ports), filling
@@ -279,6 +299,11 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         if c.heat != ENVIRONMENT:
             ports["s"] = b.entropy(c.heat)
         b.add(Path(["contacts", name]), contact(points, c.law, heat=c.heat != ENVIRONMENT), ports)
+    for name, tendon in scene.tendons.items():
+        ports = {port: b.momentum(body) for port, body in tendon_ports(tendon).items()} | {"p": b.tension(name)}
+        if tendon.damping and tendon.heat != ENVIRONMENT:
+            ports["s"] = b.entropy(tendon.heat)
+        b.add(Path(["tendons", name]), tendon_system(tendon), ports)
     for name, node in scene.thermal.items():
         ports = {"s": b.entropy(name)} | ({"e": b.lengthening(name)} if node.pull else {})
         b.add(Path(["thermal", name]), _storing(node), ports)
@@ -328,6 +353,8 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
         return b.momentum(name)
     if group == "entropies":
         return b.entropy(name)
+    if group == "tensions":
+        return b.tension(name)
     if group in SUPPLIED:
         return b.supply(_at(group, name))
     joint_name = name if name in b.inner.joints else name.rpartition(".")[0]
@@ -338,10 +365,12 @@ def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
     """Ports that the level above and this level's joints, springs and conductions need from its parts."""
     pairs = [*scene.joints.values(), *scene.springs.values()]
     bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
+    bodies |= {body for tendon in scene.tendons.values() for body in tendon.bodies}
     nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
         name for c in scene.conduction.values() for name in c.between
     }
     attached = [each for _, _, each in scene.attachments()]
+    nodes |= {tendon.heat for tendon in scene.tendons.values()}
     nodes |= {each.heat for each in attached if each.warms}
     turned = {name for name, j in scene.joints.items() if j.armature}
     turned |= {name for each in attached for name in each.tied if not isinstance(each, Actuator)}
@@ -350,7 +379,7 @@ def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
 
 def _uses_ground(scene: Scene) -> bool:
     mine = [*scene.joints.values(), *scene.springs.values()]
-    if GROUND in _touching(scene):
+    if GROUND in _touching(scene) or any(GROUND in tendon_ports(tendon).values() for tendon in scene.tendons.values()):
         return True
     return any(GROUND in (x.body1, x.body2) for x in mine) or any(map(_uses_ground, scene.parts.values()))
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.flexible import Strain
+from ephs.mechanics.scene.flexible import Strain, Tendon
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.shapes.dry import Dry
@@ -18,9 +18,9 @@ from ephs.mechanics.shapes.law import Law
 
 __all__ = ["scene_from_text", "scene_to_text"]
 
-_BESIDE: Mapping[Any, frozenset[str]] = {Joint: frozenset({"coordinate", "limits"})}
+_BESIDE: Mapping[Any, frozenset[str]] = {Joint: frozenset({"coordinate", "limits"}), Tendon: frozenset({"points"})}
 """Arrays beside those among the numbers."""
-_SEVERAL = frozenset({"shapes", "between", "surfaces", "joints", "ends", "outline", "lengths"})
+_SEVERAL = frozenset({"shapes", "between", "surfaces", "joints", "bodies", "ends", "outline", "lengths"})
 """What is several things, in order."""
 
 

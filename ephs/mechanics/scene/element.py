@@ -36,6 +36,7 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "end": frozenset({GROUND, FREE_END}),
     "node": frozenset({ENVIRONMENT}),
     "joint": frozenset(),
+    "tendon": frozenset(),
     "surface": frozenset(),
 }
 """Kind of a name that refers to something -> the names that are the same in all parts."""
@@ -133,7 +134,7 @@ class Element(Measured):
     Attributes
     ----------
     names
-        Attributes that name other elements, one or several, and of which kind: a key of `OUTSIDE`.
+        Attributes that name other elements, one, several or None, and of which kind: a key of `OUTSIDE`.
     """
 
     __slots__ = ()
@@ -142,8 +143,8 @@ class Element(Measured):
 
     def named(self, kind: str) -> tuple[str, ...]:
         """The names of a kind to which it refers."""
-        given: list[str | tuple[str, ...]] = [getattr(self, key) for key, of in self.names.items() if of == kind]
-        return tuple(name for one in given for name in ((one,) if isinstance(one, str) else one))
+        given: list[str | tuple[str, ...] | None] = [getattr(self, key) for key, of in self.names.items() if of == kind]
+        return tuple(name for one in given for name in ((one,) if isinstance(one, str) else one or ()))
 
     def seen(self, path: str) -> Self:
         """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
@@ -155,6 +156,7 @@ class Element(Measured):
 
         changed: dict[str, Any] = {"name": path + self.name}
         for key, kind in self.names.items():
-            own: str | tuple[str, ...] = getattr(self, key)
-            changed[key] = dotted(own, kind) if isinstance(own, str) else tuple(dotted(name, kind) for name in own)
+            own: str | tuple[str, ...] | None = getattr(self, key)
+            if own is not None:
+                changed[key] = dotted(own, kind) if isinstance(own, str) else tuple(dotted(name, kind) for name in own)
         return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all are dataclasses

@@ -240,7 +240,9 @@ TEXTS: dict[str, tuple[str, str]] = {
     "load ground": ("a body", "loads on the ground do nothing"),
     "tendon points": ("{count} points, one in each of its bodies", "give as many"),
     "tendon bodies": ("two different bodies after each other", "route it from one body to another"),
-    "tendon damping": ("0 without stiffness, through several bodies", "give it a stiffness"),
+    "slack damping": ("0 of a tendon with slack", "leave out one of the two; joints and bodies may have friction"),
+    "actuator target": ("either joints or a tendon", "give one of the two"),
+    "unknown tendon": ("a tendon of this file", "{hint}"),
     "same ends": ("two different points or nodes", "correct one of the two"),
     # assembly
     "gap": ("gaps below {limit}", "correct {who}, or set assembly.adjust = true"),

@@ -318,7 +318,7 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "frame1.position": _frame("frame1"),
         "frame2.position": _frame("frame2"),
     },
-    **{section: _attributes(section) for section in ("springs", *ATTACHED)},
+    **{section: _attributes(section) for section in ("springs", "tendons", *ATTACHED)},
     "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
     **{section: _attributes(section) for section in ("conduction", "markers")},
     "contacts": {

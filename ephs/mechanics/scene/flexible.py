@@ -1,7 +1,8 @@
-"""Resolved beams and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
+"""Resolved beams, tendons and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar, final
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import NON_NEGATIVE, Element, Measured, Number
 
-__all__ = ["Beam", "Load", "Strain"]
+__all__ = ["Beam", "Load", "Strain", "Tendon"]
 
 Array = NDArray[np.float64]
 
@@ -71,6 +72,48 @@ class Beam(Element):
     def joints(self) -> list[str]:
         """The joints that are its elements."""
         return [f"{self.name}-{i}" for i in range(1, self.elements + 1)]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Tendon(Element):
+    """A tendon without mass, straight from point to point of bodies, through which it slides.
+
+    Attributes
+    ----------
+    bodies : what carries its points, in their order
+    points : (n, 3) in the bodies' centre-of-mass frames (ground: world), m
+    stiffness, length, damping : of the whole: N/m, m without force, N s/m
+    slack : whether it exerts no elastic force where it is shorter
+    heat : where the heat of damping goes
+    """
+
+    names: ClassVar[Mapping[str, str]] = {"bodies": "body", "heat": "node"}
+    numbers: ClassVar[Mapping[str, Number]] = {
+        "stiffness": Number(energy=1, length=-2, least=NON_NEGATIVE),
+        "length": Number(length=1, least=NON_NEGATIVE),
+        "damping": Number(energy=1, time=1, length=-2, least=NON_NEGATIVE),
+    }
+    name: str
+    bodies: tuple[str, ...]
+    points: Array
+    stiffness: float
+    length: float
+    damping: float
+    slack: bool
+    heat: str
+
+    @property
+    def segments(self) -> list[tuple[tuple[str, Array], tuple[str, Array]]]:
+        """The (body, point) at both ends of each segment between two different bodies."""
+        spots = list(zip(self.bodies, self.points, strict=True))
+        return [(one, two) for one, two in pairwise(spots) if one[0] != two[0]]
+
+    @property
+    def inside(self) -> float:
+        """Length of the segments within bodies, m."""
+        spots = zip(self.bodies, self.points, strict=True)
+        return sum(float(np.linalg.norm(q - p)) for (a, p), (b, q) in pairwise(spots) if a == b)
 
 
 @final

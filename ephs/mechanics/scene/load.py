@@ -19,11 +19,11 @@ from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.resolve_attached import resolve_attached
 from ephs.mechanics.scene.state import Asked, adjusted
-from ephs.mechanics.scene.tendons import TendonDraft, resolve_tendons
+from ephs.mechanics.scene.tendons import resolve_tendons, with_pulls
 from ephs.mechanics.scene.text import file_text
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
@@ -147,13 +147,9 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         return None
     drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
     placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
-    tendons = _tendons(document, placed, coupled, parts, names, faults)
-    if faults:
-        return None
-    if tendons:
-        bodies += [body for tendon in tendons.values() for body in tendon.bodies]
-        drafts += [joint for tendon in tendons.values() for joint in tendon.joints]
-        placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
+    poses = {name: body.pose for name, body in placed.items()}
+    poses |= {f"{part}.{name}": body.pose for part, inner in parts.items() for name, body in inner.all_bodies()}
+    tendons = resolve_tendons(document, poses, names, faults)
     r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
     scene = Scene(
         document.name,
@@ -169,11 +165,11 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         surfaces=surfaces,
         beams={name: rod.beam for name, rod in rods.items()},
         loads=loads,
+        tendons=tendons,
     )
     attached = resolve_attached(document, scene, names, faults)
-    attached["actuators"] |= {name: tendon.actuator for name, tendon in tendons.items()}
-    attached["gears"] |= {name: tendon.gear for name, tendon in tendons.items() if tendon.gear is not None}
     scene = replace(scene, **attached)
+    scene = replace(scene, actuators=with_pulls(scene.actuators, document, tendons, faults))
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
         return None
@@ -294,14 +290,6 @@ def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, B
                 if each in document.sections[kind]:
                     faults.append(fault("collision", f"{kind}.{each}", shown(each), other=f"the beam {name}"))
     return found
-
-
-def _tendons(
-    document: Document, bodies: Mapping[str, Body], joints: Mapping[str, Joint], parts: Mapping[str, Scene],
-    names: resolve.Names, faults: list[Fault],
-) -> dict[str, TendonDraft]:  # fmt: skip
-    inner = {f"{part}.{name}": body for part, scene in parts.items() for name, body in scene.all_bodies()}
-    return resolve_tendons(document, {**bodies, **inner}, joints, names, faults)
 
 
 def _file_inside(file: Path, home: Path) -> Path | None:

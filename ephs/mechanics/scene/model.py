@@ -14,8 +14,9 @@ from ephs.mechanics.scene import attached
 from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, Marker, Spring, World, free_joint
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, Element, frozen
-from ephs.mechanics.scene.flexible import Beam, Load
+from ephs.mechanics.scene.flexible import Beam, Load, Tendon
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 from ephs.semantics.kept import Kept
 
 if TYPE_CHECKING:
@@ -59,8 +60,8 @@ class Scene:
     bodies: Mapping[str, Body]
     joints: Mapping[str, Joint] = field(default_factory=dict)
     springs: Mapping[str, Spring] = field(default_factory=dict)
-    thermal: Mapping[str, attached.ThermalNode] = field(default_factory=dict)
-    conduction: Mapping[str, attached.Conduction] = field(default_factory=dict)
+    thermal: Mapping[str, ThermalNode] = field(default_factory=dict)
+    conduction: Mapping[str, Conduction] = field(default_factory=dict)
     parts: Mapping[str, "Scene"] = field(default_factory=dict)
     source: str | None = None
     adjusted: Adjustment | None = None
@@ -69,6 +70,7 @@ class Scene:
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
+    tendons: Mapping[str, Tendon] = field(default_factory=dict)
     motors: Mapping[str, attached.Motor] = field(default_factory=dict)
     gears: Mapping[str, attached.Gear] = field(default_factory=dict)
     cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
@@ -168,6 +170,10 @@ class Scene:
         """Every load with its dotted name."""
         return self.every("loads")
 
+    def all_tendons(self) -> Iterator[tuple[str, Tendon]]:
+        """Every tendon with its dotted name; its bodies and heat sink are dotted too."""
+        return self.every("tendons")
+
     def attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
         """Section, name and value of every attachment of this level: motors, gears, cylinders, actuators, …"""
         for section in attached.ATTACHED:
@@ -181,11 +187,11 @@ class Scene:
             for section, name, each in scene.attachments():
                 yield section, path + name, each.seen(path)
 
-    def all_thermal(self) -> Iterator[tuple[str, attached.ThermalNode]]:
+    def all_thermal(self) -> Iterator[tuple[str, ThermalNode]]:
         """Every thermal node with its dotted name."""
         return self.every("thermal")
 
-    def all_conduction(self) -> Iterator[tuple[str, attached.Conduction]]:
+    def all_conduction(self) -> Iterator[tuple[str, Conduction]]:
         """Every conduction with its dotted name, as `all_joints`."""
         return self.every("conduction")
 
@@ -225,13 +231,14 @@ ELEMENTS: Mapping[str, type[Element]] = {
     "bodies": Body,
     "joints": Joint,
     "springs": Spring,
-    "thermal": attached.ThermalNode,
-    "conduction": attached.Conduction,
+    "thermal": ThermalNode,
+    "conduction": Conduction,
     "markers": Marker,
     "surfaces": Surface,
     "contacts": Contact,
     "beams": Beam,
     "loads": Load,
+    "tendons": Tendon,
     **attached.ATTACHED,
 }
 """Sections of a scene -> what stands in them."""

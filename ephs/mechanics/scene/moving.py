@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.flexible import Load
+from ephs.mechanics.scene.flexible import Load, Tendon
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Marker, Scene, Spring, World, frozen
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -38,6 +38,9 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
         turn = np.eye(3) if x.follower else so3.quaternion_to_matrix(pose[:4])
         return replace(x, force=frozen(turn @ x.force), moment=frozen(turn @ x.moment))
 
+    def tendon(t: Tendon) -> Tendon:
+        return replace(t, points=frozen([point(body, at) for body, at in zip(t.bodies, t.points, strict=True)]))
+
     def marker(m: Marker) -> Marker:
         return replace(m, at=point(m.body, m.at))
 
@@ -45,6 +48,7 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
         scene,
         world=world,
         loads={name: load(x) for name, x in scene.loads.items()},
+        tendons={name: tendon(t) for name, t in scene.tendons.items()},
         markers={name: marker(m) for name, m in scene.markers.items()},
         bodies={name: body(b) for name, b in scene.bodies.items()},
         joints={name: joint(j) for name, j in scene.joints.items()},

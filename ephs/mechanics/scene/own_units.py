@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.attaching import supplies
-from ephs.mechanics.scene.build import drive_ports, scene_system, wrench_port
+from ephs.mechanics.scene.build import drive_ports, scene_system, tension_port, wrench_port
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
@@ -77,7 +77,8 @@ def in_own_units(problem: Problem) -> Problem:
     force = units.mass * units.length / units.time**2
     sizes = units.length, units.mass, units.time, (1.0,)
     flows = {supply.outer: np.array([supply.flow.unit(*sizes) / force]) for supply in supplies(scene)}
-    forces = bodies | ports | flows
+    tensions = {tension_port(name): np.ones(1) for name, _ in scene.all_tendons()}
+    forces = bodies | ports | flows | tensions
     driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
     pushed = frozenset(name for name, _ in scene.all_bodies() if wrench_port(name) in problem.signals)
     system = scene_system(small, driven=driven, wrenches=pushed)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.mechanics.scene.attached import Attachment
 from ephs.mechanics.scene.element import Element
+from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -29,7 +30,9 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case Attachment():
                 of = map(scene.joint, x.tied)
                 tied = [float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of]
-                return x.rescaled(*units, tied)
+                return x.rescaled(*units, tied or [length])
+            case Tendon():
+                return replace(x.rescaled(*units), points=frozen(x.points * length))
             case Surface():
                 sizes = {kind: size and (np.asarray(size) * length).tolist() for kind, size in x.shape.items()}
                 return replace(x.rescaled(*units), shape=sizes)

@@ -26,28 +26,31 @@ def resolve_attached(
         section: {
             name: found
             for name, table in document.sections[section].items()
-            if (found := _resolved(section, name, table, joints, names, faults)) is not None
+            if (found := _resolved(section, name, table, scene, joints, names, faults)) is not None
         }
         for section in ATTACHED
     }
 
 
 def _resolved(
-    section: str, name: str, table: Checked[Any], joints: Mapping[str, Joint], names: Names, faults: list[Fault]
-) -> Attachment | None:
+    section: str, name: str, table: Checked[Any], scene: Scene, joints: Mapping[str, Joint], names: Names,
+    faults: list[Fault],
+) -> Attachment | None:  # fmt: skip
     kind: Any = ATTACHED[section]
     entry, key = table.entry, f"{section}.{name}"
     names.check_all(kind, table, key, faults)
     several = kind in (Gear, Actuator)
+    if kind is Actuator and table.sound("joints", "tendon"):
+        _check_target(key, entry, scene, faults)
     if not table.sound("joints", "joint"):
         return None
     tied = entry.joints if several else [entry.joint]
     of = _joints(kind, key, tied, joints, several=several, faults=faults)
     if table.spoiled:
         return None
-    given = attributes(kind, entry, len(tied))
+    given = attributes(kind, entry, len(tied) or 1)
     if several:
-        count = len(tied) - (kind is Gear)
+        count = len(tied) - 1 if kind is Gear else len(tied) or 1
         if kind is Actuator and given["ratio"].size == 1:
             given["ratio"] = frozen(np.full(count, given["ratio"][0]))
         if given["ratio"].size != count:
@@ -55,6 +58,16 @@ def _resolved(
         elif kind is Gear and not entry.stiffness:
             _check_rates(key, given["ratio"].tolist(), of, faults)
     return kind(name=name, **given)
+
+
+def _check_target(key: str, entry: Any, scene: Scene, faults: list[Fault]) -> None:
+    """Faults of what an actuator acts on, joints aside."""
+    known = dict(scene.all_tendons())
+    if bool(entry.joints) == (entry.tendon is not None):
+        faults.append(fault("actuator target", key, "both" if entry.joints else "neither"))
+    elif entry.tendon is not None and entry.tendon not in known:
+        hint = did_you_mean(entry.tendon, known, f"there are: {listing(known)}")
+        faults.append(fault("unknown tendon", f"{key}.tendon", f'"{entry.tendon}"', hint=hint))
 
 
 def _joints(

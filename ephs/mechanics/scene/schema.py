@@ -263,10 +263,9 @@ class GasSpringEntry(Entry):
 class ActuatorEntry(Entry):
     """``[actuators.NAME]``"""
 
-    joints: Annotated[list[Text], Field(min_length=1)] = Field(description="joints with one degree of freedom")
-    ratio: Numbers = Field(
-        default=1.0, description='force on each joint per control, the input "actuators.NAME"; N m, N'
-    )
+    joints: list[Text] = Field(default=[], description="joints with one degree of freedom")
+    tendon: Text | None = Field(default=None, description="instead of joints: a tendon, on whose length it acts")
+    ratio: Numbers = Field(default=1.0, description='force on each by the control, the input "actuators.NAME"; N m, N')
     limits: Range | None = Field(default=None, description="least and largest control")
 
 

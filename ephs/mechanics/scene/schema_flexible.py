@@ -134,10 +134,10 @@ class TendonEntry(Entry):
     points: Annotated[list[Vector], Field(min_length=2)] = Field(
         description="one in each, in its centre-of-mass frame (ground: world), m"
     )
-    mass: NonNegative = Field(default=0.0, description="kg; needed where two tendons lie beside each other")
     stiffness: NonNegative = Field(default=0.0, description="N/m")
     length: NonNegative | None = Field(default=None, description="without force, m; default: as at the start")
-    damping: NonNegative = Field(default=0.0, description="N s/m")
+    damping: NonNegative = Field(default=0.0, description="N s/m; 0 of one with slack")
+    slack: Flag = Field(default=False, description="no elastic force where it is shorter than its length: a cable")
     heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from ephs.mechanics.scene.attached import Attachment
 from ephs.mechanics.scene.element import OUTSIDE, Element
 from ephs.mechanics.scene.errors import ModelWarning, legible
+from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -45,6 +46,7 @@ def check_scene(scene: Scene) -> None:
         "joint": {name for name, _ in scene.all_joints()},
         "surface": {name for name, _ in scene.all_surfaces()},
         "node": {name for name, _ in scene.all_thermal()},
+        "tendon": {name for name, _ in scene.all_tendons()},
     }
     there["end"] = there["body"]
     named = [(kind, name) for _, each in _all(scene) for kind in set(each.names.values()) for name in each.named(kind)]
@@ -102,7 +104,9 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
             case Contact():
                 yield name, {key: (number, ()) for key, number in each.law.numbers}
             case Attachment():
-                yield name, each.values(len(each.tied))
+                yield name, each.values(len(each.tied) or 1)
+            case Tendon():
+                yield name, each.values() | {"points": (each.points, (len(each.bodies), 3))}
             case _:
                 yield name, each.values()
 

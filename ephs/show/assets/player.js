@@ -146,7 +146,7 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
     for (const solid of data.solids) polygons(solid, project, parts);
     for (const spring of data.springs) {
       const [a, b] = spring.ends.map(([body, at]) => project(...mover(body)(...at)));
-      parts.push({ depth: (a[2] + b[2]) / 2, corners: zigzag(a, b), stroke: shade(tinted([70, 76, 84], spring.heat), 1), width: 0 });
+      parts.push({ depth: (a[2] + b[2]) / 2, corners: spring.coiled ? zigzag(a, b) : [a, b], stroke: shade(tinted([70, 76, 84], spring.heat), 1), width: 0 });
     }
     parts.sort((a, b) => a.depth - b.depth);
     for (const part of parts) {

@@ -3,8 +3,13 @@
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import ephs
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.operad import Path
 from tests.mechanics.imports.models import URDF
 
 BODIES = "".join(
@@ -41,7 +46,7 @@ def test_forces_of_actuators_and_tendons_are_mujocos(write):
     with pytest.warns(ephs.ModelWarning) as said:
         scene = ephs.load(path)
     words = str(said[0].message)
-    assert "actuators: muscle, brake, thrust, winch" in words
+    assert "actuators: muscle, brake, thrust, winch" in words  # its sites meet
     assert "activation of: piston" in words
     assert set(scene.actuators) == set(CONTROLS)
 
@@ -74,7 +79,8 @@ ROPES = """<mujoco><option gravity="0 0 -9.81"/><worldbody><site name="top" pos=
     <site site="b"/><site site="a"/><pulley divisor="2"/><site site="a"/><site site="c"/></spatial>
   {more}
 </tendon></mujoco>"""
-MORE = """<spatial name="long" stiffness="5"><site site="top"/><site site="a"/><site site="c"/></spatial>
+MORE = """<spatial name="hoist" stiffness="5"><site site="top"/><site site="a"/><pulley divisor="2"/>
+    <site site="a"/><site site="c"/></spatial>
   <spatial name="round" stiffness="5"><site site="top"/><geom geom="post"/><site site="a"/></spatial>
   <spatial name="slack" springlength="0.1 0.9" stiffness="5"><site site="top"/><site site="c"/></spatial>"""
 
@@ -98,8 +104,48 @@ def test_other_tendons_through_points_are_said_by_name(write):
     text = ROPES.format(more=MORE).replace("<body name=", '<geom name="post" size="0.05"/><body name=', 1)
     with pytest.warns(ephs.ModelWarning) as said:
         ephs.load(write(text, "xml"))
-    assert "tendons: round, long" in str(said[0].message)
+    assert "tendons: round, hoist" in str(said[0].message)
     assert "slack of: slack" in str(said[0].message)
+
+
+LONG = """<spatial name="long" stiffness="25" damping="1.5" springlength="{rest}">
+    <site site="top"/><site site="b"/><site site="a"/><site site="c"/></spatial>
+  <spatial name="back"><site site="top"/><site site="c"/></spatial></tendon>
+<actuator><motor name="winch" tendon="long" gear="-3" ctrlrange="-1 2"/>
+  <position name="servo" tendon="back" kp="12" kv="0.6" gear="1.5"/>
+  <position name="hold" tendon="long" kp="9" kv="0.3" gear="0.5"/>"""
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7), st.sampled_from(["0.7", "0 1.4"]))
+def test_tendons_over_several_bodies_have_mujocos_length_rate_and_forces(tmp_path_factory, drawn, rest):
+    """Accelerations are by ten_J and the forces; a cable that is slack has the force of its damping alone."""
+    path = tmp_path_factory.mktemp("model") / "ropes.xml"
+    text = ROPES.format(more=LONG.format(rest=rest)).replace("</tendon></mujoco>", "</actuator></mujoco>")
+    path.write_text(text)
+    scene = ephs.load(path)
+    cable = " " in rest
+    assert set(scene.tendons) == ({"long", "hold_bias", "back"} | ({"long_damping"} if cable else set()))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = drawn[:2], drawn[2:4], drawn[4:]
+    mujoco.mj_forward(model, data)
+    there = scene.with_state(
+        *(dict(zip(("shoulder", "elbow"), x.tolist(), strict=True)) for x in (data.qpos, data.qvel))
+    )
+    inputs = {f"actuators.{name}": float(data.ctrl[model.actuator(name).id]) for name in ("winch", "servo", "hold")}
+    eq = Equations(problem_of_scene(there, inputs=inputs), 0.0)
+    start = eq.start(0.0)
+    rates = eq.rates(0.0, start.q, eq.vector(start))
+    found = [rates[eq.nv + int(eq.layout.freedoms[name][0])] for name in ("shoulder", "elbow")]
+    assert np.allclose(found, data.qacc, rtol=1e-9, atol=1e-9 * np.abs(data.qacc).max())
+    number, tendon = model.tendon("long").id, there.tendons["long"]
+    states = eq.states(start)
+    at = Path(["tendons", tendon.name, "spring", "q"])
+    assert states[at][0] + tendon.inside == pytest.approx(data.ten_length[number], rel=1e-12)
+    place = eq.reduced.entropies.index(at)
+    moved = eq.rates(0.0, start.q, eq.vector(start))[eq.nv + eq.n + place]
+    assert moved == pytest.approx(data.ten_velocity[number], rel=1e-10, abs=1e-12)
 
 
 def test_a_transmission_is_an_actuator(write):

@@ -6,6 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.rescaled import rescaled
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.operad import Path
 
 STIFFNESS, DAMPING, LENGTH = 100.0, 2.0, 1.5
 ARM = """
@@ -82,16 +87,17 @@ angle = st.floats(-1.2, 1.2)
 def test_forces_are_tension_times_the_gradient_of_the_length(tmp_path_factory, a, b, rate_a, rate_b, pull):
     folder = tmp_path_factory.mktemp("scene")
     state = (a, b, rate_a, rate_b)
-    bare = ephs.dynamics(loaded(folder, "", state))
-    tied = ephs.dynamics(loaded(folder, CABLE, state))
+    bare, tied = ephs.dynamics(loaded(folder, "", state)), loaded(folder, CABLE, state)
     step = 1e-20j
     gradient = np.array([length(a + step, b).imag, length(a, b + step).imag]) / 1e-20
     tension = STIFFNESS * (length(a, b) - LENGTH) + DAMPING * (gradient @ [rate_a, rate_b]) + pull
     forces = dict(zip(("pin", "elbow"), (-tension * gradient).tolist(), strict=True))
     exact = bare.acceleration(bare.state0, forces)
-    found = tied.acceleration(tied.state0, {"cable-1": -pull, "cable-2": -pull})
+    eq = Equations(problem_of_scene(tied, inputs={"actuators.cable": pull}), 0.0)
+    start = eq.start(0.0)
+    found = eq.rates(0.0, start.q, eq.vector(start))[eq.nv :]
     for joint, value in exact.items():
-        assert np.allclose(found[joint], value, rtol=1e-9, atol=1e-8)
+        assert np.allclose(found[eq.layout.freedoms[joint]], value, rtol=1e-9, atol=1e-8)
 
 
 def ended(scene, method, inputs=None, **options):
@@ -134,23 +140,88 @@ def test_between_two_points_it_is_a_spring(tmp_path):
         (('"hand"]\npoints', '"hnad"]\npoints'), r"tendons.cable.bodies\[3\]", "hand"),
         ((", [0.4, 0.2, 0.05]]", "]"), "tendons.cable.points", "4 points, one in each"),
         (('["ground", "arm", "arm", "hand"]', '["arm", "arm", "arm", "arm"]'), "tendons.cable.bodies", "different"),
-        ((f"stiffness = {STIFFNESS}", "stiffness = 0.0"), "tendons.cable.damping", "0 without stiffness"),
+        (("[0.2, 0.1, 0.1]", "[-0.5, 0.0, 0.4]"), r"tendons.cable.points\[1\]", "two different points"),
+        (("damping", "slack = true\ndamping"), "tendons.cable.damping", "0 of a tendon with slack"),
         (("[tendons.cable]", '[actuators.cable]\njoints = ["pin"]\n[tendons.cable]'), "actuators.cable", "tendon"),
+        (("[tendons.cable]", '[actuators.winch]\ntendon = "cabel"\n[tendons.cable]'), "winch.tendon", '"cable"'),
+        (("[tendons.cable]", "[actuators.winch]\n[tendons.cable]"), "actuators.winch", "either joints or a tendon"),
     ],
 )
 def test_what_is_no_tendon_is_said(tmp_path, change, key, expected):
     with pytest.raises(ephs.SceneError, match=key) as caught:
-        loaded(tmp_path, CABLE.replace(*change))
+        loaded(tmp_path, CABLE.replace(*change), (0.0, 0.0, 0.0, 0.0))
     assert expected in str(caught.value)
 
 
 @pytest.mark.parametrize("method", ["rk87", "radau", "natural"])
-def test_antagonists_beside_each_other_have_mass(tmp_path, method):
-    pair = (STAY + STAY.partition("[thermal")[0].replace("stay", "other").replace("0.1, 0.4]", "-0.1, -0.4]")).replace(
-        "damping", "mass = 1e-3\ndamping"
-    )
+def test_antagonists_lie_beside_each_other(tmp_path, method):
+    pair = STAY + STAY.partition("[thermal")[0].replace("stay", "other").replace("0.1, 0.4]", "-0.1, -0.4]")
     steps = {"step": 2e-3} if method == "natural" else {"rtol": 1e-8}
     pulled = {"actuators.other": 20.0}
     still, sol = (ended(loaded(tmp_path, pair), method, given, **steps) for given in ({}, pulled))
     assert sol[1].energy_error.max() < 1e-11
     assert sol[0][0] > still[0][0] + 1e-3
+
+
+def test_an_actuator_pulls_at_a_tendon_by_its_ratio_within_its_limits(tmp_path):
+    winch = '[actuators.winch]\ntendon = "cable"\nratio = -2.0\nlimits = [0.0, 3.0]\n'
+    scene = loaded(tmp_path, CABLE + winch)
+    one, other = (ended(scene, "rk87", given)[0] for given in ({"actuators.winch": 5.0}, {"actuators.cable": 6.0}))
+    assert np.allclose(one, other, rtol=0.0, atol=1e-12)
+    assert not np.allclose(one, ended(scene, "rk87")[0], atol=1e-3)
+
+
+def test_documents_parts_and_units_keep_tendons(tmp_path):
+    scene = loaded(tmp_path, CABLE)
+    text = scene_to_text(scene)
+    assert scene_to_text(scene_from_text(text)) == text
+    (tmp_path / "two.toml").write_text('format = 1\n[parts.left]\nuse = "reach.toml"\nposition = [0.3, 0.2, 0.0]\n')
+    part = ephs.load(tmp_path / "two.toml")
+    (angles, _), sol = ended(scene, "rk87"), ephs.simulate(part, 0.3, method="rk87", audit="off")
+    assert sol.joint("left.pin").coordinate[-1, 0] == pytest.approx(angles[0], abs=1e-6)
+    pulled = ephs.simulate(part, 0.3, method="rk87", inputs={"actuators.left.cable": 9.0}, audit="off")
+    assert ended(scene, "rk87", {"actuators.cable": 9.0})[0][0] == pytest.approx(
+        pulled.joint("left.pin").coordinate[-1, 0], abs=1e-6
+    )
+
+
+def test_a_tiny_mechanism_does_as_a_large_one(tmp_path):
+    scene = loaded(tmp_path, CABLE)
+    tiny = rescaled(scene, 1e-5, 1e-12, 1e-3)  # by whose actuators one control is as much
+    one = ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
+    other = ephs.simulate(tiny, 3e-4, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
+    for name in ("pin", "elbow"):
+        assert other.joint(name).coordinate[-1] == pytest.approx(one.joint(name).coordinate[-1], abs=1e-8)
+    at = "tendons.cable.spring.q"
+    assert 1e5 * other[at].ravel()[-1] == pytest.approx(one[at].ravel()[-1], rel=1e-8)
+
+
+def test_the_length_is_a_state_where_it_stores_energy(tmp_path):
+    sol = ended(loaded(tmp_path, CABLE), "rk87", rtol=1e-11, atol=1e-12)[1]
+    whole = sol["tendons.cable.spring.q"].ravel() + np.sqrt(0.05)  # with what lies along the arm
+    assert whole[0] == pytest.approx(length(0.2, -0.4), rel=1e-14)
+    angles = (sol.joint(name).coordinate[-1, 0] for name in ("pin", "elbow"))
+    assert whole[-1] == pytest.approx(length(*angles), rel=1e-10)
+
+
+def test_at_rest_tension_balances_weight(tmp_path):
+    """Forces are weights and k (ℓ − L) times the gradients of heights and length, by complex steps."""
+    found = ephs.equilibrium(loaded(tmp_path, CABLE))
+    angles = np.array([found.model.joint(name).coordinate[0] for name in ("pin", "elbow")])
+
+    def energy(a, b):
+        heights = -0.5 * np.sin(a), -np.sin(a) - 0.5 * np.sin(a + b)
+        return 9.81 * (heights[0] + 0.5 * heights[1]) + 0.5 * STIFFNESS * (length(a, b) - LENGTH) ** 2
+
+    slopes = [energy(*(angles + step)).imag / 1e-20 for step in 1e-20j * np.eye(2)]
+    assert np.abs(slopes).max() < 1e-9 * STIFFNESS
+    assert found.states[Path.of("tendons.cable.spring.q")][0] + np.sqrt(0.05) == pytest.approx(
+        length(*angles), rel=1e-12
+    )
+    still = ephs.simulate(found.model, 0.1, method="rk87", audit="off")
+    assert np.abs(still.joint("pin").coordinate[-1] - angles[0]) < 1e-9
+
+
+def test_loads_beside_sprung_tendons_have_no_static_path(tmp_path):
+    with pytest.raises(ValueError, match=r"tendons\.cable and loads"):
+        ephs.equilibrium(loaded(tmp_path, CABLE + '[loads.push]\nbody = "hand"\nforce = [0.0, 0.0, 1.0]\n'))

@@ -27,8 +27,8 @@ class Layout:
     Parameters
     ----------
     joints
-        Names of all joints, those of the tree first, in the order of the vectors. A body, or a group of bodies, that
-        no joint holds moves with a free joint of its (first) body's name.
+        Names of all joints but spans, those of the tree first, in the order of the vectors. A body, or a group of
+        bodies, that no joint holds moves with a free joint of its (first) body's name.
     freedoms
         Joint -> (d,) places of its degrees of freedom: in vectors of the tree's n degrees of freedom where below n, and
         from there on those of cut joints.
@@ -66,7 +66,7 @@ class Layout:
         taken = {edge.name for edge in reduced.edges if edge.name}
         edges: dict[str, list[tuple[int, Edge]]] = {}
         for i, edge in enumerate(reduced.edges):
-            if t.kind[i] != SPRING:
+            if t.kind[i] != SPRING and i not in reduced.spans:
                 edges.setdefault(edge.name or _free_name(reduced, i, taken), []).append((i, edge))
         for parts in edges.values():
             parts.sort(key=lambda part: part[1].freedoms.start)
@@ -86,9 +86,8 @@ class Layout:
             MappingProxyType(
                 {
                     edge.state: slice(int(t.q_at[i]), int(t.q_at[i] + t.q_size[i]))
-                    for parts in edges.values()
-                    for i, edge in parts
-                    if edge.path is not None and edge.state is not None
+                    for i, edge in enumerate(reduced.edges)
+                    if t.kind[i] != SPRING and edge.path is not None and edge.state is not None
                 }
             ),
             reduced.coordinates,

@@ -39,6 +39,8 @@ class Reduced:
     ----------
     edges
         Tree joints in walking order, each of which leads to the link of its number; cut joints; springs.
+    spans
+        Edges among the cut joints that hold nothing: relative poses that something attached reads.
     bodies
         Link -> name of the body, None for a frame without one, as inside a universal joint.
     places
@@ -63,6 +65,7 @@ class Reduced:
 
     tables: Mechanism
     edges: tuple[Edge, ...]
+    spans: frozenset[int]
     bodies: tuple[str | None, ...]
     places: tuple[Link, ...]
     entropies: tuple[Path, ...]
@@ -141,6 +144,7 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     for one, edge in zip(parts.network.inertias, inertial, strict=True):
         if any(edge is other for other in cut):
             raise Unplaced(model.descriptor.components[one.component].path, "is inertia of a joint that closes a loop")
+    cut += parts.spans
     over = [edge.name for edge in cut if edge.motion is not None]
     if over:  # prescribed joints are cut last: only a loop of nothing else is left over
         found = f"that of {', '.join(over)}, which closes a loop of prescribed joints"
@@ -161,8 +165,10 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     stored = (*parts.entropies, *(state.path for state in parts.network.states))
     attaching = attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference)
     unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum()) + len(attaching.ties)
+    count = len(tree) + len(cut)
+    spans = frozenset(range(count - len(parts.spans), count))
     return Reduced(
-        mechanism, edges, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
+        mechanism, edges, spans, names, tuple(links), stored, made, _nodes(model, parts), unknowns,
         tuple(twists), parts.gravity, acting,
         attaching,
     )  # fmt: skip

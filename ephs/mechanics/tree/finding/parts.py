@@ -52,6 +52,8 @@ class Parts:
         (3,) in m/s², of all links with a mass.
     joints, forces
         Edges that may carry a link, and those that only act between frames.
+    spans
+        Joints that hold nothing and carry no link: relative poses that something attached reads.
     entropies
         State -> component that stores it, of heat that is booked as energy.
     conduction
@@ -68,6 +70,7 @@ class Parts:
     gravity: Array
     joints: tuple[Edge, ...]
     forces: tuple[Edge, ...]
+    spans: tuple[Edge, ...]
     entropies: dict[Path, int]
     conduction: tuple[tuple[int, int, int], ...]
     acting: tuple[Acting, ...]
@@ -110,13 +113,15 @@ class _Reader:
         names = tuple(None if link.path is None else self._name(link.path) for link in links)
         joints: list[Edge] = []
         forces: list[Edge] = []
+        spans: list[Edge] = []
         taken: dict[str, int] = {}
         edges = {joint.rate: self._edge(joint, taken) for joint in self.found.joints}
         potentials, drags, conduction = self._weights(), list(self._drags()), tuple(self._conduction())
         network = self._network()
         attached = {junction: edges[junction] for junction, _ in network.rates}
         for joint in self.found.joints:
-            (forces if self._is_force(joint) and joint.rate not in attached else joints).append(edges[joint.rate])
+            of = joints if self._carries(joint, joint.rate in attached) else spans if joint.rate in attached else forces
+            of.append(edges[joint.rate])
         held = {body for edge in joints for body in (edge.body1, edge.body2)}
         joints += [self._free(i, str(names[i])) for i in range(len(links)) if i not in held]
         for group in islands(len(links), joints):  # those that nothing ties to the ground move with their first one
@@ -125,8 +130,8 @@ class _Reader:
         forces += [*self._potentials(weights), *drags]
         acting = tuple(self._acting())
         return Parts(
-            links, names, tuple(weights), gravity, tuple(joints), tuple(forces), self.entropies, conduction, acting,
-            network, attached,
+            links, names, tuple(weights), gravity, tuple(joints), tuple(forces), tuple(spans), self.entropies,
+            conduction, acting, network, attached,
         )  # fmt: skip
 
     # ---- attachments -------------------------------------------------------------------------------------------
@@ -207,10 +212,13 @@ class _Reader:
             raise Unplaced(port, "prescribes a rate by a function without derivative; a motion law has one")
         return PolynomialMotion((float(np.atleast_1d(signal.value)[0]),))
 
-    def _is_force(self, joint: LinkJoint) -> bool:
-        """Whether a joint is a force between two frames, which carries neither."""
-        energy = self.wiring.components[joint.potential].primitive
-        return joint.pair == FREE and energy.name not in OF_COORDINATES and joint.rate not in self.wiring.outer
+    def _carries(self, joint: LinkJoint, attached: bool) -> bool:
+        """Whether a joint may lead to a link: a free one does where neither a force between its frames belongs to it
+        nor, where it has no energy, anything that is attached.
+        """
+        energy = self.wiring.components[joint.potential].primitive.name
+        kept = OF_COORDINATES[attached:]
+        return joint.pair != FREE or energy in kept or joint.rate in self.wiring.outer
 
     def _free(self, link: int, name: str) -> Edge:
         """The free joint of a link that nothing else ties to the ground."""

@@ -184,12 +184,13 @@ class Net:
 
     # ---- sums --------------------------------------------------------------------------------------------------
 
-    def _sum(self, on: Evaluator, row: Integer, z: Vector) -> Real:
-        """A row of N, or of flows by efforts, times z."""
+    def _sum(self, on: Evaluator, row: Integer, z: Vector, *, sizes: bool = False) -> Real:
+        """A row of N, or of flows by efforts, times z; or the sum of the terms' sizes."""
         total, first = on.variable(0.0), self.row[3 * row]
 
         def add(k: Integer) -> None:
-            total.value = total.value + self.weight[first + k] * z[self.term[first + k]]
+            term = self.weight[first + k] * z[self.term[first + k]]
+            total.value = total.value + (on.absolute(term) if sizes else term)
 
         on.loop(self.row[3 * row + 1], add)
         return total.value
@@ -289,8 +290,8 @@ class Net:
         self._across(on, self.effort, self.flow)
 
         def inject(k: Integer) -> None:
-            flow = self.given[self.head[2] + k]
-            self.gross[k] = on.absolute(self.flow[k]) + on.absolute(flow)
+            flow, row = self.given[self.head[2] + k], self.row.size // 3 - size + k
+            self.gross[k] = self._sum(on, row, self.effort, sizes=True) + on.absolute(flow)
             self.flow[k] = self.flow[k] - flow
 
         def one(it: Called) -> None:

@@ -1,0 +1,32 @@
+"""What runs straight from point to point of bodies: springs, and the segments of tendons."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, final
+
+from ephs.show.motion import Array
+
+__all__ = ["Line", "lines_of"]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """From a point (3,) of one body to one of another, each in its body's frame; drawn as a coil, or straight."""
+
+    body1: str
+    body2: str
+    at1: Array
+    at2: Array
+    heat: str
+    coiled: bool
+
+
+def lines_of(scene: Any) -> dict[str, Line]:
+    """The springs of a scene, and the segments NAME-1, NAME-2, … of its tendons."""
+    found = {name: Line(s.body1, s.body2, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
+    for name, tendon in scene.all_tendons():
+        ends = pairwise(zip(tendon.bodies, tendon.points, strict=True))
+        for k, ((one, here), (two, there)) in enumerate(ends, 1):
+            found[f"{name}-{k}"] = Line(one, two, here, there, tendon.heat, coiled=False)
+    return found
