@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.operad import Path
@@ -225,3 +226,13 @@ def test_at_rest_tension_balances_weight(tmp_path):
 def test_loads_beside_sprung_tendons_have_no_static_path(tmp_path):
     with pytest.raises(ValueError, match=r"tendons\.cable and loads"):
         ephs.equilibrium(loaded(tmp_path, CABLE + '[loads.push]\nbody = "hand"\nforce = [0.0, 0.0, 1.0]\n'))
+
+
+@pytest.mark.parametrize(("key", "value"), [("stiffness", STIFFNESS), ("damping", DAMPING), ("length", LENGTH)])
+def test_sensitivities_to_its_numbers_are_exact(tmp_path, key, value):
+    scene, path = loaded(tmp_path, CABLE), f"tendons.cable.{key}"
+    found = ephs.sensitivity(scene, [path], 0.3, method="rk87", rtol=1e-11, atol=1e-12, save_at=[0.0, 0.3])
+    slope = found.of(lambda sol: sol.joint("pin").coordinate[:, 0])[-1, 0]
+    step = 1e-3 * value
+    ends = [ended(varied(scene, {path: value + by}), "rk87", rtol=1e-11, atol=1e-12)[0][0] for by in (step, -step)]
+    assert slope == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5)

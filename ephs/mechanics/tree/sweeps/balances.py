@@ -85,6 +85,20 @@ def _newton(on: Evaluator, net: Net, evaluate: Callable[[], None], status: Any) 
     known, unknown = net.known, net.head[4]
     before, rounds = on.variable(1e300), on.counter(0)
 
+    def step() -> None:
+        _factorise(on, net, status)
+
+        def less(k: Integer) -> None:
+            net.step[k] = -net.flow[known + k]
+
+        on.loop(unknown, less)
+        lu_solve(on, net.matrix, net.pivot, net.step)
+
+        def move(k: Integer) -> None:
+            net.effort[known + k] = net.effort[known + k] + net.step[k]
+
+        on.loop(unknown, move)
+
     def once() -> Truth:
         evaluate()
         worst = on.variable(0.0)
@@ -103,25 +117,16 @@ def _newton(on: Evaluator, net: Net, evaluate: Callable[[], None], status: Any) 
         astray = on.both(on.negate(left), rounds.value >= ROUNDS)
         net.failed(on, status, on.select(astray, UNSOLVED, 0), net.head[6])
         before.value = worst.value
-
-        def step() -> None:
-            _factorise(on, net, status)
-
-            def less(k: Integer) -> None:
-                net.step[k] = -net.flow[known + k]
-
-            on.loop(unknown, less)
-            lu_solve(on, net.matrix, net.pivot, net.step)
-
-            def move(k: Integer) -> None:
-                net.effort[known + k] = net.effort[known + k] + net.step[k]
-
-            on.loop(unknown, move)
-
         on.when(on.negate(on.either(left, astray)), step)
         return on.either(left, on.negate(on.same(status.value, 0)))
 
+    def again() -> None:
+        step()
+        evaluate()
+
     on.repeat(once)
+    # Slopes of components have no derivatives of their own: those of efforts are right one step after the efforts.
+    on.when(on.same(status.value, 0), again)
 
 
 def _factorise(on: Evaluator, net: Net, status: Any) -> None:
