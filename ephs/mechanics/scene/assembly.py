@@ -8,7 +8,8 @@ unless the scene is adjusted.
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TypeAlias
+from dataclasses import fields
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,27 +187,11 @@ def _link(draft: JointDraft, index: Mapping[str, int], poses: Array) -> Link:
 
 
 def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
-    return Joint(
-        name=draft.name,
-        kind=draft.kind,
-        body1=draft.body1,
-        body2=draft.body2,
-        frame1=frozen(link.frame1),
-        frame2=frozen(link.frame2),
-        pitch=draft.pitch,
-        friction=frozen(draft.friction),
-        dry=draft.dry,
-        stiffness=frozen(draft.stiffness),
-        rest=frozen(draft.rest),
-        heat=draft.heat,
-        drive=frozen(draft.drive),
-        motion=draft.motion,
-        coordinate=frozen(x),
-        rate=frozen(rate),
-        middle=None if draft.place.middle is None else frozen(draft.place.middle),
-        strain=draft.strain,
-        armature=draft.armature,
-    )
+    same = {each.name for each in fields(Joint)} & {each.name for each in fields(JointDraft)} - {"rate"}
+    given: dict[str, Any] = {name: getattr(draft, name) for name in same}
+    given |= {"frame1": link.frame1, "frame2": link.frame2, "coordinate": x, "rate": rate, "middle": draft.place.middle}
+    given = {name: frozen(value) if isinstance(value, np.ndarray) else value for name, value in given.items()}
+    return Joint(**given)
 
 
 def gyration(bodies: Iterable[tuple[float, Array]]) -> float:

@@ -4,8 +4,9 @@ Reading and writing, checks of files, other units, parameters by path and names 
 """
 
 from abc import ABC
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Final, Self, final
 
 import numpy as np
@@ -92,7 +93,8 @@ class Number:
             return ()
         return (coordinates - self.each if self.each >= 0 else self.count,) * (2 if self.square else 1)
 
-    def unit(self, length: float, mass: float, time: float, coordinates: Sequence[float]) -> Any:
+    @lru_cache(maxsize=1024)  # noqa: B019 - all of these are class attributes
+    def unit(self, length: float, mass: float, time: float, coordinates: tuple[float, ...]) -> Any:
         """Its unit, of those of length, mass and time, and of coordinates."""
         energy = mass * length**2 / time**2
         whole = energy**self.energy * time**self.time
@@ -119,7 +121,7 @@ class Measured(ABC):  # noqa: B024 - what differs are values
         given = {key: (getattr(self, key), number.shape(coordinates)) for key, number in self.numbers.items()}
         return {key: pair for key, pair in given.items() if pair[0] is not None}
 
-    def rescaled(self, length: float, mass: float, time: float, coordinates: Sequence[float] = ()) -> Self:
+    def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         """The same in other units; ``coordinates`` are those of its coordinates, or of its joints'."""
         changed: dict[str, Any] = {}
         for key, (value, _) in self.values().items():
@@ -150,6 +152,8 @@ class Element(Measured):
         """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
         if not path:
             return self
+        if not self.names:
+            return replace(self, name=path + self.name)  # pyright: ignore[reportArgumentType] - all are dataclasses
 
         def dotted(name: str, kind: str) -> str:
             return name if name in OUTSIDE[kind] else path + name

@@ -29,8 +29,8 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
                 return _joint(x, *units)
             case Attachment():
                 of = map(scene.joint, x.tied)
-                tied = [float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of]
-                return x.rescaled(*units, tied or [length])
+                tied = tuple(float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of)
+                return x.rescaled(*units, tied or (length,))
             case Tendon():
                 return replace(x.rescaled(*units), points=frozen(x.points * length))
             case Surface():
@@ -53,7 +53,7 @@ def _joint(j: Joint, length: float, mass: float, time: float) -> Joint:
     inertia = mass * length**2
     force = inertia / time**2 / unit
     return replace(
-        j.rescaled(length, mass, time, unit.tolist()),
+        j.rescaled(length, mass, time, tuple(unit.tolist())),
         motion=None if j.motion is None else j.motion.rescaled(float(unit[0]), time),
         coordinate=frozen(j.coordinate * element_units(j.coordinate.size, unit, length)),
         limits=None if j.limits is None else frozen(j.limits * unit[0]),
