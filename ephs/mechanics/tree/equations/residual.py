@@ -1,13 +1,12 @@
 """The dense equations of one mechanism: tables and memory of the staged program, and its functions on NumPy arrays."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.mechanics.tree.engine.build import whole_tables
-from ephs.mechanics.tree.engine.links import Frames, links_of
-from ephs.mechanics.tree.engine.tables import Forces
+from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.attached import Attached
 from ephs.mechanics.tree.equations.laws import Laws
 from ephs.mechanics.tree.equations.slopes import Slopes
@@ -16,54 +15,16 @@ from ephs.mechanics.tree.finding.tables import CUT
 from ephs.mechanics.tree.sweeps.charts import TIE
 from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
-from ephs.mechanics.tree.sweeps.pack import STANDARD, Packed, packed
+from ephs.mechanics.tree.sweeps.pack import STANDARD, packed
 from ephs.mechanics.tree.sweeps.programs import PLACE
-from ephs.mechanics.tree.sweeps.residuals import Residuals, residuals
+from ephs.mechanics.tree.sweeps.residuals import residuals
 from ephs.semantics.bundle import Array
-from ephs.semantics.kept import once
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
-from ephs.solve.sparse import Index
 
 __all__ = ["Residual"]
 
 ALL: Final = kinds_of((joint.code, joint.size, joint.dim) for joint in STANDARD)
 """Kinds of groups that the program of all mechanisms has."""
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class _Plan:
-    """The shared part of residuals: all but inputs and memory."""
-
-    bodies: Frames
-    ground: Array
-    tree: Packed
-    chart: Index
-    cut: Index
-    numbers: Array
-    forces: Forces
-    edge: Index
-    program: Residuals
-
-
-def _plan(reduced: Reduced, gravity: Array) -> _Plan:
-    t, found = reduced.tables, links_of(reduced)
-    ground = quaternion_to_matrix(found.ground[:4])
-    parts = [
-        replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
-    ]
-    usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
-    tree = packed(parts, ground @ gravity, planar=False, among=STANDARD if usual else ())
-    chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
-    moving = np.flatnonzero(t.dim)
-    heat = np.where(forces.part[:, 1] >= 0, forces.part[:, 2], -1)
-    edge = np.column_stack(
-        [forces.edge[:, :3], t.code[moving], t.dim[moving], t.q_size[moving], forces.edge[:, [4, 6]],
-         forces.part[:, :2], heat]
-    ).astype(np.int64)  # fmt: skip
-    kinds = kinds_of([*edge[:, [3, 5, 4]].tolist(), *cut[:, [2, 5, 3]].tolist()])
-    program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
-    return _Plan(found.bodies, ground, tree, chart, cut, numbers, forces, edge.ravel(), program)
 
 
 @final
@@ -92,10 +53,24 @@ class Residual:
     """
 
     def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
-        plan, t = once(reduced, ("residual", gravity.tobytes()), lambda: _plan(reduced, gravity)), reduced.tables
-        tree, cut, forces = plan.tree, plan.cut, plan.forces
-        self._bodies, self._ground, self.program = plan.bodies, plan.ground, plan.program
-        self.laws = Laws(forces, plan.edge, len(reduced.made), scal)
+        t, found = reduced.tables, links_of(reduced)
+        self._bodies, self._ground = found.bodies, quaternion_to_matrix(found.ground[:4])
+        parts = [
+            replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
+        ]
+        usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
+        tree = packed(parts, self._ground @ gravity, planar=False, among=STANDARD if usual else ())
+        chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
+        moving = np.flatnonzero(t.dim)
+        friction = forces.part[:, 1]
+        heat = np.where(friction >= 0, forces.part[:, 2], -1)
+        edge = np.column_stack(
+            [forces.edge[:, :3], t.code[moving], t.dim[moving], t.q_size[moving], forces.edge[:, [4, 6]],
+             forces.part[:, :2], heat]
+        ).astype(np.int64)  # fmt: skip
+        kinds = kinds_of([*edge[:, [3, 5, 4]].tolist(), *cut[:, [2, 5, 3]].tolist()])
+        self.program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
+        self.laws = Laws(forces, edge.ravel(), len(reduced.made), scal)
         self.attached = Attached(reduced, scal, supply)
         self.counts: list[int] = [*cut[cut[:, 2] != TIE, 8].tolist(), *[1] * len(reduced.attaching.ties)]
         self.n, self.m, self.ns = reduced.freedoms, sum(self.counts), t.node.size
@@ -105,14 +80,13 @@ class Residual:
         self.cut_rates = slice(self.rows.stop, self.rows.stop + c)
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
         self.entropy_rates = slice(self.cut_changes.stop, self.cut_changes.stop + self.ns)
-        n, m, ends, bodies = self.n, self.m, 2 * int(cut[:, 8].sum()), plan.bodies
+        n, m, ends, bodies = self.n, self.m, 2 * int(cut[:, 8].sum()), found.bodies
         self.arrays: dict[str, Any] = {
             "integers": tree.integers, "reals": tree.reals, "gravity": tree.gravity,
             "memory": np.zeros((tree.size + 1) * self.program.width), "cut": cut.ravel(),
-            "cut_numbers": plan.numbers.ravel(), "chart": plan.chart.ravel(),
-            "places": np.zeros((tree.size + 1, PLACE)), "end": np.arange(ends),
-            "motions": np.zeros((len(cut), Relative.real_width)),
-            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": plan.edge,
+            "cut_numbers": numbers.ravel(), "chart": chart.ravel(), "places": np.zeros((tree.size + 1, PLACE)),
+            "motions": np.zeros((len(cut), Relative.real_width)), "end": np.arange(ends),
+            "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": edge.ravel(),
             "edge_numbers": np.hstack([forces.frame, forces.left]).ravel(), "law": self.laws.law,
             "body": np.array(bodies.link, dtype=np.int64), "body_frame": _frames(bodies.inside),
             "warming": self.laws.warming, "passage": np.ascontiguousarray(t.conduction[:, 1:]).ravel(),
