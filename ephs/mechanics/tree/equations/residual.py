@@ -1,14 +1,12 @@
 """The dense equations of one mechanism: tables and memory of the staged program, and its functions on NumPy arrays."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.mechanics.tree.engine.build import whole_tables
-from ephs.mechanics.tree.engine.links import Frames, links_of
-from ephs.mechanics.tree.engine.tables import Forces
+from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.attached import Attached
 from ephs.mechanics.tree.equations.laws import Laws
 from ephs.mechanics.tree.equations.slopes import Slopes
@@ -17,50 +15,16 @@ from ephs.mechanics.tree.finding.tables import CUT
 from ephs.mechanics.tree.sweeps.charts import TIE
 from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
-from ephs.mechanics.tree.sweeps.pack import STANDARD, Packed, packed
+from ephs.mechanics.tree.sweeps.pack import STANDARD, packed
 from ephs.mechanics.tree.sweeps.programs import PLACE
-from ephs.mechanics.tree.sweeps.residuals import Residuals, residuals
+from ephs.mechanics.tree.sweeps.residuals import residuals
 from ephs.semantics.bundle import Array
-from ephs.semantics.kept import once
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
-from ephs.solve.sparse import Index
 
 __all__ = ["Residual"]
 
 ALL: Final = kinds_of((joint.code, joint.size, joint.dim) for joint in STANDARD)
 """Kinds of groups that the program of all mechanisms has."""
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class _Plan:
-    """The shared part of residuals: all but inputs and memory."""
-
-    bodies: Frames
-    ground: Array
-    tree: Packed
-    chart: Index
-    cut: Index
-    numbers: Array
-    forces: Forces
-    tables: Mapping[str, Any]
-    code: Index
-    program: Residuals
-
-
-def _plan(reduced: Reduced, gravity: Array) -> _Plan:
-    t, found = reduced.tables, links_of(reduced)
-    ground = quaternion_to_matrix(found.ground[:4])
-    parts = [
-        replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
-    ]
-    usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
-    tree = packed(parts, ground @ gravity, planar=False, among=STANDARD if usual else ())
-    chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
-    tables, code = forces.tables(), t.code[np.flatnonzero(t.dim)].astype(np.int64)
-    kinds = kinds_of([*np.column_stack([code, forces.edge[:, [5, 3]]]).tolist(), *cut[:, [2, 5, 3]].tolist()])
-    program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
-    return _Plan(found.bodies, ground, tree, chart, cut, numbers, forces, tables, code, program)
 
 
 @final
@@ -89,9 +53,17 @@ class Residual:
     """
 
     def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
-        plan, t = once(reduced, ("residual", gravity.tobytes()), lambda: _plan(reduced, gravity)), reduced.tables
-        tree, cut, forces, tables = plan.tree, plan.cut, plan.forces, plan.tables
-        self._bodies, self._ground, self.program = plan.bodies, plan.ground, plan.program
+        t, found = reduced.tables, links_of(reduced)
+        self._bodies, self._ground = found.bodies, quaternion_to_matrix(found.ground[:4])
+        parts = [
+            replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
+        ]
+        usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
+        tree = packed(parts, self._ground @ gravity, planar=False, among=STANDARD if usual else ())
+        chart, cut, numbers, forces = whole_tables(reduced, found.bodies, found.ground)
+        tables, code = forces.tables(), t.code[np.flatnonzero(t.dim)].astype(np.int64)
+        kinds = kinds_of([*np.column_stack([code, forces.edge[:, [5, 3]]]).tolist(), *cut[:, [2, 5, 3]].tolist()])
+        self.program = residuals(tree.kind, tuple(sorted({*kinds, *(ALL if usual else ())})))
         self.laws = Laws(forces, len(reduced.made), scal)
         self.attached = Attached(reduced, scal, supply)
         self.counts: list[int] = [*cut[cut[:, 2] != TIE, 8].tolist(), *[1] * len(reduced.attaching.ties)]
@@ -106,11 +78,10 @@ class Residual:
         self.arrays: dict[str, Any] = {
             "integers": tree.integers, "reals": tree.reals, "gravity": tree.gravity,
             "memory": np.zeros((tree.size + 1) * self.program.width), "cut": cut.ravel(),
-            "cut_numbers": plan.numbers.ravel(), "chart": plan.chart.ravel(),
-            "places": np.zeros((tree.size + 1, PLACE)), "end": np.arange(ends),
-            "motions": np.zeros((len(cut), Relative.real_width)),
+            "cut_numbers": numbers.ravel(), "chart": chart.ravel(), "places": np.zeros((tree.size + 1, PLACE)),
+            "motions": np.zeros((len(cut), Relative.real_width)), "end": np.arange(ends),
             "value": np.zeros((m, 4)), "covector": np.zeros((ends, 6)), "edge": tables["acting"],
-            "code": plan.code, "law": self.laws.law, "body": tables["body"], "warming": self.laws.warming,
+            "code": code, "law": self.laws.law, "body": tables["body"], "warming": self.laws.warming,
             "passage": tables["conduction"],
             "flow": self.laws.flow, "tie": self.attached.tie, "tied": self.attached.tied,
             "beyond": np.zeros(len(self.attached.tied)), "pulls": np.zeros(self.nv),
