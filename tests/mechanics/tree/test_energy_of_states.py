@@ -14,6 +14,8 @@ from ephs.operad import quantity
 from ephs.semantics.primitives import power_ports
 from ephs.semantics.structures import constant_structure, quadratic
 from examples import physics
+from tests.semantics.test_chemistry import R, Species, vessel
+from tests.semantics.test_chemistry import start as filled
 
 KEEP = {"alpha": {"keep": "energy"}, "variational": {"keep": "energy"}}
 EVERY = [name for name, method in METHODS.items() if method.scenes]
@@ -120,3 +122,19 @@ def test_a_circuit_beside_a_mechanism_at_rest_keeps_its_energy(method, tmp_path)
     sol = ephs.simulate(system, 5.0, initial=start, method=method, audit="off", **pace)
     assert sol.energy_error.max() <= 1e-12
     assert "energy" not in [finding.law for finding in sol.audit.findings]
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "gauss4", "ida"])
+def test_a_reaction_keeps_energy_and_atoms(method):
+    """2 A = B, with heat, in a vessel: amounts move along the reaction."""
+    parts = (
+        Species("A", {"X": 1}, entropy=R, capacity=20.0),
+        Species("B", {"X": 2}, energy=-4e3, entropy=30.0, capacity=45.0),
+    )
+    system = vessel(parts, k=5e-3, activation=1e3)
+    pace = {"step": 0.02} if method == "gauss4" else {"rtol": 1e-5, "atol": 1e-5}
+    start = filled(parts, 350.0, 0.02, A=1.0, B=0.1)
+    sol = ephs.simulate(system, 5.0, initial=start, method=method, audit="fail", **pace)
+    assert sol.energy_error.max() <= 1e-12
+    atoms = np.ravel(sol["mixture.A"]) + 2.0 * np.ravel(sol["mixture.B"])
+    assert np.abs(atoms - 1.2).max() <= 8.0 * len(sol) * np.finfo(float).eps * 1.2
