@@ -10,11 +10,15 @@ ROUNDING = 1e-13
 """Of sums of energies relative to the gross ones: ten times the rounding of a hundred steps."""
 
 
-@pytest.mark.parametrize("name", [name for name in laws.METHODS if name not in ("alpha", "variational", "ida")])
-def test_circuits_at_a_mechanism_keep_both_laws(name):
-    row = laws.measure(CELLS["circuit"], laws.METHODS[name])
+@pytest.mark.parametrize("cell", ["motor", "LC", "RLC", "fluid", "gases"])
+@pytest.mark.parametrize("name", [name for name in laws.METHODS if name not in ("alpha", "variational")])
+def test_circuits_fluids_and_gases_keep_both_laws(name, cell):
+    """`radau` of systems without bodies makes heat of what it loses, where anything makes heat."""
+    row = laws.measure(CELLS[cell], laws.METHODS[name])
+    lossless = cell == "LC" and name in ("auto", "radau")
     assert not row["failed"]
-    assert row["defect"] <= ROUNDING and row["least"] >= 0.0
+    assert (row["defect"] <= ROUNDING) != lossless
+    assert row["least"] >= 0.0 or name == "ida"
 
 
 def test_what_a_method_does_not_keep_is_seen():

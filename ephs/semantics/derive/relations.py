@@ -12,6 +12,7 @@ from typing import Any, Final, TypeAlias, final
 from ephs.semantics.derive.arguments import Arguments
 from ephs.semantics.derive.charts import moved, over
 from ephs.semantics.derive.closing import Closing
+from ephs.semantics.derive.conduction import conducted
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.maps import Maps
@@ -201,7 +202,7 @@ class Reversible:
 @final
 @dataclass(frozen=True, slots=True)
 class Irreversible:
-    """Flows f = M(x, eᴱ) e/θ₀ at the middle of the step.
+    """Flows f = M(x, eᴱ) e/θ₀ at the middle of the step; between temperatures alone by their differences.
 
     Parameters
     ----------
@@ -261,8 +262,12 @@ class Irreversible:
                 cold = on.either(cold, partials.dual(energy[i]).value <= 0.0)
         inputs = [energy[i] if effort else x[i] for effort, i in self.takes]
         rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) : self._own])
-        theta = partials.dual(a.scal[1])
-        values = through.outward([dot(rows[i * n : i * n + n], e) / theta for i in range(n)])
+        if len(self.hot) == n:
+            flows = [conducted(rows[i * n : i * n + n], energy, i) for i in range(n)]
+        else:
+            theta = partials.dual(a.scal[1])
+            flows = [dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
+        values = through.outward(flows)
         good = on.both(
             _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
         )

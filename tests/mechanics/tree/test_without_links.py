@@ -106,3 +106,18 @@ def test_what_only_reacts_is_measured_by_what_it_destroys():
     sol = ephs.simulate(system, 2.0, method="rk87", initial={"hot.s": 1.0, "cold.s": 0.0}, audit="fail")
     assert sol.ledgers.scale == pytest.approx(sol.ledgers.temperature * sol.ledgers.made[-1])
     assert sol.energy_error.max() < 1e-8
+
+
+@pytest.mark.parametrize("apart", [1e-13, 1e-10, 1e-7])
+@pytest.mark.parametrize("method", METHODS)
+def test_nearly_equal_temperatures_make_what_the_square_of_their_difference_says(method, apart):
+    """Two stores of C whose temperatures differ by a part δ make C/4 δ² (1 − exp(−4 h t/C)), as small as that is."""
+    pattern = Pattern.from_text("a: entropy; b: entropy; warm(s=a); other(s=b); wall(s1=a, s2=b)")
+    stores = {name: lib.thermal_capacity(c1=1500.0, c2=5.0) for name in ("warm", "other")}
+    system, steps = pattern(**stores, wall=lib.heat_transfer(h=1.0)), {"step": 0.1} if METHODS[method].fixed else {}
+    start = {"warm.s": 5.0 * np.log1p(apart)}
+    sol = ephs.simulate(system, 5.0, method=method, initial=start, audit="off", **steps)
+    made = 1.25 * apart**2 * -np.expm1(-4.0)
+    assert sol.stats["least_production"] >= 0.0
+    assert sol.ledgers.made[-1] == pytest.approx(made, rel=0.03)
+    assert "entropy" not in [finding.law for finding in sol.audit.findings]

@@ -7,6 +7,8 @@ prescribed motions; where they are no more than what the step changed them by, p
 Where momenta are kept, too, islands are first moved rigidly to those that they had, see
 `ephs.mechanics.tree.sweeps.rigid`; n is then without the rigid motions, and positions are also moved along these, as
 the momenta turn them by themselves.
+
+What is then still missing is left to what is attached, see `ephs.mechanics.tree.engine.storing`.
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, final
 
 from ephs.mechanics.tree.engine.forces import attached_energy, strain
 from ephs.mechanics.tree.engine.heats import entropies
+from ephs.mechanics.tree.engine.storing import store
 from ephs.mechanics.tree.sweeps.acting import Body
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
@@ -22,7 +25,7 @@ from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account, rounding, 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
 
-__all__ = ["correct", "held", "measure"]
+__all__ = ["Correction", "correct", "held", "measure"]
 
 ROUNDS = 8
 """Iterations that move positions."""
@@ -85,6 +88,7 @@ def correct(
     before: Vector,
     q: Vector,
     r: Vector,
+    stored: Vector,
     heats: Vector,
     allowed: Vector,
     always: bool,
@@ -95,17 +99,19 @@ def correct(
 
     Parameters
     ----------
-    before
-        Rates at the start of the step.
+    before, stored
+        Rates, and heats with attached states, at the start of the step.
     allowed
-        (2 degrees of freedom,) of increments and rates: what their errors may be. A state is moved further where steps
-        are on a grid, else what is farther is left to the steps that follow.
+        (2 degrees of freedom + heats,) of increments, rates and heats: what their errors may be. A state is moved
+        further where steps are on a grid, else what is farther is left to the steps that follow.
     always
         Whether what is only rounding is met, too: for the sake of its derivatives.
     """
     target = account.anchor + (work - heat)
     account.noise = rounding(on, account.anchor, work, heat)
-    run = _Correction(on, motion, account, target, h, before, q, r, heats, allowed, on.scratch(3), on.counter(0))
+    run = Correction(
+        on, motion, account, target, h, before, q, r, stored, heats, allowed, always, on.scratch(3), on.counter(0)
+    )  # fmt: skip
     account.moved, account.size, account.rest = 0.0, 0.0, 0.0
     turned = on.variable(0.0)
 
@@ -120,6 +126,8 @@ def correct(
         account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
         on.when(on.both(run.known, run.floating), settle)
         on.when(run.known if always else on.negate(run.close), run.move)
+        left = on.both(run.known if always else on.negate(run.close), motion.tables.own[0].attached > 0)
+        on.when(on.both(left, on.same(run.status.value, 0)), lambda: store(on, run))
         account.rest, account.moved = run.short, account.moved + turned.value
 
     on.when(on.absolute(account.anchor) < BEYOND, keep)
@@ -128,7 +136,7 @@ def correct(
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Correction:
+class Correction:
     """One correction; ``energies`` are what `held` writes."""
 
     on: Evaluator
@@ -139,19 +147,31 @@ class _Correction:
     before: Vector
     q: Vector
     r: Vector
+    start: Vector
     heats: Vector
     allowed: Vector
+    always: bool
     energies: Vector
     status: Variable[Integer]
 
     def look(self) -> None:
         """Evaluate the energy."""
-        self.status.value = held(self.on, self.motion, self.q, self.r, self.heats, self.energies)
+        self.energy_at(self.heats)
+
+    def energy_at(self, heats: Vector) -> Real:
+        """Evaluate the energy with other heats."""
+        self.status.value = held(self.on, self.motion, self.q, self.r, heats, self.energies)
+        return self.energy
+
+    @property
+    def energy(self) -> Real:
+        """Energy in J that is not heat, as it was evaluated last."""
+        return self.energies[0] + self.energies[1]
 
     @property
     def short(self) -> Real:
         """Missing energy in J."""
-        return self.target - (self.energies[0] + self.energies[1])
+        return self.target - self.energy
 
     @property
     def known(self) -> Truth:

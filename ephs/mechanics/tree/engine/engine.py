@@ -51,8 +51,8 @@ class Engine:
         summed = size - self._r.size - work["still"].size
         self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
         self.totals = {name: np.zeros(summed) for name in TOTALS} | {"start": self._start, "end": self._y}
-        self._account, self._allowed = Account.table(1), np.zeros(2 * self._r.size)
         self._counted = 2 * self._r.size + work["entropy"].size
+        self._account, self._allowed = Account.table(1), np.zeros(self._counted)
         self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
         self._sums: dict[int, tuple[Mapping[str, Any], Array, Bound]] = {}
         self._arguments: dict[str, tuple[Any, ...]] = {
@@ -193,7 +193,7 @@ class Engine:
             A status, elements, y, the account (anchor, left, put, total, momenta) after it, and the step's error by
             that.
         """
-        self._start[:], self._y[:], self._q[:], self._allowed[:] = y0, y, q, allowed[: self._allowed.size]
+        self._start[:], self._y[:], self._q[:], self._allowed[:] = y0, y, q, allowed
         a: Any = self._account[0]
         (a.anchor, a.left, a.put, a.total), self.work["kept"][: self.momenta] = account[:4].tolist(), account[4:]
         a.chosen, a.alone = int(chosen), int(alone)

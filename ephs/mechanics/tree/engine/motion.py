@@ -266,9 +266,9 @@ class Mechanism(Motion):
         always: bool = False,
     ) -> Integer:  # fmt: skip
         nv, n, at = self.increments, self.freedoms, self.summed + self.tables.node.size
-        heats = y.part(self.summed, self.tables.node.size)
+        stored, heats = (each.part(self.summed, self.tables.node.size) for each in (start, y))
         return correct(
-            on, self, account, y[at + 1], y[at], h, start.part(nv, n), q, y.part(nv, n), heats, allowed, always
+            on, self, account, y[at + 1], y[at], h, start.part(nv, n), q, y.part(nv, n), stored, heats, allowed, always
         )
 
     def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:

@@ -174,7 +174,8 @@ class StepTangent:
         account = Account.table(1)
         account[0].anchor = 0.0 if corrected else np.nan
         arguments.update({"control": _paired(Control.table(1), {}, ""), "account": _paired(account, {}, "")})
-        arguments.update({"allowed": _pair(np.full(2 * engine.work["force"].size, BEYOND)), "h": 0.0, **self.pairs})
+        counted = 2 * engine.work["force"].size + engine.work["entropy"].size
+        arguments.update({"allowed": _pair(np.full(counted, BEYOND)), "h": 0.0, **self.pairs})
         program = step_tangents(engine.looped).compiled()
 
         def bound(name: str, **others: Any) -> Any:

@@ -131,7 +131,8 @@ class Accounts:
         end = replace(end, account=np.concatenate([account, carry]))
         if account[2] == start.account[2] and self.own == OWN:
             return end, error
-        return replace(end, q=q, r=y[eq.nv : eq.nv + eq.n]), error
+        r, heats = np.split(y[eq.nv : eq.nv + eq.n + eq.ns], [eq.n])
+        return replace(end, q=q, r=r, heats=heats), error
 
     def note(self, state: "ReducedState") -> None:
         """Remember what corrections put in up to a state that is kept."""

@@ -176,8 +176,8 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
 
 def _nodes(model: Model, parts: Parts) -> Table[Node]:
     nodes = Node.table(len(parts.entropies) + len(parts.network.states))
-    for k in range(len(parts.entropies), nodes.size):
-        nodes[k].component = PLAIN
+    for k, state in enumerate(parts.network.states, start=len(parts.entropies)):
+        nodes[k].component, nodes[k].free = PLAIN, int(state.quantity.kind != "entropy")
     for k, number in enumerate(parts.entropies.values()):
         primitive, node = model.descriptor.components[number].primitive, nodes[k]
         node.component = -1 if isinstance(primitive, Storage) and primitive.environment else number

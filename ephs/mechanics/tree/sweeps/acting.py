@@ -189,10 +189,12 @@ class Body(Record):
 class Node(Record):
     """A store of entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1.
 
-    Or, −2, a state of what is attached, which is advanced as it is.
+    Or, −2, a state of what is attached, which is advanced as it is; ``free``: 1 where it is not of entropy, so that
+    corrections may move it.
     """
 
     component = integer()
+    free = integer()
     c1 = real()
     c2 = real()
 

@@ -308,9 +308,6 @@ class Net:
             on.loop(rows, gather)
             on.loop(it.dims[3], read)
             found = self._call(on, it, efforts, kept)
-            first = self.row.part(3 * it.entry, 6)
-            alone = on.both(on.same(rows, 2), on.both(first[2] >= 0, on.same(efforts, 2)))
-            on.when(alone, lambda: on.when(first[5] >= 0, lambda: self._conducted(on)))
 
             def scatter(j: Integer) -> None:
                 row = it.entry + j
@@ -325,17 +322,6 @@ class Net:
         on.loop(size, inject)
         self.each(on, one)
         return status.value
-
-    def _conducted(self, on: Evaluator) -> None:
-        """Make the flows of heat between two temperatures those of the heat that leaves the warmer one.
-
-        As they come they are differences of large numbers, and their sum, a square of what the temperatures differ by,
-        is lost in their rounding.
-        """
-        one, two = self.scal[1] + self.e[0], self.scal[1] + self.e[1]
-        heat = self.f[0] * one
-        heat = on.select(heat * (one - two) > 0.0, heat, 0.0)
-        self.f[0], self.f[1] = heat / one, -heat / two
 
     def _measure(self, on: Evaluator, row: Integer, flow: Real, slopes: Vector) -> None:
         """Add the size of a flow to what balances are measured by."""

@@ -1,0 +1,140 @@
+"""The energy of circuits, fluids and gases is kept by moving states within the range of their flows."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Pattern, junction
+from ephs import library as lib
+from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.scene.build import initial_state, scene_system
+from ephs.operad import quantity
+from ephs.semantics.primitives import power_ports
+from ephs.semantics.structures import constant_structure, quadratic
+from examples import physics
+from tests.semantics.test_chemistry import R, Species, vessel
+from tests.semantics.test_chemistry import start as filled
+
+KEEP = {"alpha": {"keep": "energy"}, "variational": {"keep": "energy"}}
+EVERY = [name for name, method in METHODS.items() if method.scenes]
+
+
+def circuit(resistance):
+    pattern = Pattern.from_text("q: charge; b: flux_linkage; s: entropy; cap(q); coil(b); emc(q, b); res(b, s); air(s)")
+    cap, coil, res = lib.capacitor(c=0.5), lib.inductor(l=2.0), lib.resistor(r=resistance)
+    return pattern(cap=cap, coil=coil, emc=lib.emc(), res=res, air=lib.environment())
+
+
+def tanks():
+    pattern = Pattern.from_text(
+        "a: liquid; b: liquid; g: pressure_impulse; s: entropy;"
+        "tank1(v=a); tank2(v=b); pipe(g); join(v1=a, v2=b, g); loss(g, s); room(s)"
+    )
+    one, two = (lib.tank(area=area, density=1e3) for area in (2.0, 1.0))
+    loss, pipe = lib.pipe_loss(r=2e3, k=5e3), lib.inertance(i=1e5)
+    return pattern(tank1=one, tank2=two, pipe=pipe, join=lib.conduit(), loss=loss, room=lib.environment())
+
+
+CASES = {  # system, start, end of the run and step in s, states of which the sum stays
+    "swinging circuit": (circuit(0.1), {"cap.q": 1.0}, 5.0, 0.1, ()),
+    "circuit that only decays": (circuit(8.0), {"cap.q": 1.0}, 5.0, 0.1, ()),
+    "tanks": (tanks(), {"tank1.v": 3.0, "tank2.v": 0.5}, 20.0, 0.25, ("tank1.v", "tank2.v")),
+    "gases": (physics.cylinder, physics.CYLINDER_START, 0.5, 0.005, ("gas1.v", "gas2.v")),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("method", EVERY)
+def test_energy_and_sums_stay(method, case):
+    system, start, until, step, summed = CASES[case]
+    pace = {"step": step} if not METHODS[method].adaptive or "gauss" in method else {"rtol": 1e-5, "atol": 1e-5}
+    sol = ephs.simulate(system, until, initial=start, method=method, options=KEEP.get(method, {}), audit="off", **pace)
+    assert sol.energy_error.max() <= 1e-12
+    whole = sum((np.ravel(sol[path]) for path in summed), start=np.zeros(len(sol)))
+    assert np.abs(whole - whole[0]).max() <= 8.0 * len(sol) * np.finfo(float).eps * np.abs(whole).max()
+    if method == "rk54":
+        missed = sol.stats["plain_defect"]["largest"] / sol.ledgers.scale
+        assert missed > 1e-9, "the control: the steps miss it"
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**32 - 1), charges=st.integers(1, 5), fluxes=st.integers(1, 5), lossy=st.booleans())
+def test_nets_keep_every_sum_that_their_flows_keep(seed, charges, fluxes, lossy):
+    """Random nets: covectors of a structure's kernel are charges of closed parts, fluxes of closed loops."""
+    rng, n = np.random.default_rng(seed), charges + fluxes
+    skew = np.zeros((n, n))
+    coupling = rng.integers(-1, 2, (charges, fluxes)).astype(float)
+    skew[:charges, charges:], skew[charges:, :charges] = coupling, -coupling.T
+    names = [f"q{i}" for i in range(charges)] + [f"b{i}" for i in range(fluxes)]
+    kinds = [quantity.charge] * charges + [quantity.flux_linkage] * fluxes
+    ports = power_ports(**dict(zip(names, kinds, strict=True)))
+    stores = {
+        f"of_{name}": quadratic(f"of_{name}", power_ports(x=kind), np.array([[size]]), ())
+        for name, kind, size in zip(names, kinds, rng.uniform(0.5, 2.0, n), strict=True)
+    }
+    text = "; ".join(f"{name}: {kind.kind}; of_{name}(x={name})" for name, kind in zip(names, kinds, strict=True))
+    boxes, lost = {"net": constant_structure("net", ports, skew, np.zeros((0, n)))}, skew
+    if lossy:
+        text += f"; s: entropy; loss(b={names[-1]}, s); room(s)"
+        boxes |= {"loss": lib.resistor(r=0.3), "room": lib.environment()}
+        lost = skew - 0.3 * np.diag(np.arange(n) == n - 1)
+    system = Pattern.from_text(f"{text}; net({', '.join(names)})")(**stores, **boxes)
+    start = {f"of_{name}.x": value for name, value in zip(names, rng.uniform(-1.0, 1.0, n), strict=True)}
+    sol = ephs.simulate(system, 3.0, initial=start, method="rk54", rtol=1e-5, atol=1e-5, audit="off")
+    assert sol.energy_error.max() <= 1e-12
+    states = np.array([np.ravel(sol[f"of_{name}.x"]) for name in names])
+    u, sigma, _ = np.linalg.svd(lost)
+    sums = u[:, sigma <= 1e-12 * max(sigma.max(), 1.0)].T @ states
+    rounding = 8.0 * n * len(sol) * np.finfo(float).eps * np.abs(states).max()
+    assert np.abs(sums - sums[:, :1]).max(initial=0.0) <= rounding
+
+
+HANGING = """
+format = 1
+[bodies.bob]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.0, 0.0, -1.0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "bob"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+"""
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "ida", "gauss4"])
+def test_a_circuit_beside_a_mechanism_at_rest_keeps_its_energy(method, tmp_path):
+    """Nothing of the body moves that could take what the circuit's steps miss."""
+    file = tmp_path / "hanging.toml"
+    file.write_text(HANGING, encoding="utf-8")
+    scene = ephs.load(file)
+    pattern = Pattern(
+        {"q": junction(quantity.charge), "b": junction(quantity.flux_linkage)},
+        {"cap": {"q": "q"}, "coil": {"b": "b"}, "emc": {"q": "q", "b": "b"}, "linkage": {}},
+    )
+    boxes = {"cap": lib.capacitor(c=0.5), "coil": lib.inductor(l=2.0), "emc": lib.emc()}
+    start = {f"linkage.{path}": x for path, x in initial_state(scene).items()} | {"cap.q": 1.0}
+    system = pattern(**boxes, linkage=scene_system(scene))
+    pace = {"step": 0.1} if method == "gauss4" else {"rtol": 1e-5, "atol": 1e-5}
+    sol = ephs.simulate(system, 5.0, initial=start, method=method, audit="off", **pace)
+    assert sol.energy_error.max() <= 1e-12
+    assert "energy" not in [finding.law for finding in sol.audit.findings]
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87", "gauss4", "ida"])
+def test_a_reaction_keeps_energy_and_atoms(method):
+    """2 A = B, with heat, in a vessel: amounts move along the reaction."""
+    parts = (
+        Species("A", {"X": 1}, entropy=R, capacity=20.0),
+        Species("B", {"X": 2}, energy=-4e3, entropy=30.0, capacity=45.0),
+    )
+    system = vessel(parts, k=5e-3, activation=1e3)
+    pace = {"step": 0.02} if method == "gauss4" else {"rtol": 1e-5, "atol": 1e-5}
+    start = filled(parts, 350.0, 0.02, A=1.0, B=0.1)
+    sol = ephs.simulate(system, 5.0, initial=start, method=method, audit="fail", **pace)
+    assert sol.energy_error.max() <= 1e-12
+    atoms = np.ravel(sol["mixture.A"]) + 2.0 * np.ravel(sol["mixture.B"])
+    assert np.abs(atoms - 1.2).max() <= 8.0 * len(sol) * np.finfo(float).eps * 1.2
