@@ -1,4 +1,4 @@
-"""Scenes of contact, in scene files and in MJCF: stacks of balls and of boxes, bouncing balls, a wheel that slips and rolls, a gripper.
+"""Scenes of contact, in scene files and in MJCF: stacks, bouncing balls, a wheel that slips and rolls, a gripper.
 
 Stiffnesses are chosen so that overlaps are about those of the other's usual settings.
 """
