@@ -1,4 +1,4 @@
-"""Scenes of contact, in scene files and in MJCF: a stack, bouncing balls, a wheel that slips and rolls, a gripper.
+"""Scenes of contact, in scene files and in MJCF: stacks, bouncing balls, a wheel that slips and rolls, a gripper.
 
 Stiffnesses are chosen so that overlaps are about those of the other's usual settings.
 """
@@ -93,6 +93,25 @@ def stack(count: int = 10) -> Touching:
     return Touching("stack of ten", "".join(own), _mjcf(1.0, theirs, [0.0] * count), 1.0)
 
 
+def boxes(count: int = 10) -> Touching:
+    """Free cubes, one above the other, that fall 1 mm onto each other and the floor, and come to rest."""
+    names, gap, side = [f"box{i}" for i in range(count)], 1e-3, 2.0 * RADIUS
+    heights = [RADIUS + gap + i * (side + gap) for i in range(count)]
+    own, theirs = [HEAD.format(name="boxes")], list[str]()
+    for name, height in zip(names, heights, strict=True):
+        own += [
+            _ball(name, (0.0, 0.0, height), (0.0, 0.0, 0.0)),
+            _surface(name, f"box = [{side}, {side}, {side}]", 1e4, 0.5),
+        ]
+        theirs.append(
+            f'<body pos="0 0 {height}"><freejoint/><inertial pos="0 0 0" mass="{MASS}"'
+            f' diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>'
+            f'<geom type="box" size="{RADIUS} {RADIUS} {RADIUS}" friction="0.5 0.005 0.0001"/></body>'
+        )
+    own += [FLOOR, _pairs([("floor", names[0]), *pairwise(names)])]
+    return Touching("ten boxes", "".join(own), _mjcf(0.5, theirs, [0.0] * (6 * count)), 0.5)
+
+
 def bouncing(count: int = 50) -> Touching:
     """Balls that are thrown from several heights and bounce on the floor."""
     own, theirs = [HEAD.format(name="bouncing")], list[str]()
@@ -148,5 +167,5 @@ def gripper() -> Touching:
     return Touching("gripper", own, _mjcf(0.9, [theirs], [0.0] * 8), 1.0)
 
 
-SCENES = (stack, bouncing, wheel, gripper)
+SCENES = (stack, boxes, bouncing, wheel, gripper)
 """Makers of all."""

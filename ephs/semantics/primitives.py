@@ -15,6 +15,7 @@ from ephs.operad import Algebra, Directory, Interface, Path, PortType, Quantity
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import manifold
+from ephs.semantics.support import Support
 from ephs.semantics.verdict import Condition, StructureVerdict, examine
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
 Domain = tuple[tuple[Path, float, float], ...]
 """Ports with the least and the largest number that their states may have."""
-Support = tuple[tuple[int, ...], float]
-"""Places among coordinates, and the largest value of theirs, or norm, at which anything happens."""
 Proof = Callable[[], tuple[Condition, ...]]
 
 
@@ -118,8 +117,8 @@ class Storage:
         Give a verdict when it is asked for, and not when made: what makes it accepts only parameters for which the
         conditions hold. Tests ask for the verdicts.
     support
-        Places among the states' coordinates, and a number: where the coordinate (of several places, their norm) is
-        larger, energy and effort are 0. Of an irreversible process among those that it reads, and its flow is 0.
+        Where energy and effort are not 0. Of an irreversible process in the states that it reads; its flow is 0 as well
+        where the energy of a storage beside it is, which has the same support.
     """
 
     name: str

@@ -20,7 +20,7 @@ from ephs.mechanics.shapes.impact import Impact, Meeting
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
-from ephs.semantics import structures
+from ephs.semantics import library, structures
 from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.forms import stored
 from ephs.semantics.primitives import Irreversible, Storage, power_ports
@@ -42,21 +42,21 @@ def contact(touches: Sequence[Touch], law: Law | Impact, *, heat: bool = False) 
     touches
         Frames and gap of each point, as `surfaces.touches` gives them; boxes ``point0``, ``point1``, …
     heat
-        The heat leaves through a port s; else environments inside take it.
+        The heat leaves through a port s; else an environment inside, ``env``, takes it.
     """
     momentum = quantity.body_momentum
-    junctions = {"p1": junction(momentum, exposed=True), "p2": junction(momentum, exposed=True)}
-    wires = {"p1": "p1", "p2": "p2"}
-    if heat:
-        junctions["s"] = junction(quantity.entropy, exposed=True)
-        wires["s"] = "s"
+    junctions = {name: junction(momentum, exposed=True) for name in ("p1", "p2")}
+    junctions["s"] = junction(quantity.entropy, exposed=heat)
     known = {(gap.name, gap.numbers): gap for _, _, gap in touches}
     parts = {key: _parts(gap, law) for key, gap in known.items()}
-    points = {
-        f"point{i}": between_frames(one, two, *parts[gap.name, gap.numbers], heat=heat)
+    points: dict[str, System | Storage] = {
+        f"point{i}": between_frames(one, two, *parts[gap.name, gap.numbers], heat=True)
         for i, (one, two, gap) in enumerate(touches)
     }
-    return System.of(Pattern(junctions=junctions, boxes=dict.fromkeys(points, wires)), points)
+    boxes: dict[str, dict[str, str]] = {name: {port: port for port in junctions} for name in points}
+    if not heat:
+        boxes["env"], points["env"] = {"s": "s"}, library.environment()
+    return System.of(Pattern(junctions=junctions, boxes=boxes), points)
 
 
 def _parts(gap: Gap, law: Law | Impact) -> tuple[Storage, Irreversible]:

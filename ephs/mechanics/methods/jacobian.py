@@ -5,6 +5,7 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.apart import columns_of_trees, directions
 from ephs.mechanics.tree.engine.slopes import RateSlopes
 from ephs.mechanics.tree.engine.tangents import evaluated
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -64,10 +65,9 @@ class Jacobian:
         """By tangents of the compiled rates of a tree."""
         eq = self.equations
         if self._slopes is None:
-            warm = (
-                eq.nv + eq.n + np.flatnonzero(eq.reduced.tables.node != -1)
-            )  # the environment's temperature is constant
-            wanted = np.concatenate([np.arange(eq.nv + eq.n), warm])
+            tables = eq.reduced.tables
+            warm = np.flatnonzero(tables.node != -1)  # the environment's temperature is constant
+            wanted = directions(list(columns_of_trees(tables, eq.nv, eq.n, warm)), self.size)
             self._slopes = RateSlopes(eq.engine, lambda number: _at_rest(eq, number), wanted, self.size)
         eq.load(state.t, state.q, state.r, state.heats)
         status, value = self._slopes.at(state.q, eq.vector(state))

@@ -32,6 +32,8 @@ KEPT = 0.3
 """As `Stages.enough`, at constant steps: with a kept matrix errors fall by a rate, and not as squares."""
 NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
+PIVOTING = ("swap", "swaps", "end", "ends")
+"""Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
 FAST = 2e-3
 """Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
 
@@ -223,13 +225,13 @@ class Kept:
         # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
         n.decay, n.growth, n.turning = float(real[one]), float(real[pair]), -float(imaginary[pair])
         shapes: dict[str, tuple[int, ...]] = {
-            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "single": (m, m), "pair": (2 * m, 2 * m),
+            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "single": (m, m), "pair": (2 * m, m),
             "stages": (3, m), "change": (3, m), "part": (m,), "parts": (2 * m,), "right": (2 * eq.n,), "y": (eq.size,),
             "rate": (eq.size,), "q": (eq.reduced.coordinates,),
         }  # fmt: skip
         self.memory: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "newton": self.newton, "inverse": inverse, "into": np.linalg.inv(out), "out": out,
-            "swap": np.zeros(m, dtype=np.int64), "swaps": np.zeros(2 * m, dtype=np.int64),
+            **{name: np.zeros(m, dtype=np.int64) for name in PIVOTING},
         }  # fmt: skip
 
     def renew(self, state: ReducedState) -> None:
@@ -260,5 +262,5 @@ class Kept:
     def parts(self) -> list[tuple[str, Any]]:
         """All that the next step depends on, by name."""
         integers, reals = self.newton.arrays
-        names = "matrix", "damping", "spring", "single", "pair", "swap", "swaps"
+        names = "matrix", "damping", "spring", "single", "pair", *PIVOTING
         return [("newton", integers), ("newton_reals", reals), *((name, self.memory[name]) for name in names)]

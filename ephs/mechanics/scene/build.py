@@ -118,18 +118,19 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         at = component_path("tendons", name)
         out |= {Path([*at, *path.split(".")]): value for path, value in tendon_starts(tendon, poses).items()}
     between = [
-        (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)), s.heat)
+        (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)))
         for name, s in scene.all_springs()
     ]
+    warm = [(component_path("springs", name), s.heat) for name, s in scene.all_springs()]
     for name, c in scene.all_contacts():
         bodies, touches = contact_points(scene, c)
         at = component_path("contacts", name)
-        between += [(at / f"point{i}", bodies, (one, two), c.heat) for i, (one, two, _) in enumerate(touches)]
-    for at, bodies, frames, heat in between:
+        between += [(at / f"point{i}", bodies, (one, two)) for i, (one, two, _) in enumerate(touches)]
+        warm.append((at, c.heat))
+    out |= {at / "env" / "s": np.zeros(1) for at, heat in warm if heat == ENVIRONMENT}
+    for at, bodies, frames in between:
         first, second = (SE3.compose(poses[body], frame) for body, frame in zip(bodies, frames, strict=True))
         out[at / "pe" / "q_r"] = SE3.normalise(SE3.compose(SE3.inverse(first), second))
-        if heat == ENVIRONMENT:
-            out[at / "env" / "s"] = np.zeros(1)
     for name, node in scene.all_thermal():
         out |= {component_path("thermal", name) / state: np.zeros(1) for state in ("s", *["e"] * (node.pull > 0.0))}
     for prefix, part in _levels(scene):

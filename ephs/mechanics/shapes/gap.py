@@ -5,22 +5,26 @@ first one's C1: numbers, recorded values, or arrays of many instants (7, n). Onl
 values occur, so that a gap has exact slopes over a step (`ephs.semantics.derive.slopes`).
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.support import Support
 
 __all__ = [
+    "CENTRE",
     "HEIGHT",
     "PLACE",
     "Gap",
     "Vector",
     "cross",
     "dot",
+    "edges",
     "plane_rim",
     "plane_sphere",
     "ramp",
@@ -33,11 +37,17 @@ UPRIGHT: Final = 1e-3
 """Inclination in rad below which a circle counts as flat: its gap is smaller by this part of the radius at the most."""
 PARALLEL: Final = 1e-6
 """Square of the sine of an angle below which segments count as parallel: any of their nearest points is taken."""
+CROSSING: Final = 1.0 / 32.0
+"""Square of the way aside, in radii of edges, that edges part by from where they cross to a corner, below which they
+count as parallel: the gap at the corner is then larger by half of this part of a radius at the most."""
 HEIGHT: Final = (6,)
 PLACE: Final = (4, 5, 6)
 """Places of z, and of x, y, z, in a pose."""
+ROUNDING: Final = 1e-12
+"""Relative error of the coordinates that a support is held against."""
 Vector = tuple[Any, Any, Any]
 """Components of a vector."""
+CENTRE: Final = (0.0, 0.0, 0.0)
 
 
 @final
@@ -59,8 +69,7 @@ class Gap:
     numbers
         Sizes of both surfaces by name, m.
     support
-        Places in the relative pose, and the value of that coordinate, or the norm of several, beyond which the gap is
-        positive.
+        Of the relative pose: outside of it the gap is positive.
     thickness
         Least length of a straight way of C2 through the overlap, from side to side, in m; infinite behind a plane.
     """
@@ -70,8 +79,14 @@ class Gap:
     contact: Callable[[Any], tuple[Vector, Vector]]
     radius: float
     numbers: tuple[tuple[str, float], ...]
-    support: tuple[tuple[int, ...], float]
+    support: Support
     thickness: float = np.inf
+
+
+def _apart(half1: Vector, half2: Vector, margin: float) -> Support:
+    """Support of gaps between boxes of these half lengths that are rounded by a margin in all."""
+    wide = margin * (1.0 + ROUNDING)
+    return Support(PLACE, math.hypot(*half1) + math.hypot(*half2) + wide, (*half1, *half2), wide)
 
 
 def ramp(x: Any) -> Any:
@@ -107,7 +122,7 @@ def plane_sphere(radius: float) -> Gap:
         return normal, _times(-radius, normal)
 
     numbers = (("radius", radius),)
-    return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, numbers, (HEIGHT, radius))
+    return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, numbers, Support(HEIGHT, radius))
 
 
 def plane_rim(radius: float) -> Gap:
@@ -128,7 +143,7 @@ def plane_rim(radius: float) -> Gap:
     def distance(pose: Any) -> Any:
         return pose[6] - radius * inclined(pose)[1]
 
-    return Gap("plane_rim", distance, contact, radius, (("radius", radius),), (HEIGHT, radius * (1.0 + UPRIGHT)))
+    return Gap("plane_rim", distance, contact, radius, (("radius", radius),), Support(HEIGHT, radius * (1.0 + UPRIGHT)))
 
 
 def _clamped(x: Any, most: float) -> Any:
@@ -170,9 +185,27 @@ def segments(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
         contact,
         radius2,
         (("half1", half1), ("radius1", radius1), ("half2", half2), ("radius2", radius2)),
-        (PLACE, half1 + half2 + radius1 + radius2),
+        _apart((0.0, 0.0, half1), (0.0, 0.0, half2), radius1 + radius2),
         2.0 * (radius1 + radius2),
     )
+
+
+def edges(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
+    """Gap between two edges of bodies whose corners meet the other body, too: `segments` that cross.
+
+    Where edges are parallel within `CROSSING`, and so touch along a line, the ends of the line are corners. The gap is
+    larger there by up to the lengths, so that no force jumps from end to end of a line when it tilts.
+    """
+    whole, length = segments(half1, radius1, half2, radius2), half1 + half2
+    square = CROSSING * min(radius1, radius2) * (radius1 + radius2) / max(half1, half2) ** 2
+
+    def distance(pose: Any) -> Any:
+        axes = quaternion_to_matrix(pose[:4])
+        x, y = axes[0][2], axes[1][2]
+        parallel = ramp(1.0 - (x * x + y * y) / square)
+        return whole.distance(pose) + length * (parallel * parallel)
+
+    return replace(whole, name="edges", distance=distance)
 
 
 def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
@@ -196,7 +229,7 @@ def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
         contact,
         rounding,
         (("radius", radius), *sizes, ("rounding", rounding)),
-        (PLACE, sum(half) + rounding + radius),
+        _apart(CENTRE, half, rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )
 
@@ -224,6 +257,6 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
         contact,
         radius,
         (*sizes, ("rounding", rounding), ("radius", radius)),
-        (PLACE, sum(half) + rounding + radius),
+        _apart(half, CENTRE, rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )

@@ -14,8 +14,10 @@ from typing import Any, Final
 import numpy as np
 
 from ephs.mechanics.shapes.gap import (
+    CENTRE,
     Gap,
     Vector,
+    edges,
     plane_rim,
     plane_sphere,
     rounded_box_sphere,
@@ -79,10 +81,13 @@ def _shifted(frame: Array, at: Any) -> Array:
     return SE3.compose(frame, pose if pose.size == 7 else np.concatenate([[1.0, 0.0, 0.0, 0.0], pose]))
 
 
-CENTRE: Final = (0.0, 0.0, 0.0)
 ROOT: Final = math.sqrt(0.5)
 ROUNDED: Final = 0.05
 """Radius of a box's edges by its least length, where it meets boxes and capsules."""
+
+SHORTER: Final = 0.5
+"""Length at both ends of an edge, by its radius, where only corners meet other boxes: no edge meets a corner upon a
+corner."""
 
 
 def _ends(length: float) -> tuple[tuple[float, float, float], ...]:
@@ -119,7 +124,7 @@ def _boxes(one: Sequence[float], other: Sequence[float]) -> Points:
     yield from ((CENTRE, at, rounded_box_sphere(half1, radius1, radius2)) for at in _corners(half2))
     yield from ((at, CENTRE, sphere_rounded_box(radius1, half2, radius2)) for at in _corners(half1))
     for (here, long1), (there, long2) in product(_edges(half1), _edges(half2)):
-        yield here, there, segments(long1, radius1, long2, radius2)
+        yield here, there, edges(long1 - SHORTER * radius1, radius1, long2 - SHORTER * radius2, radius2)
 
 
 def _box_capsule(sizes: Sequence[float], capsule: Sequence[float]) -> Points:

@@ -135,11 +135,8 @@ def backward(on: Evaluator, factor: Matrix, x: Vector) -> None:
     on.loop(factor.rows, row, down=True)
 
 
-def lu(on: Evaluator, a: Matrix, pivots: Integers, *, skipping: bool = False) -> Truth:
+def lu(on: Evaluator, a: Matrix, pivots: Integers) -> Truth:
     """Factorise P A = L U in place with partial pivoting; ``pivots`` (n,): the row exchanged with each.
-
-    With ``skipping`` rows that a column does not change are left as they are, which saves most of the work for blocks
-    on the diagonal; the derivative of a factor that is 0 is lost.
 
     Returns
     -------
@@ -175,10 +172,7 @@ def lu(on: Evaluator, a: Matrix, pivots: Integers, *, skipping: bool = False) ->
             def entry(j: Integer) -> None:
                 a[i, j] = a[i, j] - factor * a[k, j]
 
-            if skipping:
-                on.when(on.absolute(factor) > 0.0, lambda: on.loop(n, entry, start=k + 1))
-            else:
-                on.loop(n, entry, start=k + 1)
+            on.loop(n, entry, start=k + 1)
 
         on.loop(n, below, start=k + 1)
 

@@ -5,11 +5,11 @@ rates of freedoms depend on increments and rates alone, and sums on nothing but 
 the degrees of freedom: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, final
 
-from ephs.semantics.linear.dense import clear, copy, dot, lu, lu_solve
+from ephs.semantics.linear.dense import clear, copy, dot
+from ephs.semantics.linear.envelope import envelope_lu, envelope_solve, times
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
@@ -79,7 +79,7 @@ class Stiff:
     damping, spring
         (n, n): J_rr + J_vv and J_rr J_vv − J_rv, of increments v and rates r.
     single, pair
-        (m, m) and (2 m, 2 m): factors, with `swap` and `swaps`.
+        (m, m) and, real above imaginary parts, (2 m, m): factors, with `swap` and `end`, and with `swaps` and `ends`.
     inverse, into, out
         (3, 3): the coefficients' inverse, and to and from the parts that it falls into.
     stages, change
@@ -100,6 +100,8 @@ class Stiff:
     pair: Matrix
     swap: Integers
     swaps: Integers
+    end: Integers
+    ends: Integers
     inverse: Matrix
     into: Matrix
     out: Matrix
@@ -115,9 +117,9 @@ class Stiff:
 
 STIFF: Final[dict[str, Any]] = {
     "newton": table(Newton), "matrix": matrix(), "damping": matrix(), "spring": matrix(), "single": matrix(),
-    "pair": matrix(), "swap": indices(), "swaps": indices(), "inverse": matrix(3), "into": matrix(3), "out": matrix(3),
-    "stages": matrix(), "change": matrix(), "part": vector(), "parts": vector(), "right": vector(), "y": vector(),
-    "rate": vector(), "q": vector(),
+    "pair": matrix(), "swap": indices(), "swaps": indices(), "end": indices(), "ends": indices(), "inverse": matrix(3),
+    "into": matrix(3), "out": matrix(3), "stages": matrix(), "change": matrix(), "part": vector(), "parts": vector(),
+    "right": vector(), "y": vector(), "rate": vector(), "q": vector(),
 }  # fmt: skip
 
 
@@ -129,7 +131,7 @@ def whole(x: Matrix) -> Vector:
 @final
 @dataclass(frozen=True, slots=True)
 class Solver:
-    """The matrices μ/h − J for the real eigenvalue μ and for the pair: a complex one, its parts as two real ones."""
+    """The matrices μ/h − J for the real eigenvalue μ and for the pair."""
 
     on: Evaluator
     stiff: Stiff
@@ -153,63 +155,67 @@ class Solver:
     def one(self) -> None:
         """Solve for `part` by the real one."""
         s = self.stiff
-        self._either([s.part], self._real, lambda: lu_solve(self.on, s.single, s.swap, s.part))
+        self._either([s.part], self._real)
 
     def two(self) -> None:
         """Solve for `parts` by that of the pair."""
         s, size = self.stiff, self.stiff.matrix.rows
         parts = [s.parts.part(0, size), s.parts.part(size, size)]
-        self._either(parts, self._complex, lambda: lu_solve(self.on, s.pair, s.swaps, s.parts))
+        self._either(parts, self._complex)
 
-    def _either(self, parts: list[Vector], by: list[Real], whole: Callable[[], None]) -> None:
-        self.on.when(self.on.same(self.stiff.newton[0].split, 1), lambda: self._by_freedoms(parts, by), whole)
+    def _either(self, parts: list[Vector], by: list[Real]) -> None:
+        on, n = self.on, self.stiff.newton[0]
+        on.when(on.same(n.split, 1), lambda: self._by_freedoms(parts, by), lambda: self._solve(parts))
+
+    def _factors(self, count: int, size: Integer) -> list[Matrix]:
+        """Memory of the factors of the real matrix, or of both parts of the complex one."""
+        held = self.stiff.single if count == 1 else self.stiff.pair
+        return [Matrix(held.cells, held.start + k * (size * size), size, size) for k in range(count)]
+
+    def _factorise(self, size: Integer) -> None:
+        s = self.stiff
+        envelope_lu(self.on, self._factors(1, size), s.swap, s.end)
+        envelope_lu(self.on, self._factors(2, size), s.swaps, s.ends)
+
+    def _solve(self, parts: list[Vector]) -> None:
+        s, count = self.stiff, len(parts)
+        swaps, ends = (s.swap, s.end) if count == 1 else (s.swaps, s.ends)
+        envelope_solve(self.on, self._factors(count, parts[0].size), swaps, ends, parts)
 
     def _whole(self) -> None:
         """Write and factorise the matrices of all numbers."""
         on, s = self.on, self.stiff
         size, (decay,), (growth, turning) = s.matrix.rows, self._real, self._complex
-        clear(on, whole(s.pair))
+        (single,), (real, imaginary) = self._factors(1, size), self._factors(2, size)
+        clear(on, whole(imaginary))
 
         def row(i: Integer) -> None:
             def entry(j: Integer) -> None:
-                x = -s.matrix[i, j]
-                s.single[i, j], s.pair[i, j], s.pair[size + i, size + j] = x, x, x
+                single[i, j] = real[i, j] = -s.matrix[i, j]
 
             on.loop(size, entry)
-            s.single[i, i] = s.single[i, i] + decay
-            s.pair[i, i] = s.pair[i, i] + growth
-            s.pair[size + i, size + i] = s.pair[size + i, size + i] + growth
-            s.pair[i, size + i], s.pair[size + i, i] = -turning, turning
+            single[i, i], real[i, i], imaginary[i, i] = single[i, i] + decay, real[i, i] + growth, turning
 
         on.loop(size, row)
-        lu(on, s.single, s.swap, skipping=True)
-        lu(on, s.pair, s.swaps, skipping=True)
-
-    def _factors(self, size: int) -> Matrix:
-        """Factors of the matrix of the degrees of freedom: of one, or of a pair."""
-        n, held = self.stiff.damping.rows, self.stiff.single if size == 1 else self.stiff.pair
-        return Matrix(held.cells, held.start, size * n, size * n)
+        self._factorise(size)
 
     def _of_freedoms(self) -> None:
         """Write and factorise the matrices of the freedoms."""
         on, s, n, (decay,), (growth, turning) = self.on, self.stiff, self.stiff.damping.rows, self._real, self._complex
-        single, pair = self._factors(1), self._factors(2)
+        (single,), (real, imaginary) = self._factors(1, n), self._factors(2, n)
 
         def row(i: Integer) -> None:
             def entry(j: Integer) -> None:
                 single[i, j] = s.spring[i, j] - decay * s.damping[i, j]
-                real, imaginary = s.spring[i, j] - growth * s.damping[i, j], -turning * s.damping[i, j]
-                pair[i, j], pair[n + i, n + j], pair[i, n + j], pair[n + i, j] = real, real, -imaginary, imaginary
+                real[i, j], imaginary[i, j] = s.spring[i, j] - growth * s.damping[i, j], -turning * s.damping[i, j]
 
             on.loop(n, entry)
             single[i, i] = single[i, i] + decay * decay
-            real, imaginary = growth * growth - turning * turning, 2.0 * growth * turning
-            pair[i, i], pair[n + i, n + i] = pair[i, i] + real, pair[n + i, n + i] + real
-            pair[i, n + i], pair[n + i, i] = pair[i, n + i] - imaginary, pair[n + i, i] + imaginary
+            real[i, i] = real[i, i] + (growth * growth - turning * turning)
+            imaginary[i, i] = imaginary[i, i] + 2.0 * growth * turning
 
         on.loop(n, row)
-        lu(on, single, s.swap, skipping=True)
-        lu(on, pair, s.swaps, skipping=True)
+        self._factorise(n)
 
     def _by_freedoms(self, parts: list[Vector], by: list[Real]) -> None:
         """Solve for (δv, δr, δs) in place of (f_v, f_r, f_s): a real right side, or both parts of a complex one."""
@@ -217,12 +223,12 @@ class Solver:
         right = [s.right.part(k * n, n) for k in range(count)]
 
         def project(i: Integer) -> None:
-            turned = _times(by, [x[i] for x in parts])
+            turned = times(by, [x[i] for x in parts])
             for x, out, first in zip(parts, right, turned, strict=True):
                 out[i] = x[n + i] + first - self._row(n + i, n, n, x.part(0, n))
 
         def lift(i: Integer) -> None:
-            turned = _times(by, [x[i] for x in right])
+            turned = times(by, [x[i] for x in right])
             for x, found, first in zip(parts, right, turned, strict=True):
                 x[n + i] = first - self._row(i, 0, n, found) - x[i]
 
@@ -232,7 +238,7 @@ class Solver:
                 x[i] = value
 
         on.loop(n, project)
-        lu_solve(on, self._factors(count), s.swap if count == 1 else s.swaps, s.right.part(0, count * n))
+        self._solve(right)
         on.loop(n, lift)
         for x, found in zip(parts, right, strict=True):
             copy(on, found, x.part(0, n))
@@ -241,11 +247,6 @@ class Solver:
     def _row(self, i: Integer, first: Integer, count: Integer, x: Vector) -> Real:
         """Part of a row of the matrix times a vector."""
         return dot(self.on, self.stiff.matrix.row(i).part(first, count), x.part(0, count))
-
-
-def _times(by: list[Real], x: list[Real]) -> list[Real]:
-    """A real or a complex product, by parts."""
-    return [by[0] * x[0]] if len(by) == 1 else [by[0] * x[0] - by[1] * x[1], by[0] * x[1] + by[1] * x[0]]
 
 
 def _over(by: list[Real], x: list[Real]) -> list[Real]:

@@ -1,5 +1,7 @@
 """Contacts and stops against closed forms, by every method."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,11 +13,19 @@ from ephs.mechanics.elements.contact import contact_energy, contact_loss
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs import pace
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.shapes.gap import plane_rim, plane_sphere, rounded_box_sphere
+from ephs.mechanics.shapes.gap import (
+    edges,
+    plane_rim,
+    plane_sphere,
+    rounded_box_sphere,
+    segments,
+    sphere_rounded_box,
+)
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.tree.finding import mechanism
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import check_primitive
 
 SCENES = [name for name, method in METHODS.items() if method.scenes]
@@ -25,6 +35,9 @@ GAPS = (
     plane_rim(0.2),
     rounded_box_sphere((0.1, 0.2, 0.3), 0.0, 0.5),
     rounded_box_sphere((0.0, 0.0, 0.0), 0.3, 0.5),
+    sphere_rounded_box(0.3, (0.1, 0.2, 0.3), 0.1),
+    segments(0.2, 0.3, 0.4, 0.1),
+    edges(0.2, 0.3, 0.4, 0.1),
 )
 HEAD = 'format = 1\nname = "touching"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
 BALL = """
@@ -45,6 +58,29 @@ slip = {slip}
 body = "ground"
 shape = {{ plane = {{}} }}
 """
+BLOCK = """
+[bodies.lower]
+mass = 1.0
+inertia = [7e-3, 7e-3, 7e-3]
+position = [0.0, 3.0, 0.101]
+[bodies.upper]
+mass = 1.0
+inertia = [7e-3, 7e-3, 7e-3]
+position = [0.05, 3.02, 0.33]
+rotation = {{ axis = [1.0, 2.0, 0.5], angle = 0.2 }}
+[surfaces.lower]
+body = "lower"
+shape = {{ box = [0.2, 0.2, 0.2] }}
+stiffness = {stiffness}
+loss = {loss}
+friction = {friction}
+[surfaces.upper]
+body = "upper"
+shape = {{ box = [0.2, 0.2, 0.2] }}
+stiffness = {stiffness}
+loss = {loss}
+friction = {friction}
+"""
 USUAL = {
     "gravity": 0.0, "height": 0.15, "along": 0.0, "speed": 0.0, "stiffness": 1e5, "exponent": 1.0, "loss": 0.0,
     "friction": 0.0, "slip": 1e-3,
@@ -60,33 +96,52 @@ POSES = st.tuples(
 @pytest.mark.parametrize("gap", GAPS, ids=[gap.name for gap in GAPS])
 @given(pose=POSES, out=st.floats(0.0, 1.0))
 def test_beyond_its_support_a_gap_is_open(gap, pose, out):
-    places, reach = gap.support
-    at = pose[list(places)] if len(places) > 1 else np.ones(1)
+    places, reach = list(gap.support.places), gap.support.limit
+    at = pose[places] if len(places) > 1 else np.ones(1)
     if np.linalg.norm(at) > 1e-3:
-        pose[list(places)] = at / np.linalg.norm(at) * (reach * (1.0 + 1e-12) + out)
+        pose[places] = at / np.linalg.norm(at) * (reach * (1.0 + 1e-12) + out)
         assert gap.distance(pose) >= 0.0
+
+
+@pytest.mark.parametrize("gap", [gap for gap in GAPS if gap.support.halves], ids=lambda gap: gap.name)
+@given(pose=POSES, out=st.floats(0.0, 0.1), axis=st.integers(0, 2), upper=st.booleans(), back=st.booleans())
+def test_behind_a_face_of_boxes_about_its_frames_a_gap_is_open(gap, pose, out, axis, upper, back):
+    """The nearest corner of the second box is put in front of a face of the first one, or the other way round."""
+    halves = np.reshape(gap.support.halves, (2, 3))[:: -1 if back else 1]
+    corners = np.array(list(product(*((-x, x) for x in halves[1]))))
+    ways = corners @ quaternion_to_matrix(pose[:4])[axis]
+    far = halves[0, axis] + gap.support.margin + out
+    pose[4 + axis] = far - ways.min() if upper else -far - ways.max()
+    assert gap.distance(SE3.inverse(pose) if back else pose) >= 0.0
 
 
 @pytest.mark.parametrize(("gap", "turn"), [(plane_sphere(0.3), [1.0, 0.0, 0.0, 0.0]), (plane_rim(0.2), [1, 1, 0, 0])])
 def test_below_its_support_a_gap_above_a_plane_may_be_closed(gap, turn):
     """So that the law above fails for a smaller one."""
-    pose = np.array([*(np.array(turn) / np.linalg.norm(turn)), 0.0, 0.0, 0.99 * gap.support[1]])
+    pose = np.array([*(np.array(turn) / np.linalg.norm(turn)), 0.0, 0.0, 0.99 * gap.support.limit])
     assert gap.distance(pose) < 0.0
 
 
-def test_what_is_out_of_reach_is_left_out_to_the_last_bit(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("text", "until", "touching"),
+    [(BALL, 0.5, ["ball_floor"]), (BALL + BLOCK, 0.1, ["floor_lower", "lower_upper"])],
+    ids=["plane", "boxes"],
+)
+def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching, tmp_path, monkeypatch):
     options = {"height": 0.15, "along": 1.0, "gravity": -9.81, "loss": 0.3, "friction": 0.4}
-    found = run(scene_of(tmp_path, BALL, **options), 0.5)
+    found = run(scene_of(tmp_path, text, **options), until)
     called = []
 
     def everywhere(*_):
         called.append(True)
-        return 0, 0.0
+        return 0, [0.0] * 8
 
     monkeypatch.setattr(mechanism, "_support", everywhere)
-    oracle = run(scene_of(tmp_path, BALL, **options), 0.5)
-    assert called and found.contact("ball_floor").gap.min() < 0.0 < found.contact("ball_floor").gap.max()
-    assert np.array_equal(found.body("ball").position, oracle.body("ball").position)
+    oracle = run(scene_of(tmp_path, text, **options), until)
+    for name in touching:
+        assert called and found.contact(name).gap.min() < 0.0 < found.contact(name).gap.max()
+    for name, _ in found.scene.all_bodies():
+        assert np.array_equal(found.body(name).position, oracle.body(name).position)
     assert np.array_equal(found.heat, oracle.heat)
 
 

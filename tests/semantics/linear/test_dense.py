@@ -8,19 +8,9 @@ from hypothesis import strategies as st
 from ephs.semantics.linear.dense import backward, cholesky, forward, lu, lu_solve
 from ephs.semantics.stage import Entry, Program, indices, matrix, vector
 
-
-def whole(on, a, pivots):
-    return lu(on, a, pivots)
-
-
-def skipping(on, a, pivots):
-    return lu(on, a, pivots, skipping=True)
-
-
 PROGRAM = Program(
     "dense",
-    lu=Entry(whole, a=matrix(), pivots=indices()),
-    skipping=Entry(skipping, a=matrix(), pivots=indices()),
+    lu=Entry(lu, a=matrix(), pivots=indices()),
     lu_solve=Entry(lu_solve, factors=matrix(), pivots=indices(), x=vector()),
     cholesky=Entry(cholesky, a=matrix(), factor=matrix()),
     forward=Entry(forward, factor=matrix(), x=vector()),
@@ -57,22 +47,6 @@ def test_lu_solves_within_its_backward_error(run, a):
         size[[k, pivots[k]]] = size[[pivots[k], k]]
     assert np.all(np.abs(a @ x - np.arange(1.0, n + 1.0)) <= (bound(3 * n) + bound(n)) * size)
     assert np.abs(np.tril(factors, -1)).max() <= 1.0 + 2.0 * U  # partial pivoting
-
-
-@pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
-@given(matrices(), st.integers(0, 2**32 - 1))
-@settings(max_examples=25)
-def test_rows_that_do_not_change_are_skipped_without_another_bit(run, a, seed):
-    """With zeros anywhere; -0.0 and 0.0 are the same number."""
-    sparse = np.where(np.random.default_rng(seed).random(a.shape) < 0.5, 0.0, a)
-    found = []
-    for name in ("lu", "skipping"):
-        factors, pivots = sparse.copy(), np.zeros(len(a), dtype=np.int64)
-        found.append((run[name](factors, pivots), factors, pivots))
-    (good, factors, pivots), (too, others, rows) = found
-    assert good == too
-    if good:
-        assert np.array_equal(factors, others) and np.array_equal(pivots, rows)
 
 
 @pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)

@@ -299,7 +299,7 @@ def _forces(
     parts: list[list[int]] = []
     frames: list[Array] = []
     left: list[Array] = []
-    reach: list[list[float]] = []
+    reach: list[Array] = []
     port: dict[int, list[int]] = {}
     for i in range(len(reduced.edges)):
         friction = int(t.friction[i])
@@ -313,7 +313,7 @@ def _forces(
             [kind, one, two, int(t.dim[i]), int(t.q_at[i]), int(t.q_size[i]), int(t.r_at[i]), number.get(i, -1)]
         )
         parts.append([int(t.spring[i]), friction, int(t.heat[i]), int(t.support[i])])
-        reach.append([float(t.reach[i])])
+        reach.append(t.reach[i])
         frames.append(frame)
         left.append(t.left[i].ravel())
     return Forces(
@@ -321,7 +321,7 @@ def _forces(
         part=np.array(parts, dtype=np.int64).reshape(-1, 4),
         frame=np.array(frames).reshape(-1, 24),
         left=np.array(left).reshape(-1, 36),
-        reach=np.array(reach).reshape(-1, 1),
+        reach=np.array(reach).reshape(-1, 8),
         body=np.array([bodies.link[b] if b in acted[1] else -1 for b in range(reduced.links)], dtype=np.int64),
         body_frame=np.array([_matrix(inside) for inside in bodies.inside]).reshape(-1, 12),
         node=reduced.nodes,

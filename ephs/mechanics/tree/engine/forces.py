@@ -6,6 +6,7 @@ from typing import final
 
 from ephs.mechanics.tree.sweeps.acting import (
     ABOVE,
+    APART,
     BEYOND,
     ON_BODIES,
     ON_TREE,
@@ -21,8 +22,8 @@ from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import se3, so3
-from ephs.semantics.spaces.vectors import apply_transposed, dot, product, scale, sub, transposed
-from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Variable, Vector, staged
+from ephs.semantics.spaces.vectors import Rows, apply_transposed, dot, product, scale, sub, transposed
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Variable, Vector, staged
 
 __all__ = ["act", "attached_energy", "strain"]
 
@@ -196,15 +197,37 @@ class _Acting:
 
         def look() -> None:
             one, other = place_of(on, self.work.place, edge.first), place_of(on, self.work.place, edge.second)
-            _, there = between(one, other, edge.outer_turn, edge.outer_at)
-            x, y, z = apply_transposed(edge.inner_turn, sub(there, edge.inner_at))
+            turn, there = between(one, other, edge.outer_turn, edge.outer_at)
+            x, y, z = at = apply_transposed(edge.inner_turn, sub(there, edge.inner_at))
             square = edge.reach * edge.reach
             above = on.both(on.same(edge.support, ABOVE), z > edge.reach)
-            beyond = on.both(on.same(edge.support, BEYOND), x * x + y * y + z * z > square)
+            beyond = on.both(edge.support >= BEYOND, x * x + y * y + z * z > square)
             near.value = on.select(on.either(above, beyond), 0, 1)
+
+            def apart() -> None:
+                turned = product(transposed(edge.inner_turn), turn)
+                near.value = on.select(self._apart(edge, turned, at), 0, 1)
+
+            on.when(on.both(on.same(edge.support, APART), on.same(near.value, 1)), apart)
 
         on.when(edge.support > 0, look)
         on.when(on.same(near.value, 1), lambda: body(edge))
+
+    def _apart(self, edge: Acting, turn: Rows, at: list[Real]) -> Truth:
+        """Whether a plane along faces of either box about the frames of an edge is between them, at more than a margin.
+
+        ``turn`` and ``at`` are the second frame in the first.
+        """
+        on = self.on
+        found: Truth = False
+        one, other = ([edge.halves[3 * k + i] for i in range(3)] for k in (0, 1))
+        for rows, places, here, there in (
+            (turn, at, one, other), (transposed(turn), apply_transposed(turn, at), other, one)
+        ):  # fmt: skip
+            for row, place, half in zip(rows, places, here, strict=True):
+                spread = dot([on.absolute(x) for x in row], there)
+                found = on.either(found, on.absolute(place) > half + spread + edge.margin)
+        return found
 
     def edge(self, edge: Acting) -> None:
         """Add the forces of an edge to those on joints, or to the wrenches on links."""
@@ -222,8 +245,17 @@ class _Acting:
 
         on.when(tree, in_tree, aside)
         on.when(between_bodies, lambda: None, lambda: self._drive(edge, rate, pull))
-        on.when(edge.spring >= 0, lambda: self._spring(edge, pull))
-        self.unless_refused(lambda: on.when(edge.friction >= 0, lambda: self._friction(edge, rate, pull)))
+        pressed = on.counter(1)
+
+        def spring() -> None:
+            self._spring(edge, pull)
+            pressed.value = on.select(on.both(edge.support > 0, w.c[0] <= 0.0), 0, 1)
+
+        def friction() -> None:
+            on.when(on.both(edge.friction >= 0, on.same(pressed.value, 1)), lambda: self._friction(edge, rate, pull))
+
+        on.when(edge.spring >= 0, spring)
+        self.unless_refused(friction)
 
         def in_joint() -> None:
             def one(j: Integer) -> None:

@@ -1,11 +1,12 @@
 """Derivatives of a mechanism's rates by its state: the rates over dual numbers, several directions a call."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.apart import Column
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
@@ -39,18 +40,24 @@ class RateSlopes:
     relation
         Called with the number of a component; returns the program and the entry that it is in machine code.
     wanted
-        Numbers of y by which derivatives are asked for; those by others are 0.
+        Of each direction the numbers of y by which derivatives are asked for, and the rows of each; no two of a
+        direction share a row. All else is 0.
     size
         How many numbers of y have rates of interest: the first ones.
     """
 
     def __init__(
-        self, engine: Engine, relation: Callable[[int], tuple[Program, str]], wanted: Index, size: int
+        self,
+        engine: Engine,
+        relation: Callable[[int], tuple[Program, str]],
+        wanted: Sequence[Sequence[Column]],
+        size: int,
     ) -> None:
         coordinates, whole = engine.sizes
         self._q, self._y, self._out = (np.zeros(count) for count in (coordinates, whole, whole))
         self._seed, self._slope = np.zeros((2, whole, DIRECTIONS))
-        self._wanted, self._size = wanted, size
+        self._size = size
+        self._calls = [_call(wanted[k : k + DIRECTIONS]) for k in range(0, len(wanted), DIRECTIONS)]
         still, moved = np.zeros((coordinates, DIRECTIONS)), np.zeros((coordinates, DIRECTIONS))
         tables, work, _ = paired_tables(engine, relation)
         self._run = rate_slopes().compiled()["rates"].bind(
@@ -62,12 +69,20 @@ class RateSlopes:
         """A status, and ∂ẏ/∂y (size, size) where joints' elements are q·exp(v)."""
         self._q[:], self._y[:] = q, y
         found = np.zeros((self._size, self._size))
-        for first in range(0, self._wanted.size, DIRECTIONS):
-            here = self._wanted[first : first + DIRECTIONS]
-            self._seed[here, range(here.size)] = 1.0
+        for seeds, rows, columns, along in self._calls:
+            self._seed[seeds] = 1.0
             status = int(self._run())
-            self._seed[here] = 0.0
+            self._seed[seeds] = 0.0
             if status:
                 return status, found
-            found[:, here] = self._slope[: self._size, : here.size]
+            found[rows, columns] = self._slope[rows, along]
         return 0, found
+
+
+def _call(directions: Sequence[Sequence[Column]]) -> tuple[tuple[Index, Index], Index, Index, Index]:
+    """Places of the seeds of one call, and rows, columns and directions of what it finds."""
+    every = [(column, k, rows) for k, columns in enumerate(directions) for column, rows in columns]
+    columns, along = (np.array([one[i] for one in every], dtype=np.int64) for i in (0, 1))
+    counts = [len(rows) for _, _, rows in every]
+    whole = np.concatenate([rows for _, _, rows in every])
+    return (columns, along), whole, np.repeat(columns, counts), np.repeat(along, counts)

@@ -20,7 +20,7 @@ class Forces(NamedTuple):
     part: Index  # (edges, 4): component of the potential, of friction, entropy that takes its heat, −1: none; support
     frame: Array  # (edges, 24): rows of R and p of both joint frames in their links' frames
     left: Array  # (edges, 36): (BᵀB)⁻¹Bᵀ, row by row
-    reach: Array  # (edges, 1): from where on nothing acts
+    reach: Array  # (edges, 8): from where on nothing acts; margin and half lengths of boxes
     body: Index  # (bodies,): link on which the wrench acts, −1: none does
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
     node: Table[Node]

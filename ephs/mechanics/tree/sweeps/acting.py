@@ -31,6 +31,7 @@ from ephs.semantics.stage import (
 
 __all__ = [
     "ABOVE",
+    "APART",
     "BEYOND",
     "ON_BODIES",
     "ON_CUT",
@@ -49,7 +50,7 @@ __all__ = [
     "Work",
 ]  # fmt: skip
 
-ABOVE, BEYOND = 1, 2
+ABOVE, BEYOND, APART = 1, 2, 3
 """End of a spring's action: above a plane z = reach of its first frame, beyond a distance from it."""
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
@@ -152,6 +153,8 @@ class Acting(Record):
         The entropy that takes its heat.
     support, reach
         `ABOVE` or `BEYOND`: where the second frame's place in the first is higher or farther, nothing acts; else 0.
+    halves, margin
+        Of `APART`: nor where boxes of these half lengths about both frames are farther from each other.
     inner_turn, inner_at, outer_turn, outer_at
         Its first frame in the first link's, its second in the second's.
     left
@@ -176,6 +179,8 @@ class Acting(Record):
     outer_at = reals(3)
     left = reals(6, 6)
     reach = real()
+    margin = real()
+    halves = reals(6)
 
 
 class Body(Record):

@@ -1,0 +1,70 @@
+"""Columns of a Jacobian that have no row in common: one direction gives them all (Curtis, Powell and Reid, 1974)."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.mechanics.tree.finding.tables import TREE, Mechanism
+from ephs.solve.sparse import Index
+
+if TYPE_CHECKING:
+    from ephs.semantics.bundle import Array
+
+__all__ = ["Column", "columns_of_trees", "directions"]
+
+Column = tuple[int, Index]
+"""A column, and the rows in which it may have entries."""
+
+
+def columns_of_trees(t: Mechanism, increments: int, freedoms: int, warm: Index) -> Iterator[Column]:
+    """The columns of ∂ẏ/∂y of y = (v, r, heats) and their rows, of a mechanism without loops or attached networks.
+
+    A tree of bodies acts on itself, on those that springs and contacts tie to it, and on what takes the heat there.
+
+    Parameters
+    ----------
+    increments, freedoms
+        Sizes of v and r.
+    warm
+        Numbers of the heats with a column; they may act on all.
+    """
+    links, heats = len(t.parent), increments + freedoms
+    root = np.arange(links)
+    for link in range(links):
+        root[link] = link if t.parent[link] < 0 else root[t.parent[link]]
+    tied = {int(one): {int(one)} for one in root}
+    heated: dict[int, set[int]] = {one: set() for one in tied}
+    for i, kind in enumerate(t.kind):
+        ends = [i] if kind == TREE else [int(t.first[i]), int(t.second[i])]
+        trees = {int(root[end]) for end in ends if end >= 0}
+        for one in trees:
+            tied[one] |= trees
+            heated[one] |= {int(t.heat[i])} if t.heat[i] >= 0 else set()
+    own: dict[int, list[int]] = {one: [] for one in tied}
+    for i in range(links):
+        own[int(root[i])] += range(int(t.r_at[i]), int(t.r_at[i] + t.dim[i]))
+    rows: dict[int, Index] = {}
+    for one, others in tied.items():
+        moved = np.sort(np.concatenate([np.array(own[other], dtype=np.int64) for other in others]))
+        warmed = np.array(sorted(heated[one]), dtype=np.int64)
+        rows[one] = np.concatenate([moved, increments + moved, heats + warmed])
+    owner = {freedom: one for one, found in own.items() for freedom in found}
+    for start in (0, increments):
+        yield from ((start + freedom, rows[owner[freedom]]) for freedom in sorted(owner))
+    every = np.arange(heats + len(t.node))
+    yield from ((heats + int(heat), every) for heat in warm)
+
+
+def directions(columns: Sequence[Column], size: int) -> list[list[Column]]:
+    """Columns of each direction, each in the first one where none has a row of it; rows are below ``size``."""
+    found: list[list[Column]] = []
+    taken: list[Array] = []
+    for column, rows in columns:
+        place = next((k for k, mask in enumerate(taken) if not mask[rows].any()), len(found))
+        if place == len(found):
+            found.append([])
+            taken.append(np.zeros(size, dtype=bool))
+        found[place].append((column, rows))
+        taken[place][rows] = True
+    return found

@@ -1,0 +1,29 @@
+"""Where a component acts, of the states that it reads."""
+
+from dataclasses import dataclass
+from typing import final
+
+__all__ = ["Support"]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Support:
+    """Where a component acts: outside of it energies, efforts and flows are 0.
+
+    Parameters
+    ----------
+    places
+        Places among the states' coordinates.
+    limit
+        The largest value of that coordinate, or norm of several, at which anything happens.
+    halves
+        Half lengths in m of two boxes about the frames of a relative pose, or none.
+    margin
+        The largest distance in m of these boxes at which anything happens.
+    """
+
+    places: tuple[int, ...]
+    limit: float
+    halves: tuple[float, ...] = ()
+    margin: float = 0.0
