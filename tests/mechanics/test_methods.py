@@ -149,7 +149,7 @@ def test_steps_keep_their_limits(method):
     sol = ephs.simulate(scene, 0.2, method=method, rtol=1e-3, atol=1e-3, max_step=0.01)
     assert np.diff(sol.t).max() <= 0.01 * (1.0 + 1e-12)
     assert sol.stats["longest_step"] <= 0.01 * (1.0 + 1e-12)
-    with pytest.raises(ephs.SimulationError, match="below the least"):
+    with pytest.raises(ephs.SimulationError, match="below the smallest"):
         ephs.simulate(scene, 0.2, method=method, rtol=1e-13, atol=1e-13, min_step=0.05)
 
 

@@ -279,7 +279,7 @@ def test_a_full_disk_ends_the_run_by_name_and_the_run_goes_on_when_there_is_room
     room = (tmp_path / "other.journal").stat().st_size * 2 // 3
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))  # Python ignores the signal, and sees EFBIG
     try:
-        with pytest.raises(ephs.SimulationError, match="make room") as failed:
+        with pytest.raises(ephs.SimulationError, match="free space") as failed:
             simulate(SCENE, options, journal=file)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)

@@ -212,7 +212,7 @@ def test_what_was_computed_is_kept_when_a_run_ends_early():
     with pytest.raises(ephs.SimulationError, match="more steps than are allowed") as caught:
         ephs.simulate(oscillator.free_oscillator, 10.0, initial=start, method="radau", max_steps=5)
     assert len(caught.value.partial.t) == 6 and caught.value.partial.t[-1] == caught.value.time
-    with pytest.raises(ephs.SimulationError, match="below the least") as caught:
+    with pytest.raises(ephs.SimulationError, match="below the smallest") as caught:
         ephs.simulate(
             oscillator.free_oscillator, 10.0, initial=start, method="radau", min_step=5.0, rtol=1e-12, atol=1e-12
         )
