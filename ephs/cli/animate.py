@@ -1,4 +1,4 @@
-"""`ephs animate`: the moving mechanism of a result folder as one page."""
+"""`ephs animate`: the moving mechanism of a result folder as one page, or as a video."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,16 +23,16 @@ def animate(
     fps: float = 30.0,
     duration: float | None = None,
 ) -> int:
-    """Write the moving mechanism as one page, which needs no network.
+    """Write the moving mechanism as one page, which needs no network, or as a video of its schematic.
 
     Parameters
     ----------
     folder
         Result folder of ephs run, or a saved solution (.nc).
     output
-        Page to write, FILE.html.
+        Page to write, FILE.html, or video: FILE.gif, or FILE.mp4 or FILE.webm, which need ffmpeg.
     wrenches
-        Draw joint forces and moments, and contact forces, as arrows.
+        Draw joint forces and moments, and contact forces, as arrows; pages only, as the next two.
     heat
         Colour bodies by the temperature of their thermal nodes.
     strain
@@ -45,11 +45,21 @@ def animate(
     from rich.console import Console
 
     from ephs.show import animate as animated
+    from ephs.show import write_video
+    from ephs.show.video import VIDEOS
 
-    if output.suffix != ".html":
-        raise BadInput(TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=".html"))
+    if output.suffix not in (".html", *VIDEOS):
+        expected = ", ".join((".html", *VIDEOS))
+        raise BadInput(TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=expected))
+    overlays = {"wrenches": wrenches, "heat": heat, "strain": strain}
+    drawn = next((name for name, asked in overlays.items() if asked), None)
+    if output.suffix in VIDEOS and drawn is not None:
+        raise BadInput(f"--{drawn}: found a video, {output}, expected a page, FILE.html; leave the option out")
     sol = solution_of(folder)
     with addressed(str(folder), output):
-        animated(sol, output, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)
+        if output.suffix in VIDEOS:
+            write_video(sol, output, fps=fps, duration=duration)
+        else:
+            animated(sol, output, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)
     Console().print(str(output), highlight=False, markup=False, soft_wrap=True)
     return 0

@@ -22,6 +22,7 @@ from ephs.show.plots import plot_exergy as plot_exergy
 from ephs.show.plots import plot_motion as plot_motion
 from ephs.show.portraits import plot_phase as plot_phase
 from ephs.show.report import write_report as write_report
+from ephs.show.video import write_video as write_video
 
 __all__ = [
     "Drawing",
@@ -43,4 +44,5 @@ __all__ = [
     "plot_signals",
     "plot_wrenches",
     "write_report",
+    "write_video",
 ]

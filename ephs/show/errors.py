@@ -21,6 +21,8 @@ _TEXTS = {
         "animation: the package viser is not installed; expected it for moving pictures; "
         "install it with: pip install 'ephs[viz]'"
     ),
+    "video": "video {found}: found another ending, expected one of {expected}; choose another file name",
+    "ffmpeg": "video: found no program ffmpeg, which writes {found} files; install it, or choose a file ending in .gif",
     "ledger": "solution {path}: found no {found}, expected {expected}; draw the states with plot_motion instead",
     "span": "animation: found {path} = {found}, expected a number of at least {expected}; give a larger one",
     "shape": (

@@ -84,7 +84,7 @@ class Sketch:
         return points.min(axis=0), points.max(axis=0)
 
 
-def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None) -> Sketch:
+def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None, extent: float | None = None) -> Sketch:
     """The schematic of a mechanism, seen from far off.
 
     Parameters
@@ -93,6 +93,9 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None) -> Ske
         (7,) of each body.
     way
         (3,) from the mechanism to the eye; by default the side on which its places are seen best.
+    extent
+        Of the mechanism in m, for the size of symbols, in frames of a film: these have no names and no scale bar. By
+        default it is that of the mechanism at these poses.
     """
     out = Sketch()
     joints, springs = dict(scene.all_joints()), lines_of(scene)
@@ -104,7 +107,7 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None) -> Ske
         [*corners.values(), *(np.array(e) for e in ends.values()), *(p[None] for p in places.values())]
     )
     view = _view(best_side(cloud) if way is None else way)
-    size = float(np.linalg.norm(np.ptp(cloud @ view[:, :2], axis=0))) or 1.0
+    size = extent or float(np.linalg.norm(np.ptp(cloud @ view[:, :2], axis=0))) or 1.0
     order = sorted(solids, key=lambda name: float((corners[name] @ view[:, 2]).mean()))
     for name in order:  # the far bodies first
         solid, tone = solids[name], MUTED if solids[name].kind == "stand-in" else ink(list(solids).index(name))
@@ -126,8 +129,9 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None) -> Ske
             axis = rotate(poses.get(joint.body1, _STILL)[:4], rotate(frame[:4], np.array([0.0, 0.0, 1.0])))
             if joint.kind != "free":
                 draw(out, joint, places[name] @ view, axis @ view, 0.022 * size)
-    _bar(out, cloud @ view, size)
-    _names(out, {n: poses[n][4:] @ view for n in solids}, {n: p @ view for n, p in places.items()}, size)
+    if extent is None:
+        _bar(out, cloud @ view, size)
+        _names(out, {n: poses[n][4:] @ view for n in solids}, {n: p @ view for n, p in places.items()}, size)
     return out
 
 

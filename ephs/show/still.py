@@ -26,12 +26,14 @@ MARGIN = 24.0
 """Pixels about the marks of an SVG, for names."""
 
 
-def draw_still(axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | None = None) -> None:
+def draw_still(
+    axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | None = None, extent: float | None = None
+) -> None:
     """Draw a mechanism into some axes; parameters as of `sketch`."""
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.patheffects import withStroke
 
-    made = sketch(scene, poses, way)
+    made = sketch(scene, poses, way, extent)
     for level, (filled, group) in enumerate(groupby(made.marks, key=lambda mark: mark.fill is not None)):
         marks = list(group)
         strokes: dict[str, Any] = {
