@@ -1,15 +1,16 @@
-"""Position residuals of joints over a motion: the second joint frame by coordinates against that by bodies."""
+"""Position residuals over a motion: joint frames by coordinates against those by bodies, and lengths of tendons."""
 
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 import numpy as np
 
-from ephs.mechanics.motion.batch import gap, product
+from ephs.mechanics.motion.batch import compose, gap, product
+from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import Joint
 from ephs.semantics.bundle import Array
 
-__all__ = ["open_by"]
+__all__ = ["open_by", "span_of"]
 
 
 class Read(Protocol):
@@ -40,3 +41,14 @@ def open_by(joints: Mapping[str, Joint], read: Read, chunks: Iterable[slice]) ->
         body1, body2, moved = (np.stack([pose[at].T for pose in of], axis=1) for of in poses)
         out.append(np.array(gap(product(body1, product(frame1, moved)), product(body2, frame2))))
     return np.concatenate(out, axis=2) if out else np.zeros((2, len(each), 0))
+
+
+def span_of(tendon: Tendon, read: Read) -> Array:
+    """(n,) sum of the distances between the points of each segment, in m, by the poses of the bodies."""
+
+    def point(end: tuple[str, Array]) -> Array:
+        poses = read.poses(end[0])
+        frame = np.concatenate([[1.0, 0.0, 0.0, 0.0], end[1]])
+        return compose(poses, np.broadcast_to(frame, poses.shape))[:, 4:]
+
+    return np.sum([np.linalg.norm(point(two) - point(one), axis=1) for one, two in tendon.segments], axis=0)

@@ -236,3 +236,39 @@ def test_sensitivities_to_its_numbers_are_exact(tmp_path, key, value):
     step = 1e-3 * value
     ends = [ended(varied(scene, {path: value + by}), "rk87", rtol=1e-11, atol=1e-12)[0][0] for by in (step, -step)]
     assert slope == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5)
+
+
+THROUGH = """
+format = 1
+name = "through"
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.cart]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "cart"]
+frame1 = { rotation = { axis = [0, 1, 0], angle_deg = 90 } }
+frame2 = { rotation = { axis = [0, 1, 0], angle_deg = 90 } }
+coordinate = -0.33
+rate = 1.0
+[tendons.stay]
+bodies = ["ground", "cart"]
+points = [[0.0, OFF, 0.0], [0.0, 0.0, 0.0]]
+stiffness = 1e-3
+length = 0.0
+"""
+
+
+@pytest.mark.parametrize("method", ["natural", "alpha"])
+def test_a_length_that_is_not_that_of_its_points_is_found_by_the_audit(tmp_path, method):
+    """A segment's direction jumps at the length zero, where coarse steps lose length; beside it they do not."""
+    for off, sound in ((0.0, False), (0.3, True)):
+        file = tmp_path / f"{off}.toml"
+        file.write_text(THROUGH.replace("OFF", str(off)), encoding="utf-8")
+        sol = ephs.simulate(ephs.load(file), 1.0, method=method, step=0.08, audit="off")
+        places = sol.body("cart").position - np.array([0.0, off, 0.0])
+        apart = np.abs(sol["tendons.stay.spring.q"].ravel() - np.linalg.norm(places, axis=1)).max()
+        told = [finding for finding in sol.audit.findings if "tendons.stay" in finding.path]
+        assert (apart <= 1e-2) == sound == (not told)
