@@ -5,7 +5,7 @@ from typing import final
 __all__ = ["PatternError"]
 
 _TEXTS = {
-    "name": "invalid name {found!r} in a path: expected {expected}; choose another name",
+    "name": "invalid name {found!r} in a path: {expected}; choose another name",
     "path": "invalid path {found!r}: expected {expected}",
     "prefix": "{what}: the paths {found} clash, as one is a prefix of the other; {expected}; rename one of them",
     "duplicate": "{what}: the path {found} is given twice; {expected}; rename one of them",

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from types import FunctionType, MethodType
 from typing import Any, cast, final
@@ -88,6 +88,10 @@ def _same(one: Any, two: Any, depth: int = 0) -> bool:
         return alike and all(_same(a, b, depth + 1) for a, b in zip(*held, strict=True))
     if isinstance(one, MethodType):
         return one.__func__ is two.__func__ and _same(one.__self__, two.__self__, depth + 1)
+    if isinstance(one, partial):
+        mine, theirs = cast("partial[Any]", one), cast("partial[Any]", two)
+        held = (mine.args, mine.keywords) == (theirs.args, theirs.keywords)
+        return held and _same(mine.func, theirs.func, depth + 1)
     if isinstance(one, Formula):
         return one.parameters == two.parameters and _same(one.function, two.function, depth + 1)
     if isinstance(one, dict):

@@ -241,7 +241,7 @@ def _tables(
     for called, mine in zip(parts.network.attached, flows, strict=True):
         sinks += [[int(flow), taken, int(mine[0])] for flow, (_, taken) in zip(mine, called.heated, strict=True)]
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
-    acting = np.unique([*spring, *friction, *_called(parts.network)])
+    acting = np.unique([*spring, *friction, *_called(parts.network)]).astype(np.int64)
     return Mechanism(
         parent=np.array(parents, dtype=np.int64),
         inertia=np.array([parts.links[body].inertia for body in order]).reshape(links, 6, 6),
