@@ -11,7 +11,7 @@ made.
 from typing import TYPE_CHECKING
 
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
-from ephs.solve.march.account import MOST, ROUNDING
+from ephs.solve.march.account import BEYOND, MOST, ROUNDING
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.balance import Correction
@@ -35,8 +35,9 @@ def store(on: Evaluator, run: "Correction") -> None:
     w, size = run.motion.work, run.heats.size
     along, beside = w.idle.part(0, size), w.spare.part(0, size)
     _directions(on, run, along, beside)
-    first, slope = _weigh(on, run, along)
-    second, more = _weigh(on, run, beside)
+    found = _energies(on, run, along, beside)
+    first, slope = _weigh(on, run, found, 0)
+    second, more = _weigh(on, run, found, 1)
 
     def join(k: Integer) -> None:
         along[k] = first * along[k] + second * beside[k]
@@ -85,31 +86,36 @@ def _directions(on: Evaluator, run: "Correction", along: Vector, beside: Vector)
     on.loop(size, even)
 
 
-def _weigh(on: Evaluator, run: "Correction", direction: Vector) -> tuple[Real, Real]:
-    """Return dE/d²E along a direction, and (dE)²/d²E: nothing where its change of the energy is rounding."""
-    trial, here = run.motion.work.temperature.part(0, direction.size), run.energy
+def _energies(on: Evaluator, run: "Correction", along: Vector, beside: Vector) -> Vector:
+    """Return the changes (4,) of the energy forwards and backwards along both directions; BEYOND without one."""
+    trial, here = run.motion.work.temperature.part(0, along.size), on.variable(run.energy)
+    found = on.scratch(4)
 
-    def at(sign: float) -> Real:
-        def one(k: Integer) -> None:
-            trial[k] = run.heats[k] + sign * direction[k]
+    def one(k: Integer) -> None:
+        sign = on.select(on.either(on.same(k, 0), on.same(k, 2)), 1.0, -1.0)
 
-        on.loop(direction.size, one)
-        return run.energy_at(trial)
+        def place(j: Integer) -> None:
+            trial[j] = run.heats[j] + sign * on.select(k < 2, along[j], beside[j])
 
-    up = on.variable(0.0)
-    up.value = at(1.0)
-    above = on.same(run.status.value, 0)
-    rise = on.variable(0.0)
-    rise.value = on.select(above, up.value - here, 0.0)
-    fall = on.variable(0.0)
-    fall.value = here - at(-1.0)
-    sound = on.both(on.same(run.status.value, 0), on.absolute(rise.value) + on.absolute(fall.value) < 1e300)
+        on.loop(along.size, place)
+        change = run.energy_at(trial) - here.value
+        sound = on.both(on.same(run.status.value, 0), on.absolute(change) < BEYOND)
+        found[k] = on.select(sound, change, BEYOND)
+
+    on.loop(4, one)
     run.status.value = 0
-    slope, bend = 0.5 * (rise.value + fall.value), on.absolute(rise.value - fall.value)
-    known = on.both(sound, on.absolute(slope) > run.account.noise)
+    return found
+
+
+def _weigh(on: Evaluator, run: "Correction", found: Vector, which: int) -> tuple[Real, Real]:
+    """Return dE/d²E along a direction, and (dE)²/d²E: nothing where its change of the energy is rounding."""
+    rise, fall = found[2 * which], -found[2 * which + 1]
+    sound = on.both(rise < BEYOND, fall > -BEYOND)
+    slope, bend = on.select(sound, 0.5 * (rise + fall), 0.0), on.absolute(rise - fall)
+    known = on.absolute(slope) > run.account.noise
     bend = on.maximum(bend, STRAIGHT * on.absolute(slope))
     ratio = on.select(known, slope / on.select(known, bend, 1.0), 0.0)
-    return ratio, ratio * on.select(known, slope, 0.0)
+    return ratio, ratio * slope
 
 
 def _go(on: Evaluator, run: "Correction", along: Vector, whole: Variable[Real]) -> None:
@@ -132,14 +138,21 @@ def _go(on: Evaluator, run: "Correction", along: Vector, whole: Variable[Real]) 
             run.heats[k] = run.heats[k] + by * along[k]
 
         on.loop(along.size, one)
-        run.look()
 
     def once() -> Truth:
-        short = on.variable(run.short)
+        short, known = on.variable(run.short), [on.variable(run.energies[k]) for k in range(3)]
         step = part * (short.value / whole.value)
         shift(step)
+        run.look()
         sound = on.same(run.status.value, 0)
-        on.when(sound, lambda: None, lambda: shift(-step))
+
+        def back() -> None:
+            shift(-step)
+            run.status.value = 0
+            for k, energy in enumerate(known):
+                run.energies[k] = energy.value
+
+        on.when(sound, lambda: None, back)
         rounds.value = rounds.value + 1
         share = (short.value - run.short) / on.select(on.absolute(short.value) > 0.0, part * short.value, 1.0)
         seen = on.both(on.absolute(short.value) > LEARNT * account.noise, on.both(share > 0.25, share < 4.0))
