@@ -119,13 +119,13 @@ def sparse(run: Heard, n: int, seed: int, least: float) -> None:
 
 
 def linear(run: Heard, n: int, k: int, m: int, seed: int) -> None:
-    """The relations of n ports with k conditions and m multipliers, at drawn numbers."""
+    """The relations of n ports with k conditions and m multipliers, at drawn numbers; of a frame change 12 and 6."""
     rng = np.random.default_rng(seed)
-    dims, width = np.array([n, k, m, 0]), n + k + m
-    sizes = {"scal": 1, "p": n * (n + k), "x0": n, "v": n, "e": n, "lam": k, "f": n * n, "c": max(k, 1)}
-    sizes |= {"jac": (n + k) * width, "work": 1}
     for name in PROGRAMS["linear"].entries:
-        run[name](dims, *(rng.standard_normal(size) for size in sizes.values()))
+        n, k, m = (12, 6, 0) if name == "frame_change" else (n, k, m)
+        sizes = {"scal": 1, "p": n * (n + k), "x0": n, "v": n, "e": n, "lam": k, "f": n * n, "c": max(k, 1)}
+        sizes |= {"jac": (n + k) * (n + k + m), "work": 1}
+        run[name](np.array([n, k, m, 0]), *(rng.standard_normal(size) for size in sizes.values()))
 
 
 @cache
