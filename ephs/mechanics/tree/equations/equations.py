@@ -285,8 +285,8 @@ class Equations:
 
     def ended(self, base: ReducedState, y: Array, t: float) -> ReducedState:
         """The same of a vector whose totals are made up already."""
-        v, r, heats, totals = np.split(y, np.cumsum([self.nv, self.n, self.ns]))
-        end = ReducedState(t, self.advance(base.q, v), r, heats, totals, account=base.account)
+        q, at = self.advance(base.q, y[: self.nv]), self.nv + self.n
+        end = ReducedState(t, q, y[self.nv : at], y[at : at + self.ns], y[at + self.ns :], account=base.account)
         return self.prescribed.followed(base, end)
 
     def settled(self, y0: Array, y1: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from types import MappingProxyType
 from typing import final
 
@@ -116,6 +117,9 @@ class Layout:
             if name not in self.freedoms:
                 raise OptionError(f"{what}[{name!r}]", value, f"a joint: {', '.join(self.joints)}")
             where = self.freedoms[name]
+            if type(value) is float and where.size == 1 and isfinite(value):  # in the loops of controllers
+                out[where[0]] = value
+                continue
             array = np.atleast_1d(np.asarray(value, dtype=float))
             if array.shape != where.shape or not np.isfinite(array).all():
                 raise OptionError(f"{what}[{name!r}]", value, f"{where.size} finite numbers")
