@@ -25,3 +25,15 @@ def test_every_page_is_in_the_contents():
 def test_no_page_loads_from_a_network():
     loading = re.compile(r'<(?:script|link|img)[^>]*(?:src|href)="https?:')
     assert not [page.name for page in DOCS.glob("*.md") if loading.search(page.read_text("utf-8"))]
+
+
+def test_blocks_are_closed():
+    """Fences of code come in pairs: one that opens may have a word, one that closes has none."""
+    for page in (*DOCS.glob("*.md"), *DOCS.parent.glob("*.md")):
+        open_at = 0
+        for line in page.read_text("utf-8").splitlines():
+            if line.startswith("```"):
+                word = line[3:].strip()
+                assert not (open_at and word), f"{page.name}: {line} within a block"
+                open_at = not open_at
+        assert not open_at, page.name
