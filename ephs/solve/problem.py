@@ -171,7 +171,7 @@ class Motion(Protocol):
         """Contacts passed in a step of at most h s: path, instant after it, distance of the step in thicknesses."""
         ...
 
-    def slips(self) -> Iterable[tuple[Path, int, float]]:
+    def length_errors(self) -> Iterable[tuple[Path, int, float]]:
         """Lengths that states integrate: path, instant at which one is farthest from that of its points, difference as
         a part of the mechanism's length."""
         ...

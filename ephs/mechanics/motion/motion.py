@@ -255,7 +255,7 @@ class SceneMotion:
         for leap in leaps(self._scene, self, self._solution.t, h):
             yield component_path("contacts", leap.name), leap.instant, leap.size
 
-    def slips(self) -> Iterator[tuple[Path, int, float]]:
+    def length_errors(self) -> Iterator[tuple[Path, int, float]]:
         """Tendons: path, instant at which the state is farthest from the points' distances, part of the length."""
         problem = self._solution.problem
         for name, tendon in self._scene.all_tendons():

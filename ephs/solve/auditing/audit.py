@@ -162,8 +162,8 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
         short = f"{0.9 * longest * LEAP / size:.2g} s: a contact was passed"
         hint = f" of {short}" if bounds.step else f", or max_step = {short}"
         yield Breach(size, lambda: LEAP - min(LEAP, bounds.accuracy), instant, path, hint)
-    for path, instant, size in solution.motion.slips() if solution.motion is not None else ():
-        yield Breach(size, _nothing, instant, path, ": a segment of the tendon came to the length zero")
+    for path, instant, size in solution.motion.length_errors() if solution.motion is not None else ():
+        yield Breach(size, _nothing, instant, path, ": segments of tendons must not pass the length zero")
     if isinstance(trials, Missed):
         yield Breach(trials.size * bounds.tolerance, _nothing, int(np.argmin(np.abs(solution.t - trials.at))))
     if bounds.step is None or not isinstance(trials, Trials):
