@@ -21,7 +21,7 @@ __all__ = ["scene_from_text", "scene_to_text"]
 _BESIDE: Mapping[Any, frozenset[str]] = {Joint: frozenset({"coordinate", "limits"}), Tendon: frozenset({"points"})}
 """Arrays beside those among the numbers."""
 _SEVERAL = frozenset({"shapes", "between", "surfaces", "joints", "bodies", "ends", "outline", "lengths"})
-"""What is several things, in order."""
+"""Attributes that are tuples."""
 
 
 def scene_to_text(scene: Scene) -> str:

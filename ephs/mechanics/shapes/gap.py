@@ -193,7 +193,7 @@ def segments(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
 def edges(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
     """Gap between two edges of bodies whose corners meet the other body, too: `segments` that cross.
 
-    Where edges are parallel within `CROSSING`, and so touch along a line, the ends of the line are corners. The gap is
+    Edges that are parallel within `CROSSING` touch along a line, whose ends are corners. The gap is
     larger there by up to the lengths, so that no force jumps from end to end of a line when it tilts.
     """
     whole, length = segments(half1, radius1, half2, radius2), half1 + half2
