@@ -14,8 +14,6 @@ OF ?=
 # Threads of a linear-algebra library change the order of sums, and fight with the test workers.
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
-# LLVM loads code by addresses of 32 bits: processes of the tests stay small, as they keep all code that they load.
-export MALLOC_ARENA_MAX := 2
 
 .DELETE_ON_ERROR:
 .PHONY: help demo test laws real learning lint types docs bench tables fuzz fuzz-inputs mutate mutants repeat dist matrix smoke clean
@@ -43,8 +41,7 @@ test: $(VENV)/.installed-dev
 	$(PYTEST) -n $(CORES) -m 'not long'
 
 laws: $(VENV)/.installed-dev
-	$(PYTEST) -n $(CORES) -m long tests/mechanics
-	$(PYTEST) -n $(CORES) -m long --ignore tests/mechanics
+	$(PYTEST) -n $(CORES) -m long
 
 real: $(VENV)/.installed-real
 	$(PYTEST) -n $(CORES) tests_real

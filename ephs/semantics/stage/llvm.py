@@ -1,7 +1,8 @@
 """Interface to LLVM: object code from assembly text, and addresses from object code."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
+from itertools import count
 from typing import Any, Final, final
 
 from ephs.semantics.stage.errors import StageError
@@ -26,11 +27,16 @@ class Target:
 class Library:
     """Object code in memory; its addresses are good as long as this lives."""
 
-    engine: Any
+    linker: Any
+    linked: Any
+    found: dict[str, Any] = field(default_factory=dict[str, Any])
+    """What LLVM returns for a name; it unloads the code when one of these is gone."""
 
     def address(self, name: str) -> int:
         """Return the address of a function."""
-        return int(self.engine.get_function_address(name))
+        if name not in self.found:
+            self.found[name] = self.linker.lookup(self.linked.name, name)
+        return int(self.found[name][name])
 
 
 @cache
@@ -104,10 +110,17 @@ def compile_text(text: str, target: Target | None = None) -> bytes:
     return bytes(machine.emit_object(module))
 
 
+@cache
+def _linker() -> Any:
+    """Return LLVM's linker in memory: it places an object in one block, within reach of addresses of 32 bits."""
+    return _llvm().create_lljit_compiler(_machine(host()), use_jit_link=True)
+
+
+_COUNT: Final = count()
+
+
 def load(code: bytes) -> Library:
     """Load object code for this machine."""
-    llvm = _llvm()
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine(host()))
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return Library(engine)
+    linker = _linker()
+    parts = _llvm().JITLibraryBuilder().add_object_img(code).add_current_process()
+    return Library(linker, parts.link(linker, f"ephs{next(_COUNT)}"))

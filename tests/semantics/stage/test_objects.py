@@ -2,6 +2,7 @@
 
 import ctypes
 import errno
+import mmap
 import os
 import shutil
 import subprocess
@@ -160,6 +161,31 @@ def test_processes_at_once_leave_one_whole_file(folder):
     assert [process.wait(timeout=120.0) for process in running] == [0, 0, 0]
     (file,) = folder.iterdir()
     assert STORE.read(file.name) is not None
+
+
+def load_where_memory_is_scattered() -> None:
+    """Load code and a table many times, in a process whose free places are small and 3 GiB apart."""
+    system, page, block = ctypes.CDLL(None), 1 << 12, 3 << 30
+    system.mmap.restype = ctypes.c_void_p
+    system.mmap.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long)
+    system.munmap.argtypes = (ctypes.c_void_p, ctypes.c_size_t)
+    code = llvm.compile_text(
+        f"@table = internal constant [4096 x i64] [{', '.join(f'i64 {k}' for k in range(4096))}]\n"
+        "define i64 @pick(i64 %k) {\n%at = getelementptr [4096 x i64], ptr @table, i64 0, i64 %k\n"
+        "%found = load i64, ptr %at\nret i64 %found\n}"
+    )
+    for _ in range(40):
+        start = system.mmap(None, block, 0, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, -1, 0)
+        system.munmap(start + block - page, page)
+    pick = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
+    loaded = [llvm.load(code) for _ in range(200)]
+    assert all(pick(library.address("pick"))(k) == k for k, library in enumerate(loaded))
+
+
+def test_code_is_loaded_where_free_memory_is_scattered():
+    """Addresses in code have 32 bits: code and tables of an object must be placed together."""
+    code = "from tests.semantics.stage import test_objects; test_objects.load_where_memory_is_scattered()"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def many() -> tuple[np.ndarray, np.ndarray]:
