@@ -320,7 +320,7 @@ LAWS: Mapping[str, Law] = {
         f"{COARSE:g}, and {MOTION:g} at the end, at constant steps; {MANY_TIMES:g} rtol at chosen ones",
         _accuracy,
         lambda bounds: bounds.accuracy,
-        ("take a step", "lower rtol"),
+        ("take a shorter step", "lower rtol"),
     ),
     "entropy": Law(
         "no component, and no system without entropy from outside, loses entropy in a step",
