@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Storage
+from ephs.semantics.primitives import Primitive, Storage
 from ephs.solve.heats import Heats, exponential_law
 from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.model import Model
@@ -148,15 +148,20 @@ def _stores(model: Model) -> list[_Store]:
         elif slot.primitive.kind == "storage":
             taken |= seen & set(slot.efforts)
             seen |= set(slot.efforts)
+    laws = [_law(primitive) for primitive in d.numbering.primitives]
     found: list[_Store] = []
     for number, slot in enumerate(d.components):
-        primitive = slot.primitive
-        if not isinstance(primitive, Storage) or len(slot.efforts) != 1 or slot.efforts[0] in taken:
-            continue
-        law = (1.0, 0.0) if primitive.environment else exponential_law(primitive)
-        if law is not None and t.entropy[slot.efforts[0]] == 1.0:
+        law = laws[d.numbering.primitive[number]]
+        if law is not None and t.entropy[slot.efforts[0]] == 1.0 and slot.efforts[0] not in taken:
             found.append(_Store(number, slot.efforts[0], slot.reads[0].point.start, law))
     return found
+
+
+def _law(primitive: Primitive) -> tuple[float, float] | None:
+    """The exponential law of a storage of one state; the environment's is linear."""
+    if not isinstance(primitive, Storage) or len(primitive.interface) != 1:
+        return None
+    return (1.0, 0.0) if primitive.environment else exponential_law(primitive)
 
 
 def _ports(model: Model, stores: Mapping[int, int]) -> list[_Port]:
