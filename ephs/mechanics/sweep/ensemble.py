@@ -84,7 +84,7 @@ class Ensemble:
         self, scene: Scene, axes: Axes, t0: float, until: float, save_at: Array, options: Mapping[str, Any],
         outputs: tuple[Output, ...],
     ) -> None:  # fmt: skip
-        self.t0, self._until, self._options = t0, until, dict(options)
+        self.t0, self.until, self._options = t0, until, dict(options)
         if self._options.pop("form", "reduced") != "reduced" or set(self._options) - _STEERING:
             raise Unlike
         times = times_of(save_at, t0, until)
@@ -121,8 +121,8 @@ class Ensemble:
     def span(self, start: ReducedState, control: Control, times: Array, saved: int) -> Span[ReducedState]:
         """The run of a member."""
         policy = None if control.step is not None else _CHOSEN
-        h = first_step(control, abs(self._until - self.t0))
-        return Span(start, self.t0, self._until, h, control, policy, times, saved)
+        h = first_step(control, abs(self.until - self.t0))
+        return Span(start, self.t0, self.until, h, control, policy, times, saved)
 
     def stepper(self, equations: Equations) -> Any:
         """The method on these equations.
@@ -134,7 +134,7 @@ class Ensemble:
         """
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
-        if given.get("step") is None and longest_step(equations.problem.scene, 1, 0.0, (self.t0, self._until)) < np.inf:
+        if given.get("step") is None and longest_step(equations.problem.scene, 1, 0.0, (self.t0, self.until)) < np.inf:
             raise Unlike("each member has its own limit")
         if equations.led.holds:
             raise Unlike("its work is no sum of rows")
@@ -174,7 +174,7 @@ class _Runs:
         if step is not None:
             self._legs.append(partial(self._leg, replace(control, step=LONGER * step), np.zeros(0), 0))
         self._marches = [Marches(leg(self._made.start), tables, most) for leg in self._legs]
-        kept = times.size - ensemble.first
+        kept = np.count_nonzero(times != ensemble.until) - ensemble.first  # the end is looked at in any case
         self._chosen = np.unique(np.linspace(0, kept - 1, INSTANTS).astype(int)) if kept else np.zeros(0, dtype=int)
         self._energies = Energies(eq, tables, most, self._chosen.size + 2)
 
@@ -184,22 +184,21 @@ class _Runs:
         rows, done = ensemble.images.of(members)
         for _, stack, within, among in self._parts:
             stack[:count, within] = rows[:, among]
-        q, r, heats = (start[:count] for start in self._starts)
+        q, *start = (each[:count] for each in self._starts)
+        y = np.hstack([*start, np.zeros((count, 2 + len(eq.reduced.made)))])
         for marches, leg in zip(self._marches, self._legs, strict=True):
-            ending = marches.run(q, r, heats, BURST)
+            ending = marches.run(q, y, BURST)
             for k in np.flatnonzero(done & (ending == Ending.CAREFUL)):
                 ending[k] = self._carefully(int(k), rows[k], leg, marches)
             done &= ending == Ending.DONE
-        marches, begin = (
-            self._marches[0],
-            (q, np.pad(np.hstack([r, heats]), ((0, 0), (0, eq.size - eq.nv - r.shape[1] - heats.shape[1])))),
-        )
         with np.errstate(all="ignore"):  # of members that are not done
-            done &= self._lawful(rows, *begin)
-        kept = marches.rows_q[:count], marches.rows_y[:count]
-        if ensemble.first:
-            kept = tuple(np.concatenate([one[:, None], many], axis=1) for one, many in zip(begin, kept, strict=True))
-        return Ran(done, ensemble.read(*kept), marches.steps[:count].copy(), marches.rejected[:count].copy())
+            done &= self._lawful(rows, q, y)
+        marches = self._marches[0]
+        q, y = (
+            np.concatenate([start[:, None][:, : ensemble.first], kept[:count]], axis=1)
+            for start, kept in ((q, marches.rows_q), (y, marches.rows_y))
+        )
+        return Ran(done, ensemble.read(q, y), marches.steps[:count].copy(), marches.rejected[:count].copy())
 
     def _lawful(self, rows: Array, q: Array, y: Array) -> Truths:
         """(members,) whether a member obeys the laws of its audit, by what it kept; q and y are those at its start."""

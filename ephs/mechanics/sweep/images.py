@@ -148,9 +148,9 @@ class Images:
     def __init__(self, scene: Scene, axes: Axes, t0: float) -> None:
         self._scene, self._axes, self._t0 = scene, axes, t0
         self._middle = [_middle(values) for values in axes.values]
-        self._lock = threading.Lock()
+        self._lock, self._spare = threading.Lock(), list[Made]()
         self._along: dict[tuple[int, float], Array] = {}
-        self.made = self.anew()
+        self.made = self._member(self._middle)
         self.base, self._counts = self.made.image(), self.made.counts()
         self._shapes = [a.shape for a in self.made.arrays()]
         self._courses: dict[int, _Course] = {}
@@ -158,10 +158,12 @@ class Images:
         self.columns = np.arange(self.base.size)
         self._whole = False
         self._whole = not self._followed()
+        self._spare.append(self.made)
 
     def anew(self) -> Made:
-        """The member of the image ``base``, made anew."""
-        return self._member(self._middle)
+        """The member of the image ``base``, for one thread, which may overwrite its tables."""
+        with self._lock:
+            return self._spare.pop() if self._spare else self._member(self._middle)
 
     def of(self, members: Array) -> tuple[Array, Truths]:
         """(members, columns) their numbers in `columns`, and (members,) whether they are like the others."""
@@ -201,19 +203,30 @@ class Images:
 
     def _followed(self) -> bool:
         """See how paths change the image, each for itself; whether all members are put together from that."""
-        values = self._axes.values
-        ends = [(self._end(i, np.unique(x)), self._end(i, np.unique(x)[::-1])) for i, x in enumerate(values)]
-        many = [i for i, x in enumerate(values) if np.unique(x).size > STRAIGHT]
+        values = [np.unique(x) for x in self._axes.values]
+        tops = [self._end(i, x[::-1]) for i, x in enumerate(values)]
+        many = [i for i, x in enumerate(values) if x.size > STRAIGHT]
         for i in set(range(len(values))) - set(many):
-            for value in np.unique(values[i]).tolist():
+            for value in values[i].tolist():
                 with suppress(*FAULTS):
                     self._one(i, value)
+        if len(many) > 1:
+            self._at_once({i: float(values[i][0]) for i in many})
+        ends = [(self._end(i, x), top) for i, (x, top) in enumerate(zip(values, tops, strict=True))]
         touched = self._changed(_apart)
         courses = self._courses = {i: self._course(i, *ends[i], touched[i]) for i in many}
         if self._holds():
             return True
         self._courses = {i: course for i, course in courses.items() if self._follows(i, course)}
         return self._holds()
+
+    def _at_once(self, values: dict[int, float]) -> None:
+        """Find the images along several paths in one member, if each path changes numbers that are known to be its."""
+        touched = self._changed(_apart)
+        with suppress(Unlike):
+            built = self._built(np.array([values.get(i, middle) for i, middle in enumerate(self._middle)]))
+            if not np.any(_apart(built, self.base) & ~np.any(touched, axis=0)):
+                self._along |= {(i, x): np.where(touched[i], built, self.base) for i, x in values.items()}
 
     def _changed(self, apart: Callable[[Array, Array], Truths]) -> list[Truths]:
         """(numbers,) of each path whether a number changes along it, as far as is known."""

@@ -59,16 +59,15 @@ class Marches:
     def _arrays(leg: March) -> list[Any]:
         return [*(leg.memory[name] for name in OWN), *leg.steering.arrays, *leg.account.arrays]
 
-    def run(self, q: Array, r: Array, heats: Array, steps: int) -> Index:
-        """March from starts (members, …) with so many steps at most; return each `Ending`.
+    def run(self, q: Array, y: Array, steps: int) -> Index:
+        """March from starts (members, …), of elements, and y without increments, with so many steps at most.
 
-        Members end as `Ending.CAREFUL` where a step needs Python: from their start on, then, see `take`.
+        Returns each member's `Ending`: `Ending.CAREFUL` where a step needs Python, see `take`.
         """
-        count, eq = len(q), self._leg.method.equations
+        count = len(q)
         for stack, fresh in zip(self._stacks, self._fresh, strict=True):
             stack[:count] = fresh
-        self.q[:count], self.y[:count] = q, 0.0
-        self.y[:count, eq.nv : eq.nv + eq.n], self.y[:count, eq.nv + eq.n :][:, : eq.ns] = r, heats
+        self.q[:count], self.y[:count, self._leg.method.equations.nv :] = q, y
         return self._run(count, steps) if self._leg.explicit else np.full(count, int(Ending.CAREFUL))
 
     def take(self, member: int, leg: March) -> None:
