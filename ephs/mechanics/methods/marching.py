@@ -126,6 +126,11 @@ class March:
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
 
     @property
+    def explicit(self) -> bool:
+        """Whether no step needs a matrix, which Python makes."""
+        return self._kept is None
+
+    @property
     def momenta(self) -> Array:
         """The momenta that steps keep, where these read them."""
         return self.method.equations.engine.work["kept"][: self.own - OWN]

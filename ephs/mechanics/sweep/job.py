@@ -13,11 +13,12 @@ from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.sweep.axes import Axes
-from ephs.mechanics.sweep.ensemble import Ensemble, Unlike
+from ephs.mechanics.sweep.ensemble import Ensemble
+from ephs.mechanics.sweep.images import FAULTS
 from ephs.mechanics.sweep.outputs import Output
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError, SemanticsError
-from ephs.solve.errors import Interrupted, SimulationError, SolveError
+from ephs.solve.errors import Interrupted, SimulationError
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
@@ -125,29 +126,24 @@ class _Prepared:
         if isinstance(self.model, Scene) and len(self.members) >= ALIKE:
             try:
                 self.ensemble = Ensemble(self.model, job.axes, job.t0, job.until, job.save_at, job.options, job.outputs)
-            except (Unlike, SolveError, SceneError, SemanticsError):  # members report their own faults
+            except FAULTS:  # members report their own faults
                 self.ensemble = None
 
     def run(self, numbers: Index) -> Batch:
-        found = [self._member(self.members[k]) for k in numbers]
-        shape = next((([v.shape for v in values]) for values, *_ in found if values is not None), None)
-        values = () if shape is None else tuple(
-            np.array([np.full(size, np.nan) if row is None else row[i] for row, *_ in found])
-            for i, size in enumerate(shape)
-        )  # fmt: skip
-        status = tuple(text for _, text, _, _ in found)
-        steps, rejected = (np.array([row[i] for row in found], dtype=np.int64) for i in (2, 3))
-        return Batch(numbers, values, status, steps, rejected)
-
-    def _member(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
+        members, count = self.members[numbers], len(numbers)
+        status, steps, rejected = [DONE] * count, *np.zeros((2, count), dtype=np.int64)
+        values: list[Array] = []
+        missing = np.arange(count)
         if self.ensemble is not None:
-            try:
-                read, steps, rejected = self.ensemble.run(values)
-            except (Unlike, SolveError, SceneError, SemanticsError):
-                pass
-            else:
-                return [row.reshape(len(row), -1) for row in read], DONE, steps, rejected
-        return self._alone(values)
+            ran = self.ensemble.run(members)
+            values, steps, rejected, missing = list(ran.values), ran.steps, ran.rejected, np.flatnonzero(~ran.done)
+        for k in missing.tolist():
+            read, status[k], steps[k], rejected[k] = self._alone(members[k])
+            if read is not None and not values:
+                values = [np.full((count, *row.shape), np.nan) for row in read]
+            for i, column in enumerate(values):
+                column[k] = np.nan if read is None else read[i]
+        return Batch(numbers, tuple(values), tuple(status), steps, rejected)
 
     def _alone(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
         """By `simulate`, which reports failures with time and path; the audit's findings become a member's status."""

@@ -13,7 +13,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.llvm import Library
 
-__all__ = ["Bound", "Call", "First", "apart", "packed"]
+__all__ = ["Bound", "Call", "First", "address_of", "apart", "packed"]
 
 RESULTS = {"void": None, "double": ctypes.c_double, "i64": ctypes.c_int64}
 NUMBERS = ("real", "integer")
@@ -65,36 +65,38 @@ class Bound:
         Its arguments, arrays and numbers, as machine code takes them; those after the first where these are given.
     first
         Its first arguments.
+
+    Attributes
+    ----------
+    block
+        All of them as numbers of eight bytes.
     """
 
-    __slots__ = ("_block", "_function", "_integers", "_reals", "call", "parts")
+    __slots__ = ("_at", "_function", "block", "call", "parts")
 
     def __init__(self, call: "Call", parts: tuple[Any, ...], first: First | None = None) -> None:
         self.call, self._function = call, call.function
         known = 0 if first is None else len(first.parts)
-        self._integers = np.zeros(known + len(parts), dtype=np.int64)
-        self._reals = self._integers.view(np.float64)
+        self.block = np.zeros(known + len(parts), dtype=np.int64)
         passed, spans = _addresses(call.entry.atoms[known:], parts)
         if first is not None:
-            self._integers[:known], spans = first.block, [*first.spans, *spans]
+            self.block[:known], spans = first.block, [*first.spans, *spans]
         _distinct(call.entry, spans)
-        for place, (part, number) in enumerate(zip(passed, call.scalars[known:], strict=True), known):
-            self._into(number)[place] = part
+        _put(self.block, range(known, self.block.size), passed, call.scalars)
         self.parts = parts if first is None else (*first.parts, *parts)
-        self._block = int(self._integers.ctypes.data)
-
-    def _into(self, number: str) -> "np.ndarray[Any, Any]":
-        return self._reals if number == "real" else self._integers
+        self._at = int(self.block.ctypes.data)
 
     def __call__(self, *numbers: float) -> Any:
-        if numbers:
-            places = self.call.numbers
-            if len(numbers) != len(places):
-                expected = f"{len(places)} numbers"
-                raise StageError("parameters", where=self.call.entry.name, expected=expected, found=len(numbers))
-            for place, number in zip(places, numbers, strict=True):
-                self._into(self.call.scalars[place])[place] = number
-        return self._function(self._block)
+        self.write(numbers, self.block)
+        return self._function(self._at)
+
+    def write(self, numbers: Sequence[float], block: "np.ndarray[Any, np.dtype[np.int64]]") -> None:
+        """Write new values of all numbers among the arguments, or none, into a block of arguments."""
+        places = self.call.numbers
+        if numbers and len(numbers) != len(places):
+            expected = f"{len(places)} numbers"
+            raise StageError("parameters", where=self.call.entry.name, expected=expected, found=len(numbers))
+        _put(block, places[: len(numbers)], numbers, self.call.scalars)
 
 
 @final
@@ -111,6 +113,13 @@ class Call:
         LLVM's type of its result.
     trail
         What shape follows that of an argument's numbers: nothing, or the number of members.
+
+    Attributes
+    ----------
+    packed
+        Address of the function on a block of its arguments, see `packed`.
+    silent
+        Whether it returns nothing.
     """
 
     def __init__(
@@ -119,8 +128,8 @@ class Call:
         self.entry, self.library, self.trail = entry, library, trail
         self.address = library.address(symbol)
         self.scalars = ["" if trail(name) and atom == "real" else atom for name, atom in entry.atoms]
-        packed = library.address(packed_name(symbol))
-        self.function: Callable[[int], Any] = ctypes.CFUNCTYPE(RESULTS[result], ctypes.c_void_p)(packed)
+        self.packed, self.silent = library.address(packed_name(symbol)), RESULTS[result] is None
+        self.function: Callable[[int], Any] = ctypes.CFUNCTYPE(RESULTS[result], ctypes.c_void_p)(self.packed)
         names = [name for name, _ in entry.atoms]
         self.numbers = [k for k, atom in enumerate(self.scalars) if atom in NUMBERS and names.count(names[k]) == 1]
 
@@ -146,9 +155,7 @@ class Call:
         parts = tuple(self.entry.split(arguments, self.trail, 0, count))
         passed, spans = _addresses(self.entry.atoms[: len(parts)], parts)
         block = np.zeros(len(parts), dtype=np.int64)
-        reals = block.view(np.float64)
-        for place, (part, number) in enumerate(zip(passed, self.scalars[: len(parts)], strict=True)):
-            (reals if number == "real" else block)[place] = part
+        _put(block, range(len(parts)), passed, self.scalars)
         return First(tuple(self.entry.kinds.values())[:count], parts, block, spans)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -176,7 +183,16 @@ def packed(symbol: str, result: str, kinds: Sequence[str]) -> str:
     return "\n".join([f"define {result} @{packed_name(symbol)}(ptr %block) {{", "entry:", *lines, *last, "}"])
 
 
-def _address(array: "np.ndarray[Any, Any]") -> int:
+def _put(
+    block: "np.ndarray[Any, np.dtype[np.int64]]", places: Sequence[int], values: Sequence[Any], scalars: Sequence[str]
+) -> None:
+    """Write addresses and numbers to their places of a block, as the kinds of all places say."""
+    reals = block.view(np.float64)
+    for place, value in zip(places, values, strict=True):
+        (reals if scalars[place] == "real" else block)[place] = value
+
+
+def address_of(array: "np.ndarray[Any, Any]") -> int:
     """Return the address of an array's data."""
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(cast("Any", array)))
@@ -190,7 +206,7 @@ def _addresses(atoms: Sequence[tuple[str, Atom]], parts: Sequence[Any]) -> tuple
     spans: list[Span] = []
     for (name, _), part in zip(atoms, parts, strict=True):
         if isinstance(part, np.ndarray):
-            start = _address(cast("np.ndarray[Any, Any]", part))
+            start = address_of(cast("np.ndarray[Any, Any]", part))
             passed.append(start)
             if size := part.nbytes:
                 spans.append((start, start + size, name))

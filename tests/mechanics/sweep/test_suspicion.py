@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.sweep import job
-from ephs.mechanics.sweep.suspicion import Suspicion
+from ephs.mechanics.sweep import ensemble, job
 from ephs.show.charts import family_scenes as scenes
 from ephs.solve.errors import Outcome
 from examples.failing import pendulum
@@ -48,7 +47,8 @@ def test_members_that_break_a_law_are_run_on_their_own_and_say_so(alone):
 
 
 def test_without_a_look_they_are_silent(alone, monkeypatch):
-    monkeypatch.setattr(Suspicion, "of", lambda *_: False)
+    monkeypatch.setattr(ensemble, "suspicious", lambda _, held, *rest: np.zeros(len(held), dtype=bool))
+    monkeypatch.setattr(ensemble, "resolved", lambda _, x, other: np.ones(len(x), dtype=bool))
     found = status(BRAKE, {"joints.pin.friction": FRICTIONS}, 2.0, method="rk54", step=0.1)
     assert all(text == "done" or Outcome.LAWLESS in text for text in found)
     refused = [friction for friction, text in zip(FRICTIONS, found, strict=True) if text != "done"]

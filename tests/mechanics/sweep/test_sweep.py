@@ -18,7 +18,7 @@ from ephs import quantity as Q
 from ephs.cli import main
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
-from ephs.mechanics.sweep.ensemble import Ensemble, Unlike
+from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.testing import mechanisms
 
@@ -70,6 +70,16 @@ def agree(model, table, places, tolerance=1e-11, **options):
             assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max()), output
 
 
+def assert_built(images, members):
+    """Members put together are those that are built in full."""
+    rows, like = images.of(members)
+    assert like.all()
+    for values, row in zip(members, rows, strict=True):
+        image = images.base.copy()
+        image[images.columns] = row
+        assert np.allclose(image, images._built(values), rtol=1e-12, atol=1e-12)
+
+
 # ---- members ---------------------------------------------------------------------------------------------------------
 
 
@@ -116,8 +126,7 @@ def test_what_two_paths_change_together_is_built_in_full(tmp_path):
     product = Axes.of({"joints.weld.frame1.position[0]": [0.0, 0.2], "bodies.two.mass": [1.0, 2.0]}, paired=False)
     for model, axes in ((scene, apart), (ephs.load(file), product)):
         ensemble = Ensemble(model, axes, 0.0, 0.1, TIMES, {}, outputs_of(model, None))
-        for values in axes.members:
-            assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+        assert_built(ensemble.images, axes.members)
 
 
 @pytest.mark.parametrize("span", [(1.1, 2.0), (1.1, 1.1001), (0.01, 10.0)])
@@ -126,9 +135,8 @@ def test_three_members_say_what_all_of_a_path_are(path, span):
     scene = ephs.load(CHAIN)
     axes = Axes.of({path: np.linspace(*span, 20)}, paired=False)
     ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, None))
-    assert ensemble._courses  # a start is a number, too
-    for values in axes.members[::4]:
-        assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+    assert ensemble.images._courses  # a start is a number, too
+    assert_built(ensemble.images, axes.members[::4])
 
 
 def test_a_member_unlike_the_others_is_run_on_its_own():
@@ -136,11 +144,9 @@ def test_a_member_unlike_the_others_is_run_on_its_own():
     scene, friction = ephs.load(CHAIN), np.linspace(0.0, 0.5, 20)
     axes = Axes.of({"joints.j0.friction": friction}, paired=False)
     ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, None))
-    assert ensemble._courses
-    with pytest.raises(Unlike):
-        ensemble.run(axes.members[0])
-    for values in axes.members[1::4]:
-        assert np.allclose(ensemble.image(values), ensemble._built(values), rtol=1e-12, atol=1e-12)
+    assert ensemble.images._courses
+    assert ensemble.run(axes.members).done.tolist() == [False, *[True] * 19]
+    assert_built(ensemble.images, axes.members[1::4])
     table = ephs.sweep(scene, {"joints.j0.friction": friction}, 0.1, save_at=TIMES, rtol=1e-7, atol=1e-7)
     for k in (0, 1, 19):
         agree(scene, table, [{"joints.j0.friction": k}], 1e-9, rtol=1e-7, atol=1e-7)
@@ -161,9 +167,11 @@ def test_careful_steps_of_a_member_have_its_own_numbers():
     scene = ephs.load(SCENES / "four-bar.toml")
     axes = Axes.of({"bodies.coupler.mass": [0.5, 1.0, 2.0]}, paired=False)
     ensemble = Ensemble(scene, axes, 0.0, 0.1, TIMES, {}, outputs_of(scene, ["heat"]))
-    equations, _ = ensemble._threads_own()
-    for (mass,) in axes.members[::-1]:
-        start = ensemble._fill(equations, ensemble.image(np.array([mass])))
+    runs = _Runs(ensemble)
+    equations, start = runs._made.equations, runs._made.start
+    rows, _ = ensemble.images.of(axes.members)
+    for (mass,), row in zip(axes.members[::-1], rows[::-1], strict=True):
+        runs._fill(row)
         alone = ephs.dynamics(varied(scene, {"bodies.coupler.mass": mass}))
         assert np.abs(equations.mass(start.q, start.r) - alone.mass_matrix(alone.state0)).max() <= 1e-13
 

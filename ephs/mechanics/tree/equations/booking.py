@@ -12,8 +12,10 @@ from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sums import grown
+from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.model import STORING
+from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -101,10 +103,13 @@ class Booking:
         eq = self._equations
         q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
         x = self.paper.rows(np.array(q), np.array(r), eq.heats.entropies(np.array(heats)))
-        energies = np.zeros((len(states), len(eq.problem.descriptor.components)))
-        t, fault = eq.model.tables, np.zeros(1, dtype=np.int64)
-        status = STATES.compiled()["energies"](
-            self.storages, t.read_x, t.parameters, eq.scal, x, *self._memory, energies, fault
-        )
-        eq.refuse(status, int(fault[0]))
+        energies, fault = np.zeros((len(states), len(eq.problem.descriptor.components))), np.zeros(1, dtype=np.int64)
+        eq.refuse(self.weighed(x, energies, fault)(), int(fault[0]))
         return x, energies
+
+    def weighed(self, x: Array, energies: Array, fault: Index) -> Bound:
+        """A call that writes the energies at rows of all states, or the number of a storage that has none there."""
+        t, scal = self._equations.model.tables, self._equations.scal
+        return STATES.compiled()["energies"].bind(
+            self.storages, t.read_x, t.parameters, scal, x, *self._memory, energies, fault
+        )

@@ -13,6 +13,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3, manifold
+from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.problem import Problem
 
@@ -101,11 +102,15 @@ class PaperStates:
                 source, _, at, *_ = row.tolist()
                 # a pose has two quaternions: that one which is continuous with the initial one
                 row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self.rest[at : at + 4]) < 0.0
-        plan = table_of(Source, self._plan)
-        STATES.compiled()["rows"](*self._tables, plan, q, r, self._stored(r, s), *self._memory, out)
+        self.walked(q, r, self.stored(r, s), out)()
         return out
 
-    def _stored(self, r: Array, s: Array) -> Array:
+    def walked(self, q: Array, r: Array, stored: Array, x: Array) -> Bound:
+        """A call that writes all states of rows of elements, rates and `stored` to x, whose rows are `rest` before."""
+        plan = table_of(Source, self._plan)
+        return STATES.compiled()["rows"].bind(*self._tables, plan, q, r, stored, *self._memory, x)
+
+    def stored(self, r: Array, s: Array) -> Array:
         """(rows, …): s, then the states of storages that are inertia of joints."""
         return np.hstack([s, r[:, self._turning] * self._momentum]) if self._inertias else s
 

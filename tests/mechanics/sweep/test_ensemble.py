@@ -1,0 +1,108 @@
+"""An ensemble equals its single runs bit for bit: members share what is bound, and nothing that is computed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.parameters import read, varied
+from ephs.mechanics.sweep.axes import Axes
+from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
+from ephs.mechanics.sweep.images import STARTS
+from ephs.mechanics.sweep.outputs import outputs_of
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.finding.tables import TREE
+from ephs.show.charts.family_scenes import parallelogram
+from ephs.solve.march import Ending
+
+ROOT = Path(__file__).parents[3]
+CHAIN, GRAVITY = ROOT / "benchmarks/scenes/revolute-chain-4.toml", "world.gravity[2]"
+SCENES = {
+    "tree": (CHAIN, ("bodies.rod1.mass", "joints.j0.rate", "joints.j1.coordinate", "joints.j2.friction", GRAVITY)),
+    "ball": (ROOT / "scenes/heavy-top.toml", ("bodies.top.mass", GRAVITY)),
+    "loop": (ROOT / "scenes/four-bar.toml", ("bodies.coupler.mass", GRAVITY)),
+    "slider": (ROOT / "scenes/slider-crank.toml", ("bodies.rod.mass", "joints.bearing.friction")),
+    "windows": (ROOT / "benchmarks/scenes/four-bar-windows-1.toml", (GRAVITY,)),
+    "repeated rows": (ROOT / "scenes/bricard.toml", (GRAVITY,)),
+    "heat": (ROOT / "scenes/hot-brake.toml", ("bodies.flywheel.mass", "thermal.disc.capacity")),
+    "rank that changes": (parallelogram(0.0), (GRAVITY, "bodies.coupler.mass")),
+}
+OPTIONS = ({}, {"rtol": 1e-3, "atol": 1e-3}, {"method": "rk87", "rtol": 1e-8}, {"method": "rk54", "step": 0.01})
+TIMES = np.array([0.0, 0.02, 0.05, 0.3])
+
+
+def made(scene, vary, options, *, paired=True):
+    """An ensemble with the outputs that compiled members have: of the tree's joints."""
+    reduced = Equations(problem_of_scene(scene), 0.0).reduced
+    names = [e.name for e, kind in zip(reduced.edges, reduced.tables.kind, strict=True) if kind == TREE]
+    outputs = outputs_of(scene, [*(f"joints.{name}.coordinate" for name in names), "heat", "work"])
+    axes = Axes.of(vary, paired=paired)
+    return Ensemble(scene, axes, 0.0, float(TIMES[-1]), TIMES, options, outputs), axes.members, outputs
+
+
+@settings(max_examples=16)
+@given(data=st.data(), kind=st.sampled_from(sorted(SCENES)), options=st.sampled_from(OPTIONS))
+def test_an_ensemble_equals_its_single_runs_bit_for_bit(data, kind, options):
+    """Where a path has few values, numbers of a member are those of its scene: its run is the run of `simulate`."""
+    model, paths = SCENES[kind]
+    scene = ephs.load(model) if isinstance(model, Path) else model
+    path = data.draw(st.sampled_from(paths))
+    factors = data.draw(st.lists(st.floats(0.3, 1.9), min_size=3, max_size=4, unique=True))
+    values = [(read(scene, path) or 0.7) * factor for factor in factors]
+    ensemble, members, outputs = made(scene, {path: values}, options)
+    ran = ensemble.run(members)
+    for k in np.flatnonzero(ran.done):
+        solution = ephs.simulate(varied(scene, {path: values[k]}), TIMES[-1], save_at=TIMES, audit="off", **options)
+        assert solution.audit.passed, "compiled members are held to stricter bounds"
+        assert (ran.steps[k], ran.rejected[k]) == (solution.stats["steps"], solution.stats["rejected"])
+        for output, found in zip(outputs, ran.values, strict=True):
+            assert np.array_equal(found[k], output.read(solution).reshape(found[k].shape)), output.name
+    assert ran.done.any() or "step" in options  # constant steps may not resolve a fast motion
+
+
+@settings(max_examples=8)
+@given(data=st.data(), kind=st.sampled_from(sorted(SCENES)), options=st.sampled_from(OPTIONS))
+def test_a_member_does_not_depend_on_those_before_it(data, kind, options):
+    """In another order, in parts, among many values of two paths, which are interpolated."""
+    model, paths = SCENES[kind]
+    scene = ephs.load(model) if isinstance(model, Path) else model
+    chosen = data.draw(st.permutations(paths))[:2]
+    vary = {path: (read(scene, path) or 0.7) * np.linspace(0.5, 1.3, 15) for path in chosen}
+    ensemble, members, _ = made(scene, vary, options)
+    order = np.array(data.draw(st.permutations(range(len(members)))))
+    ensemble.together = data.draw(st.integers(1, len(members)))
+    ran, other = ensemble.run(members), _Runs(ensemble)
+    again = [other.run(members[k][None]) for k in order]
+    for at, k in enumerate(order):
+        one = again[at]
+        assert (one.done[0], one.steps[0], one.rejected[0]) == (ran.done[k], ran.steps[k], ran.rejected[k])
+        if ran.done[k]:
+            assert all(np.array_equal(a[0], b[k]) for a, b in zip(one.values, ran.values, strict=True))
+
+
+def test_members_at_a_change_of_rank_take_careful_steps_together(monkeypatch):
+    """The law above holds of them, too, and they stay in the ensemble."""
+    careful, run = [], _Runs._carefully
+
+    def noted(self, *arguments):
+        careful.append(run(self, *arguments))
+        return careful[-1]
+
+    monkeypatch.setattr(_Runs, "_carefully", noted)
+    ensemble, members, _ = made(parallelogram(0.0), {GRAVITY: [-9.81, -3.0, 2.0]}, {})
+    assert ensemble.run(members).done.all()
+    assert careful == [Ending.DONE] * 3
+
+
+@pytest.mark.parametrize("path", ["joints.j1.coordinate", "bodies.rod1.mass"])
+def test_tables_that_no_path_changes_are_shared(path):
+    """Members from other starts have the same tables; other masses are few numbers of them."""
+    ensemble, _, _ = made(ephs.load(CHAIN), {path: np.linspace(0.5, 1.5, 20)}, {})
+    arrays = ensemble.images.made.arrays()
+    changed = {number for number, *_ in ensemble.images.parts()}
+    assert (min(changed) >= len(arrays) - STARTS) == path.startswith("joints.")
+    assert ensemble.images.columns.size < 0.01 * ensemble.images.base.size
