@@ -28,6 +28,7 @@ SHIPPED: Final = (
     "ephs.mechanics.sensitivity.implicit:tangent_program",
     "ephs.solve.methods.newton:natural_program",
     "ephs.solve.methods.integral:integral_program",
+    "ephs.solve.methods.settling:settling_program",
     "ephs.solve.methods.gauss:gauss_program",
     "ephs.exporting.outputs:outputs_program",
 )

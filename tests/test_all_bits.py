@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs import Pattern, library
 from ephs.semantics.stage.elementary import COMPOSED
 from tests.watch import watching
 
@@ -40,6 +41,14 @@ type = "fixed"
 bodies = ["ground", "rod.0"]
 at = [0.0, 0.0, 0.0]
 """
+
+
+def circuit():
+    """A capacitor with a coil, whose energy is kept."""
+    pattern = Pattern.from_text("q: charge; b: flux_linkage; cap(q); coil(b); emc(q, b)")
+    return pattern(cap=library.capacitor(c=0.5), coil=library.inductor(l=2.0), emc=library.emc())
+
+
 CASES = {
     "loops": ("scenes/slider-crank.toml", {"method": "rk87", "until": 0.002}, {"motion_of_loops", "element", "states"}),
     "network": ("scenes/motor-four-bar.toml", {"method": "rk54", "until": 0.002}, {"network", "resting"}),
@@ -52,16 +61,20 @@ CASES = {
     "stiff contact": (SOFT, {"method": "radau", "until": 1e-4}, {"stiff_steps_of_trees"}),
     "hard contact": (HARD, {"method": "rk87", "until": 2e-3}, {"motion_of_trees"}),
     "beam": (BEAM, {"method": "natural", "until": 1e-4, "step": 1e-4}, {"natural", "element"}),
+    "circuit": (circuit, {"method": "radau", "until": 0.2, "step": 0.1}, {"integral", "settling"}),
 }
 
 
 def watched(case, tmp_path):
-    text, run, _ = CASES[case]
-    file = tmp_path / "few.toml"
-    file.write_text(HEAD + text)
-    scene = ephs.load(text if text.endswith(".toml") else file)
+    of, run, _ = CASES[case]
+    if isinstance(of, str):
+        file = tmp_path / "few.toml"
+        file.write_text(HEAD + of)
+        model, start = ephs.load(of if of.endswith(".toml") else file), None
+    else:
+        model, start = of(), {"cap.q": 1.0}
     with watching() as watch:
-        ephs.simulate(scene, **run, audit="off")
+        ephs.simulate(model, **run, initial=start, audit="off")
     return watch
 
 

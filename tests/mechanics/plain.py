@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.tree.equations.accounts import Accounts
+from ephs.solve.methods.settling import Settling
 
 __all__ = ["uncorrected"]
 
@@ -13,13 +14,19 @@ __all__ = ["uncorrected"]
 @contextmanager
 def uncorrected():
     """Runs that begin inside have no energy to meet."""
-    opened = Accounts.opened
+    reduced, general = Accounts.opened, Settling.opened
 
     def without(self, state):
-        state = opened(self, state)
+        state = reduced(self, state)
         state.account[0] = np.nan
         return state
 
+    def plain(self, x):
+        account = general(self, x)
+        account[0] = np.nan
+        return account
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Accounts, "opened", without)
+        patch.setattr(Settling, "opened", plain)
         yield

@@ -28,11 +28,14 @@ class Booked:
         (components,) by how much more entropy each made than its quadrature says, in J/K.
     heat
         By how much more heat of friction there is than its quadrature says, in J.
+    passed
+        Heat that went to the storages, in J.
     """
 
     entropies: Array
     made: Array
     heat: float
+    passed: float
 
 
 @final
@@ -66,8 +69,8 @@ class Passages:
 
     Attributes
     ----------
-    states
-        (heats,) entries of the state vector.
+    states, components
+        (heats,) entries of the state vector, and numbers of the storages.
     """
 
     def __init__(self, model: Model) -> None:
@@ -75,6 +78,7 @@ class Passages:
         stores = _stores(model)
         ports = _ports(model, {store.effort: k for k, store in enumerate(stores)})
         self.states = np.array([store.state for store in stores], dtype=np.int64)
+        self.components = np.array([store.component for store in stores], dtype=np.int64)
         self._makers = np.array([port.component for port in ports], dtype=np.int64)
         self._flows = np.array([port.flow for port in ports], dtype=np.int64)
         effort = np.array([stores[port.store].effort for port in ports], dtype=np.int64)
@@ -135,7 +139,8 @@ class Passages:
         change, made = self._heats.taken(before, flows)
         out = np.zeros(self._rest.size)
         np.add.at(out, self._makers, made - entropy)
-        return Booked(self._heats.entropies(before + change), out, float((flows - heat)[frictions].sum()))
+        more = float((flows - heat)[frictions].sum())
+        return Booked(self._heats.entropies(before + change), out, more, float(flows.sum()))
 
 
 def _stores(model: Model) -> list[_Store]:

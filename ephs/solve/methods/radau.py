@@ -19,6 +19,7 @@ from ephs.solve.methods.continuous import Continuous, Matrices
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
+from ephs.solve.methods.settling import PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solver, Solvers
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
@@ -70,6 +71,8 @@ class RadauState:
         The unknowns at the stages of the step before, and its length in s: 0 where there is none.
     sums
         (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
+    account
+        That of the energy, see `Settling`; empty where nothing may be moved.
     """
 
     t: float
@@ -78,6 +81,7 @@ class RadauState:
     sums: Array
     stages: Array
     h: float
+    account: Array
 
     def guess(self, h: float) -> Array:
         """Unknowns at the stages of a step of h seconds, by the polynomial of the step before."""
@@ -118,11 +122,14 @@ class Radau:
         self.equations: Continuous | Integral = Integral.of(self.model) or Continuous(self.model)
         self._given = self.model.input_values()
         self._passages = Passages(self.model)
+        self._settling = Settling(self.model, self._passages.components)
+        self._chosen = control.step is None
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.evaluations = self.factorisations = self.iterations = 0
         self._rates = int(self.model.tables.counts[0])
         self._makers = self.model.tables.kind == IRREVERSIBLE
         self._matrices: Matrices | None = None
+        self._slow = False
         self._family = Solvers(self.model.unknown_name, self.equations.pivots)
         self._solvers: tuple[float, Solver, Solver] | None = None
         self._current: RadauState | None = None
@@ -147,7 +154,9 @@ class Radau:
         d = self.model.descriptor
         x = d.pack(self.problem.initial)
         z = self.equations.guess(x)
-        start = RadauState(t, x.copy(), z, np.zeros(4 + len(d.components)), np.zeros((NODES.size, z.size)), 0.0)
+        account = self._settling.opened(x) if self._settling.active else np.zeros(0)
+        sums, stages = np.zeros(4 + len(d.components)), np.zeros((NODES.size, z.size))
+        start = RadauState(t, x.copy(), z, sums, stages, 0.0, account)
         first, second = (self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5))
         jumps = [self._size(end - x, x) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
@@ -176,12 +185,13 @@ class Radau:
             raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
         totals = self._totals(state, h, stages)
         error = self._error(state, h, stages, x)
-        end = replace(self._end(state, h, 1.0, x, stages[-1].copy(), totals), stages=stages, h=h)
+        end, missed = self._end(state, h, 1.0, x, stages[-1].copy(), totals)
+        end = replace(end, stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
         self.iterations += iterations
-        if iterations > 4:
-            self._matrices = None
-        return Attempt(state, end, h, error, float(made.min(initial=np.inf)) if made.size else 0.0, (stages, totals))
+        self._slow = iterations > 4
+        least = float(made.min(initial=np.inf)) if made.size else 0.0
+        return Attempt(state, end, h, max(error, missed), least, (stages, totals))
 
     def inside(self, attempt: Attempt[RadauState], t: float) -> RadauState:
         """The state at a time within the step, by its collocation polynomial."""
@@ -189,7 +199,7 @@ class Radau:
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
         x = start.x + h * moments(NODES, theta) @ stages[:, : self._rates]
-        return self._end(start, h, theta, x, values(NODES, theta) @ stages, totals)
+        return self._end(start, h, theta, x, values(NODES, theta) @ stages, totals)[0]
 
     def missed(self, attempt: Attempt[RadauState]) -> None:
         """None: the balance of energy shows it."""
@@ -204,6 +214,9 @@ class Radau:
 
     def record(self, taken: Sequence[tuple[float, RadauState, float]]) -> Record:
         """Records of many instants."""
+        for _, state, _ in taken:
+            if state.account.size:
+                self._settling.noted.note(state.t, *state.account[PUT : TOTAL + 1].tolist())
         return record_of(taken, [self.row(state) for _, state, _ in taken])
 
     def row(self, state: RadauState) -> Row:
@@ -218,16 +231,18 @@ class Radau:
             "evaluations": self.evaluations,
             "factorisations": self.factorisations,
             "unknowns": self.equations.unknowns,
+            **(self._settling.noted.stats() if self._settling.active else {}),
         }
 
     def snapshot(self, state: RadauState) -> Snapshot:
         """State at which the matrices were made, and the step for which they were factorised."""
-        made = self._current if self._matrices is not None else None
+        made = self._current if self._matrices is not None and not self._slow else None
         return {
             "made": parts(made),
             "here": made is state,
             "step": self._solvers[0] if self._solvers is not None and made is not None else None,
             "counts": [self.evaluations, self.factorisations, self.iterations],
+            "noted": self._settling.noted.snapshot(),
         }
 
     def restore(self, snapshot: Snapshot, state: RadauState) -> None:
@@ -238,10 +253,11 @@ class Radau:
             if snapshot["step"] is not None:
                 self._solve(snapshot["step"])
         self.evaluations, self.factorisations, self.iterations = snapshot["counts"]
+        self._settling.noted.restore(snapshot["noted"])
 
     def _solved(self, state: RadauState, h: float) -> tuple[Array, Array, int]:
         """Stages, the states at the end, and how many iterations that took."""
-        if self._matrices is None:
+        if self._matrices is None or self._slow:
             self._refresh(state)
         try:
             stages, iterations = self._stages(state, h)
@@ -269,10 +285,16 @@ class Radau:
             self._last = state, found.energies, self._passages.powers(found.flows, found.unknowns)
         return self._last[1:]
 
-    def _end(self, state: RadauState, h: float, theta: float, x: Array, z: Array, totals: Totals) -> RadauState:
-        """The state at a part of a step of h seconds: its heat is booked by energy, see `Heats`."""
+    def _end(
+        self, state: RadauState, h: float, theta: float, x: Array, z: Array, totals: Totals
+    ) -> tuple[RadauState, float]:
+        """The state at a part of a step of h seconds, and what its error is by the energy that it missed.
+
+        Its heat is booked by energy, see `Heats`, and it is moved to what energy is left, see `Settling`.
+        """
         t, weights, passages = state.t + theta * h, h * moments(NODES, theta), self._passages
-        sums = state.sums + weights @ totals.powers
+        sums, heat, error, account = state.sums + weights @ totals.powers, 0.0, 0.0, state.account
+        changed = x - state.x
         if passages.states.size:
             x[passages.states] = state.x[passages.states]
             energies = [self._known(state)[0], self.equations.instant(x, z, self.inputs(t, x)).energies]
@@ -288,12 +310,20 @@ class Radau:
             sums[0] += booked.heat
             sums[3] += booked.made.sum()
             sums[4:] += booked.made
-        return RadauState(t, x, z, sums, state.stages, 0.0)
+            heat = booked.passed
+        if account.size:
+            rest = theta * h * z[: self._rates] - changed
+            allowed = self.atol + self.rtol * np.maximum(np.abs(state.x), np.abs(x))
+            x, account, error = self._settling.settled(
+                account, state.x, x, lambda: self._filtered(h, np.array([changed, rest])), allowed, float(sums[1]),
+                heat, chosen=self._chosen,
+            )  # fmt: skip
+        return RadauState(t, x, z, sums, state.stages, 0.0, account), error
 
     def _refresh(self, state: RadauState) -> None:
         self._matrices = self.equations.matrices(state.x, state.z, self.inputs(state.t, state.x))
         self._current = state
-        self._solvers = None
+        self._solvers, self._slow = None, False
 
     def _solve(self, h: float) -> tuple[Solver, Solver]:
         """Solvers with ∂g/∂z + h·μ·∂g/∂x for the real and the complex eigenvalue μ."""
@@ -353,15 +383,17 @@ class Radau:
 
     def _error(self, state: RadauState, h: float, stages: Array, x: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
+        raw = h * (GAMMA * state.z[: self._rates] + DEFECT @ stages[:, : self._rates])
+        return self._size(self._filtered(h, raw), np.maximum(np.abs(state.x), np.abs(x)))
+
+    def _filtered(self, h: float, changes: Array) -> Array:
+        """Changes (…, states) with their stiff parts damped, so that what is algebraic allows them."""
         real, _ = self._solve(h)
         m = self._matrices
         assert m is not None
-        rates = self._rates
-        raw = np.zeros(state.z.size)
-        raw[:rates] = h * (GAMMA * state.z[:rates] + DEFECT @ stages[:, :rates])
-        correction = real(-(m.states @ raw))
-        difference = raw[:rates] + h * GAMMA * correction[:rates]
-        return self._size(difference, np.maximum(np.abs(state.x), np.abs(x)))
+        raw = np.zeros((*changes.shape[:-1], self.equations.unknowns))
+        raw[..., : self._rates] = changes
+        return changes + h * GAMMA * real(-(m.states @ raw.T)).T[..., : self._rates]
 
     def _size(self, difference: Array, x: Array) -> float:
         """Largest entry relative to its tolerance."""

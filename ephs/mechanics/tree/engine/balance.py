@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, final
 
 from ephs.mechanics.tree.engine.forces import attached_energy, strain
 from ephs.mechanics.tree.engine.heats import entropies
-from ephs.mechanics.tree.engine.storing import store
+from ephs.mechanics.tree.engine.storing import store_attached
 from ephs.mechanics.tree.sweeps.acting import Body
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
 from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account, rounding, stretch
+from ephs.solve.march.storing import Missing
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
@@ -110,7 +111,7 @@ def correct(
     target = account.anchor + (work - heat)
     account.noise = rounding(on, account.anchor, work, heat)
     run = Correction(
-        on, motion, account, target, h, before, q, r, stored, heats, allowed, always, on.scratch(3), on.counter(0)
+        on, account, target, on.scratch(3), on.counter(0), always, motion, h, before, q, r, stored, heats, allowed
     )  # fmt: skip
     account.moved, account.size, account.rest = 0.0, 0.0, 0.0
     turned = on.variable(0.0)
@@ -118,16 +119,16 @@ def correct(
     def settle() -> None:
         short = run.short
         turn(on, motion, q, r, motion.work.kept)
-        run.look()
+        run.look(heats)
         turned.value = short - run.short
 
     def keep() -> None:
-        run.look()
+        run.look(heats)
         account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
         on.when(on.both(run.known, run.floating), settle)
         on.when(run.known if always else on.negate(run.close), run.move)
         left = on.both(run.known if always else on.negate(run.close), motion.tables.own[0].attached > 0)
-        on.when(on.both(left, on.same(run.status.value, 0)), lambda: store(on, run))
+        on.when(on.both(left, on.same(run.status.value, 0)), lambda: store_attached(run))
         account.rest, account.moved = run.short, account.moved + turned.value
 
     on.when(on.absolute(account.anchor) < BEYOND, keep)
@@ -136,13 +137,10 @@ def correct(
 
 @final
 @dataclass(frozen=True, slots=True)
-class Correction:
+class Correction(Missing):
     """One correction; ``energies`` are what `held` writes."""
 
-    on: Evaluator
     motion: "Mechanism"
-    account: Account
-    target: Real
     h: Real
     before: Vector
     q: Vector
@@ -150,43 +148,14 @@ class Correction:
     start: Vector
     heats: Vector
     allowed: Vector
-    always: bool
-    energies: Vector
-    status: Variable[Integer]
 
-    def look(self) -> None:
-        """Evaluate the energy."""
-        self.energy_at(self.heats)
-
-    def energy_at(self, heats: Vector) -> Real:
-        """Evaluate the energy with other heats."""
-        self.status.value = held(self.on, self.motion, self.q, self.r, heats, self.energies)
-        return self.energy
-
-    @property
-    def energy(self) -> Real:
-        """Energy in J that is not heat, as it was evaluated last."""
-        return self.energies[0] + self.energies[1]
-
-    @property
-    def short(self) -> Real:
-        """Missing energy in J."""
-        return self.target - self.energy
-
-    @property
-    def known(self) -> Truth:
-        """Whether it is a number: else nothing is to be met."""
-        return self.on.absolute(self.short) < BEYOND
+    def look(self, states: Vector) -> None:
+        self.status.value = held(self.on, self.motion, self.q, self.r, states, self.energies)
 
     @property
     def floating(self) -> Truth:
         """Whether there are momenta to be kept."""
         return self.motion.tables.own[0].islands > 0
-
-    @property
-    def close(self) -> Truth:
-        """Whether it is no more than rounding, or not a number."""
-        return self.on.negate(self.on.absolute(self.short) > self.account.noise)
 
     def move(self) -> None:
         """Move the rates along their free part; positions too where those are small."""
@@ -354,4 +323,4 @@ class Correction:
         if motion.closes:
             self.status.value = motion.shut(on, self.q, self.r)
         on.when(self.floating, lambda: turn(on, motion, self.q, self.r, w.kept))
-        on.when(on.same(self.status.value, 0), self.look)
+        on.when(on.same(self.status.value, 0), lambda: self.look(self.heats))

@@ -13,6 +13,7 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import OptionError
 from ephs.solve.march import Status
+from ephs.solve.march.noted import Noted
 from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -36,13 +37,12 @@ class Accounts:
         Whether steps are corrected.
     followed
         Whether steps go on from what is corrected: else the balance is kept at single states only, to the tolerance.
-    largest, at, total
-        Of the states that were kept: the largest sum in J of what corrections put in, its time, the sum of sizes.
+    noted
+        What corrections put into the states that were kept.
     """
 
     def __init__(self, equations: "Equations") -> None:
-        self._equations, self.kept, self.followed = equations, False, True
-        self.largest = self.at = self.total = 0.0
+        self._equations, self.kept, self.followed, self.noted = equations, False, True, Noted()
 
     def keep(self, what: str, also: tuple[str, ...] = ()) -> None:
         """Keep what is asked for: one of `KEEP`, or of what the method keeps by itself.
@@ -137,23 +137,20 @@ class Accounts:
     def note(self, state: "ReducedState") -> None:
         """Remember what corrections put in up to a state that is kept."""
         if state.account.size:
-            put, self.total = abs(float(state.account[2])), float(state.account[3])
-            if put > self.largest:
-                self.largest, self.at = put, state.t
+            self.noted.note(state.t, float(state.account[2]), float(state.account[3]))
 
     def snapshot(self) -> Snapshot:
         """Notes of the run, for a journal."""
-        return {"kept": self.kept, "largest": self.largest, "at": self.at, "total": self.total}
+        return {"kept": self.kept, **self.noted.snapshot()}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
-        self.kept, self.largest = snapshot["kept"], snapshot["largest"]
-        self.at, self.total = snapshot["at"], snapshot["total"]
+        self.kept = snapshot["kept"]
+        self.noted.restore(snapshot)
 
     def stats(self) -> dict[str, Any]:
         """Statistics of corrected steps: by how much the balance would be missed without corrections."""
         if not (self.kept and self.followed) or self._equations.led.counting:
             return {}
         momenta = int(np.any(self._equations.engine.tables["bases"].reshape(-1, 6, 6), axis=1).sum())
-        kept = {"momenta": momenta} if self.own > OWN else {}
-        return {"plain_defect": {"sum": self.total, "largest": self.largest, "at": self.at}} | kept
+        return self.noted.stats() | ({"momenta": momenta} if self.own > OWN else {})

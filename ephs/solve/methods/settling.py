@@ -1,0 +1,221 @@
+"""A step's end moved to the energy that work and heat leave to it, of any system on vector spaces.
+
+The move is that of `ephs.solve.march.storing`; stores of heat are advanced by energy before, see `Passages`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sums import grown
+from ephs.semantics.numbering import Index
+from ephs.semantics.primitives import Storage
+from ephs.semantics.spaces.rank import TINY
+from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Table, Vector, real, table, vector
+from ephs.solve.errors import SolveError
+from ephs.solve.march.account import ROUNDING, Account, rounding, worth
+from ephs.solve.march.noted import Noted
+from ephs.solve.march.storing import Missing, Moved, store
+from ephs.solve.methods.places import Part
+from ephs.solve.methods.records import MEMORY, STORING, TABLES, Columns, Scratch, parts_of
+from ephs.solve.methods.residuals import FAULTS, called
+from ephs.solve.model import Model
+
+__all__ = ["PUT", "TOTAL", "Settling", "settling_program"]
+
+ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY = range(6)
+"""Numbers of a state's account: those of `Account`; the heat in J that went to stores of heat, and its rounding."""
+
+
+def _held(
+    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, states: Vector, out: Vector
+) -> Integer:
+    """Write the energy in J of all storages, zero, and the sum of its terms' sizes to out (3,).
+
+    Returns
+    -------
+    Integer
+        0, or a status + FAULTS · the storage.
+    """
+    total, carry, size, fault = (*(on.variable(0.0) for _ in range(3)), on.counter(0))
+
+    def add(energy: Real) -> None:
+        total.value, carry.value = grown(total.value, carry.value, energy)
+        size.value = size.value + on.absolute(energy)
+
+    def storage(i: Integer) -> None:
+        found = called(on, Part.of(t, i), states, z, scal, m)
+
+        def fail() -> None:
+            fault.value = found + FAULTS * i
+
+        on.when(on.same(found, 0), lambda: add(m.c[0]), fail)
+
+    on.loop(states.size, lambda k: add(weights[k] * states[k]))
+    on.loop(t.kind.size, lambda i: on.when(on.same(fault.value, 0), lambda: storage(i)))
+    out[0], out[1], out[2] = total.value, 0.0, size.value
+    return fault.value
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Network(Missing):
+    """The energy of storages."""
+
+    given: tuple[Columns, Vector, Vector, Vector, Scratch]
+
+    def look(self, states: Vector) -> None:
+        self.status.value = _held(self.on, *self.given, states, self.energies)
+
+    @staticmethod
+    def of(
+        on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[Account],
+        states: Vector, work: Real, heat: Real,
+    ) -> "_Network":  # fmt: skip
+        """What states miss of the energy that work and heat in J leave to them, with its rounding in the account."""
+        a, given = account[0], (t, weights, z, scal, m)
+        run = _Network(on, a, a.anchor + (work - heat), on.scratch(3), on.counter(0), False, given)
+        run.look(states)
+        a.noise, a.rest = rounding(on, a.anchor, work, heat) + ROUNDING * run.energies[2], run.short
+        return run
+
+
+def missed(
+    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[Account],
+    states: Vector, work: Real, heat: Real,
+) -> Integer:  # fmt: skip
+    """Write the energy that states miss, and its rounding, to the account; return 0, or status + FAULTS · storage."""
+    return _Network.of(on, t, weights, z, scal, m, account, states, work, heat).status.value
+
+
+def settled(
+    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[Account],
+    states: Vector, start: Vector, along: Vector, beside: Vector, trial: Vector, allowed: Vector, free: Vector,
+    work: Real, heat: Real,
+) -> Integer:  # fmt: skip
+    """Move states by what they miss; return a status as `missed`.
+
+    The account's ``size`` becomes the step's error by that, in tolerances.
+    """
+    a, run = account[0], _Network.of(on, t, weights, z, scal, m, account, states, work, heat)
+    a.moved, a.size = 0.0, 0.0
+    store(run, Moved(states, start, along, beside, trial, allowed, lambda k: free[k]))
+    a.rest = run.short
+    a.size = worth(on, a)
+    return run.status.value
+
+
+@cache
+def settling_program() -> Program:
+    """Return the program of the correction."""
+    given: dict[str, Any] = {
+        "t": TABLES, "weights": vector(), "z": vector(), "scal": vector(3), "m": MEMORY, "account": table(Account)
+    }  # fmt: skip
+    numbers = ("states", "start", "along", "beside", "trial", "allowed", "free")
+    return Program(
+        "settling",
+        missed=Entry(missed, **given, states=vector(), work=real(), heat=real()),
+        settled=Entry(settled, **given, **dict.fromkeys(numbers, vector()), work=real(), heat=real()),
+    )
+
+
+@final
+class Settling:
+    """The energy of a model's storages but those of heat, which steps are moved to. It keeps memory.
+
+    Parameters
+    ----------
+    booked
+        Numbers of the storages that are advanced by energy, as `Passages` has them.
+
+    Attributes
+    ----------
+    active
+        Whether there is a state that may be moved.
+    noted
+        What was moved in states that are kept.
+    """
+
+    def __init__(self, model: Model, booked: Index) -> None:
+        t, d = model.tables, model.descriptor
+        counted = np.setdiff1d(np.flatnonzero(t.kind == STORING), booked)
+        self._model, self._counted, self.noted = model, counted, Noted()
+        self._free, weights = np.zeros(d.point_size), np.zeros(d.point_size)
+        for number in counted.tolist():
+            slot = d.components[number]
+            for state in slot.reads:
+                self._free[state.point] = float(state.quantity.kind != "entropy")
+                environment = isinstance(slot.primitive, Storage) and slot.primitive.environment
+                weights[state.point] = model.reference.intensive(state.quantity) if environment else 0.0
+        self.active = bool(self._free.any())
+        tables = replace(model.only(counted).tables, address=model.resting(counted)[counted])
+        self._account = Account.table(1)
+        given = (
+            parts_of(tables), weights, np.zeros(model.unknowns), model.scal(0.0), parts_of(model.memory()),
+            self._account,
+        )  # fmt: skip
+        self._states, self._start, self._along, self._beside, trial, self._allowed = np.zeros((6, d.point_size))
+        calls = settling_program().compiled()
+        self._missed = calls["missed"].bind(*given, self._states, 0.0, 0.0)
+        self._settled = calls["settled"].bind(
+            *given, self._states, self._start, self._along, self._beside, trial, self._allowed, self._free, 0.0, 0.0
+        )
+
+    def opened(self, x: Array) -> Array:
+        """An account that begins at the states x.
+
+        Raises
+        ------
+        SolveError
+            A storage cannot be evaluated there.
+        """
+        a: Any = self._account[0]
+        self._states[:], a.anchor = x, 0.0
+        self._refuse(self._missed(0.0, 0.0))
+        account = np.zeros(CARRY + 1)
+        account[ANCHOR] = -a.rest
+        return account
+
+    def settled(
+        self, account: Array, start: Array, x: Array, directions: Callable[[], Array], allowed: Array, work: float,
+        heat: float, *, chosen: bool,
+    ) -> tuple[Array, Array, float]:  # fmt: skip
+        """The end x of a step moved to its energy, the account after it, and the step's error by that in tolerances.
+
+        Parameters
+        ----------
+        account, start
+            At the start of the step.
+        directions
+            Makes (2, states): what the step changed, and h ẋ at its end less that.
+        allowed
+            (states,) what errors may be.
+        work, heat
+            Work in J since the start of the run; heat in J that went to stores of heat in the step.
+        chosen
+            Whether steps are chosen: then states are moved by no more than `MOST` of what is allowed.
+
+        Raises
+        ------
+        SolveError
+            A storage cannot be evaluated there.
+        """
+        a: Any = self._account[0]
+        taken, carry = grown(float(account[HEAT]), float(account[CARRY]), heat)
+        (a.anchor, a.left), a.chosen, a.moved, a.size = account[: LEFT + 1].tolist(), int(chosen), 0.0, 0.0
+        self._states[:] = x
+        self._refuse(self._missed(work, taken))
+        if abs(a.rest) > a.noise:
+            self._start[:], self._allowed[:] = start, np.maximum(allowed, TINY)
+            self._along[:], self._beside[:] = directions() * self._free
+            self._refuse(self._settled(work, taken))
+        put, total = account[PUT] + a.moved, account[TOTAL] + abs(a.moved)
+        return self._states.copy(), np.array([a.anchor, a.rest, put, total, taken, carry]), float(a.size)
+
+    def _refuse(self, fault: int) -> None:
+        if fault:
+            raise SolveError.of_component(fault % FAULTS, self._model, int(self._counted[fault // FAULTS]))
