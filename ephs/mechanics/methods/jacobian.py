@@ -6,13 +6,14 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.apart import columns_of_trees, directions
-from ephs.mechanics.tree.engine.slopes import RateSlopes
+from ephs.mechanics.tree.engine.slopes import Call, RateSlopes, calls_of
 from ephs.mechanics.tree.engine.tangents import evaluated
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundle import Array
 from ephs.semantics.derive.relations import entry_of
+from ephs.semantics.kept import once
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.stage import Program
 from ephs.solve.snapshot import Snapshot, like, parts
@@ -65,14 +66,17 @@ class Jacobian:
         """By tangents of the compiled rates of a tree."""
         eq = self.equations
         if self._slopes is None:
-            tables = eq.reduced.tables
-            warm = np.flatnonzero(tables.node != -1)  # the environment's temperature is constant
-            wanted = directions(list(columns_of_trees(tables, eq.nv, eq.n, warm)), self.size)
-            self._slopes = RateSlopes(eq.engine, lambda number: _at_rest(eq, number), wanted, self.size)
+            calls, relations = once(eq.reduced, "slopes of rates", lambda: (self._calls(), _at_rest(eq)))
+            self._slopes = RateSlopes(eq.engine, relations.__getitem__, calls, self.size)
         eq.load(state.t, state.q, state.r, state.heats)
         status, value = self._slopes.at(state.q, eq.vector(state))
         eq.refuse(status, eq.engine.failed)
         return value
+
+    def _calls(self) -> list[Call]:
+        eq, tables = self.equations, self.equations.reduced.tables
+        warm = np.flatnonzero(tables.node != -1)  # the environment's temperature is constant
+        return calls_of(directions(list(columns_of_trees(tables, eq.nv, eq.n, warm)), self.size))
 
     def _dense(self, state: ReducedState) -> Array:
         """By tangents of the residual, with components' own derivatives."""
@@ -140,8 +144,14 @@ def _recorded(equations: Equations) -> bool:
     )
 
 
-def _at_rest(equations: Equations, number: int) -> tuple[Program, str]:
-    """Program and entry of a component's relation at rest."""
-    kernel = equations.problem.descriptor.components[number].primitive.kernel
-    assert kernel is not None
-    return entry_of(kernel.relation, derivatives=False, rest=True)
+def _at_rest(equations: Equations) -> dict[int, tuple[Program, str]]:
+    """Program and entry of each component's relation at rest."""
+    kernels = {
+        number: equations.problem.descriptor.components[number].primitive.kernel
+        for number in evaluated(equations.engine.tables)
+    }
+    return {
+        number: entry_of(kernel.relation, derivatives=False, rest=True)
+        for number, kernel in kernels.items()
+        if kernel is not None
+    }

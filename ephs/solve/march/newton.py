@@ -50,9 +50,14 @@ def newton(
 
         on.when(on.same(status.value, 0), look)
 
+    def rest(i: Integer) -> None:
+        copy(on, k.row(0), k.row(i + 1))
+
     def once() -> Truth:
         tries.value, n.iterations = tries.value + 1, n.iterations + 1
-        on.loop(stiff.stages.rows, stage)
+        # The stages begin at the start of the step, whose rates are known.
+        begins = on.same(tries.value, 1)
+        on.when(begins, lambda: on.loop(stiff.stages.rows, rest), lambda: on.loop(stiff.stages.rows, stage))
         on.when(on.same(status.value, 0), go)
         return on.either(on.negate(on.same(status.value, 0)), done.value > 0)
 

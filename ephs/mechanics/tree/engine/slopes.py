@@ -15,7 +15,10 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Evaluator, Integer, Program, Vector, vector
 from ephs.solve.sparse import Index
 
-__all__ = ["RateSlopes", "rate_slopes"]
+__all__ = ["Call", "RateSlopes", "calls_of", "rate_slopes"]
+
+Call = tuple[tuple[Index, Index], Index, Index, Index]
+"""Places of the seeds of one call, and rows, columns and directions of its derivatives."""
 
 
 @cache
@@ -39,9 +42,8 @@ class RateSlopes:
         Its equations, whose tables are read where they are.
     relation
         Called with the number of a component; returns the program and the entry that it is in machine code.
-    wanted
-        Of each direction the numbers of y by which derivatives are asked for, and the rows of each; no two of a
-        direction share a row. All else is 0.
+    calls
+        What is asked for, by `calls_of`; all other derivatives are 0.
     size
         How many numbers of y have rates of interest: the first ones.
     """
@@ -50,14 +52,14 @@ class RateSlopes:
         self,
         engine: Engine,
         relation: Callable[[int], tuple[Program, str]],
-        wanted: Sequence[Sequence[Column]],
+        calls: Sequence[Call],
         size: int,
     ) -> None:
         coordinates, whole = engine.sizes
         self._q, self._y, self._out = (np.zeros(count) for count in (coordinates, whole, whole))
         self._seed, self._slope = np.zeros((2, whole, DIRECTIONS))
         self._size = size
-        self._calls = [_call(wanted[k : k + DIRECTIONS]) for k in range(0, len(wanted), DIRECTIONS)]
+        self._calls = calls
         still, moved = np.zeros((coordinates, DIRECTIONS)), np.zeros((coordinates, DIRECTIONS))
         tables, work, _ = paired_tables(engine, relation)
         self._run = rate_slopes().compiled()["rates"].bind(
@@ -79,8 +81,12 @@ class RateSlopes:
         return 0, found
 
 
-def _call(directions: Sequence[Sequence[Column]]) -> tuple[tuple[Index, Index], Index, Index, Index]:
-    """Places of the seeds of one call, and rows, columns and directions of what it finds."""
+def calls_of(wanted: Sequence[Sequence[Column]]) -> list[Call]:
+    """Return the calls for the columns of each direction; no two columns of a direction share a row."""
+    return [_call(wanted[k : k + DIRECTIONS]) for k in range(0, len(wanted), DIRECTIONS)]
+
+
+def _call(directions: Sequence[Sequence[Column]]) -> Call:
     every = [(column, k, rows) for k, columns in enumerate(directions) for column, rows in columns]
     columns, along = (np.array([one[i] for one in every], dtype=np.int64) for i in (0, 1))
     counts = [len(rows) for _, _, rows in every]
