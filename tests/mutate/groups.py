@@ -50,9 +50,8 @@ LONG = Pace(each=10.0, file=90.0, budget=40.0)
 """For what shows itself over many steps."""
 DERIVATIVES = (
     "ephs/mechanics/tree/sweeps/closures.py",
-    "ephs/mechanics/tree/sweeps/edges.py",
+    "ephs/mechanics/tree/sweeps/expanding.py",
     "ephs/mechanics/tree/sweeps/inverse.py",
-    "ephs/mechanics/tree/engine/laws.py",
     "ephs/mechanics/tree/engine/tangents.py",
     "ephs/mechanics/tree/equations/slopes.py",
     "ephs/mechanics/sensitivity/explicit.py",

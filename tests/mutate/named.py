@@ -37,7 +37,9 @@ BREAKS = {
     "dense, multipliers": Break(
         "ephs/mechanics/tree/sweeps/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"
     ),
-    "dense, heat": Break("ephs/mechanics/tree/sweeps/edges.py", "+ (law.made + (", "- (law.made + ("),
+    "dense, components": Break(
+        "ephs/mechanics/tree/sweeps/expanding.py", "value[j] + (by_effort", "value[j] - (by_effort"
+    ),
     "totals": Break(
         "ephs/solve/result/entries.py",
         "self.exergy - self.exergy[:1] + self.destroyed",

@@ -168,7 +168,7 @@ class Variational(ReducedMethod):
         for passes in range(1, ITERATIONS):  # temperatures in the middle, by two passes
             eq.load(state.t + 0.5 * h, q, r, heats)
             eq.refuse(*found.about(q, r, eq.heats.entropies(heats), eq.drive, eq.wrench))
-            flows = eq.heats.flows(heats, found.laws.made)
+            flows = eq.heats.flows(heats, found.made)
             before, heats = heats, state.heats + eq.heats.taken(state.heats, 0.5 * h * flows)[0]
             if plain.any():
                 heats[plain] = found.follow(state.heats[plain], before[plain], h)
@@ -177,7 +177,7 @@ class Variational(ReducedMethod):
                 break
             last = moved
         eq.evaluations += 1
-        return *found.momenta(), flows, np.array([found.laws.heat, found.power()]), heats
+        return *found.momenta(), flows, np.array([found.heat, found.power]), heats
 
     def _gap(self, state: ReducedState, xi: Array, h: float) -> tuple[Array, Array]:
         """Residuals of prescribed joints and loops at the end of the step, and their rows on changes of ξ."""

@@ -1,12 +1,12 @@
 """From the tables of a reduced scene to those of the engine: links at their joints, rigid groups merged."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
-from ephs.mechanics.tree.engine.attachment import attachment_of
+from ephs.mechanics.tree.engine.attachment import Attachment, attachment_of
 from ephs.mechanics.tree.engine.closing import Closing, closing
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.islands import islands_of
@@ -15,10 +15,11 @@ from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
-from ephs.mechanics.tree.sweeps.charts import TIE, Chart
+from ephs.mechanics.tree.sweeps.charts import TIE, Chart, Kind
 from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
-from ephs.mechanics.tree.sweeps.programs import PLACE, Sweeps, sweeps
+from ephs.mechanics.tree.sweeps.pack import STANDARD, Packed
+from ephs.mechanics.tree.sweeps.programs import PLACE, sweeps
 from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
@@ -30,7 +31,7 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["engine_of", "whole_tables"]
+__all__ = ["Whole", "engine_of", "whole_of"]
 
 
 def engine_of(
@@ -110,7 +111,7 @@ def _plan(
     """The plan of an engine, ``rates`` the number of all joints' rates."""
     found = links_of(reduced, apart=apart)
     bodies, ground = found.bodies, found.ground
-    cut, cut_frame, cut_basis, ends = _cut(reduced, bodies, ground, kept)
+    cut, cut_numbers, ends = _cut(reduced, bodies, ground, kept)
     charts = _chart(reduced, cut)
     forces = _forces(reduced, bodies, ground, cut, acted)
     net = attachment_of(reduced, reduced.tables.resting)
@@ -122,37 +123,87 @@ def _plan(
     records = found.packed(gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut) or apart))
     eliminated = closing([part.parent for part in found.parts], ends)
-    joints = kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
-    reached = _reached(program.program, loop_program(joints))
+    reached = _reached(program.program, loop_program(_kinds(charts, cut)))
     if attached:
         reached["attach"] = network_program(), "solve"
-    tables: dict[str, Any] = {
-        "own": _own(
-            (len(found.parts), len(bases) if momenta else 0),
-            reached,
-            forced=forced,
-            driven=driven,
-            attached=attached,
-            between=between,
-        ),
-        "integers": records.integers,
-        "reals": records.reals,
-        "gravity": records.gravity,
-        "chart": table_of(Chart, charts),
-        "cut": cut[:, :-1].ravel(),
-        "cut_numbers": np.hstack([cut_frame, cut_basis]).ravel(),
-        **{name: getattr(eliminated, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
-        **forces.tables(),
-        "island": island,
-        "bases": bases.ravel(),
-        "net": net.integers,
-        "numbers": net.reals,
-    }
+    own = _own(
+        (len(found.parts), len(bases) if momenta else 0),
+        reached,
+        forced=forced,
+        driven=driven,
+        attached=attached,
+        between=between,
+    )
+    links = {"own": own, "island": island, "bases": bases.ravel(), **_links(records)}
+    tables = {**links, **_joints(charts, cut, cut_numbers, eliminated), **forces.tables(), **_attached(net)}
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
     sizes = reduced.coordinates, rates + freedoms + entropies + 2 + len(reduced.made)
     booked = entropies, entropies + 2 + len(reduced.made)
-    shapes = _shapes(program, (len(found.parts), len(bases)), freedoms, rates, len(cut), booked, eliminated)
+    shapes = _shapes(program.width, (len(found.parts), len(bases)), freedoms, rates, len(cut), booked, eliminated)
     return _Plan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
+
+
+class Whole(NamedTuple):
+    """A mechanism with all rows of its loops, and with all its joints and bodies acted on."""
+
+    bodies: Frames
+    ground: Array
+    records: Packed
+    kinds: tuple[Kind, ...]  # of its joints
+    usual: bool  # whether its joints are standard ones, which all are in its class
+    body_frame: Array  # (bodies, 12): see `Forces`
+    tables: dict[str, Any]
+    shapes: dict[str, tuple[int, ...]]  # of its memory, without what the class's program takes for links
+
+
+def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
+    """A reduced scene under gravity (3,) in world axes, for equations over dense matrices.
+
+    What acts is evaluated with derivatives. Prescribed motions are rows, and nothing is eliminated.
+    """
+    found, t = links_of(reduced), reduced.tables
+    parts = [
+        replace(part, joint=replace(part.joint, driven=False, armature=part.armature > 0.0)) for part in found.parts
+    ]
+    usual = {part.joint for part in parts} <= set(STANDARD)  # others have programs of their own class
+    records = replace(found, parts=parts, planar=False).packed(gravity, among=STANDARD if usual else ())
+    cut, cut_numbers, ends = _cut(reduced, found.bodies, found.ground, None)
+    charts, size = _chart(reduced, cut), 2 * int(cut[:, 8].sum())
+    joints = frozenset(i for i in range(len(reduced.edges)) if t.kind[i] != SPRING)
+    forces = _forces(reduced, found.bodies, found.ground, cut, (joints, frozenset(range(reduced.links))))
+    net, none = attachment_of(reduced, t.address), np.zeros(0, dtype=np.int64)
+    attached = reduced.attaching.network.acts
+    reached = {"attach": (network_program(), "solve")} if attached else {}
+    whole = Closing(none, none, np.arange(size), none, none, 0, 0)
+    own = _own((len(parts), 0), reached, forced=True, driven=False, attached=attached, between=True)
+    links = {"own": own, "island": none, "bases": np.zeros(0), **_links(records)}
+    tables = {**links, **_joints(charts, cut, cut_numbers, whole), **forces.tables(), **_attached(net)}
+    tables["component"] = forces.component
+    booked = len(reduced.entropies), len(reduced.entropies) + 2 + len(reduced.made)
+    shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[sorted(joints)].sum()), len(cut), booked, whole)
+    shapes |= {"value": (len(ends), 4), "covector": (size, 6), "e": (64,), "jac": (1024,), "scratch": (4096,)}
+    return Whole(
+        found.bodies, found.ground, records, _kinds(charts, cut), usual, forces.body_frame, tables, shapes
+    )  # fmt: skip
+
+
+def _links(records: Packed) -> dict[str, Any]:
+    return {"integers": records.integers, "reals": records.reals, "gravity": records.gravity}
+
+
+def _joints(charts: Index, cut: Index, numbers: Array, closing: Closing) -> dict[str, Any]:
+    return {
+        "chart": table_of(Chart, charts), "cut": cut[:, :-1].ravel(), "cut_numbers": numbers.ravel(),
+        **{name: getattr(closing, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
+    }  # fmt: skip
+
+
+def _attached(net: Attachment) -> dict[str, Any]:
+    return {"net": net.integers, "numbers": net.reals}
+
+
+def _kinds(charts: Index, cut: Index) -> tuple[Kind, ...]:
+    return kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
 
 
 def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
@@ -183,14 +234,16 @@ def _own(
 
 
 def _shapes(
-    program: Sweeps, groups: tuple[int, int], freedoms: int, joints: int, cuts: int, booked: tuple[int, int],
+    width: int, groups: tuple[int, int], freedoms: int, joints: int, cuts: int, booked: tuple[int, int],
     closing: Closing,
 ) -> dict[str, tuple[int, ...]]:  # fmt: skip
-    """Shapes of the memory of one thread, by numbers of links and islands, of entropies, and with totals."""
+    """Shapes of the memory of one thread, by a link's width, numbers of links and islands, of entropies, and with
+    totals.
+    """
     (links, islands), (entropies, totals) = groups, booked
     rows, slots = len(closing.row), len(closing.slot)
     return {
-        "work": ((links + 1) * program.width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
+        "work": ((links + 1) * width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
         "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,), "pulled": (joints,),
         "relative": (cuts, Relative.real_width),
         "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),
@@ -201,14 +254,6 @@ def _shapes(
         "kept": (6 * islands,), "released": (6 * islands,), "found": (6 * islands,), "torque": (6 * islands,),
         "sums": (islands, SUMS), "still": (joints,), "idle": (totals,), "spare": (totals,),
     }  # fmt: skip
-
-
-def whole_tables(reduced: "Reduced", bodies: Frames, ground: Array) -> tuple[Index, Index, Array, Forces]:
-    """Charts, cut joints with all their rows, and the tables of forces where anything may act."""
-    cut, frames, basis, _ = _cut(reduced, bodies, ground, None)
-    every = frozenset(range(len(reduced.edges))), frozenset(range(reduced.links))
-    forces = _forces(reduced, bodies, ground, cut, every)
-    return _chart(reduced, cut), cut[:, :-1], np.hstack([frames, basis]), forces
 
 
 def _matrix(pose: Array) -> Array:
@@ -229,11 +274,11 @@ def _ends(reduced: "Reduced", bodies: Frames, ground: Array, i: int) -> tuple[in
 
 def _cut(
     reduced: "Reduced", bodies: Frames, ground: Array, kept: Sequence[Array] | None
-) -> tuple[Index, Array, Array, list[tuple[int, ...]]]:
+) -> tuple[Index, Array, list[tuple[int, ...]]]:
+    """Cut joints with the numbers of their edges behind them, their numbers, and the links of each row."""
     t = reduced.tables
     found = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
     cut: list[tuple[int, ...]] = []
-    frames: list[Array] = []
     numbers: list[Array] = []
     ends: list[tuple[int, ...]] = []
     for k, i in enumerate(found):
@@ -243,11 +288,10 @@ def _cut(
             chosen = chosen[:0]
         covectors = np.zeros((6, 6))
         covectors[: chosen.size] = t.normal[i][chosen]
-        numbers.append(np.concatenate([t.basis[i].ravel(), t.left[i].ravel(), covectors.ravel(), [0.0]]))
+        numbers.append(np.concatenate([frame, t.basis[i].ravel(), t.left[i].ravel(), covectors.ravel(), [0.0]]))
         cut.append((
             one, two, t.code[i], t.dim[i], t.q_at[i], t.q_size[i], t.r_at[i], len(ends), chosen.size, 2 * len(ends), i
         ))  # fmt: skip
-        frames.append(frame)
         ends += [(one, two)] * chosen.size
     size = 2 * len(ends)
     for number, tie in enumerate(reduced.attaching.ties):
@@ -257,16 +301,16 @@ def _cut(
         links: list[int] = []
         for i, freedom, ratio in tie.terms:
             one, two, frame = _ends(reduced, bodies, ground, i)
-            numbers.append(_geared(reduced, i, freedom, ratio))
+            numbers.append(np.concatenate([frame, _geared(reduced, i, freedom, ratio)]))
             cut.append((one, two, TIE, 0, t.q_at[i] + freedom, 1, t.r_at[i], len(ends), 1, size + len(links), -1))
-            frames.append(frame)
             links += [one, two]
         size = at + len(links)
         ends.append(tuple(links))
     return (
-        np.array(cut, dtype=np.int64).reshape(-1, Cut.integer_width + 1), np.array(frames).reshape(-1, 24),
-        np.array(numbers).reshape(-1, Cut.real_width - 24), ends,
-    )  # fmt: skip
+        np.array(cut, dtype=np.int64).reshape(-1, Cut.integer_width + 1),
+        np.array(numbers).reshape(-1, Cut.real_width),
+        ends,
+    )
 
 
 def _geared(reduced: "Reduced", edge: int, freedom: int, ratio: float) -> Array:

@@ -18,6 +18,7 @@ from ephs.mechanics.tree.sweeps.acting import (
     Work,
 )
 from ephs.mechanics.tree.sweeps.cuts import Relative, between, motion_of, place_of
+from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
@@ -35,13 +36,21 @@ def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
 
 @staged
 def act(
-    on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, totals: Vector
-) -> Integer:
+    on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, totals: Vector,
+    about: About | None, expanded: bool,
+) -> Integer:  # fmt: skip
     """Write forces on joints and wrenches on links, rates of entropies, entropies made and powers; return a status.
 
     Entropies are those in the memory; ``totals`` (2,) receives the powers of friction and of what drives.
+
+    Parameters
+    ----------
+    about
+        Receives what was evaluated; None: it is not kept.
+    expanded
+        Whether it is read instead: nothing is evaluated but what was, to first order.
     """
-    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0))
+    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), about, expanded)
     totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
@@ -57,7 +66,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
     Places of links in the memory are those at q where springs act between bodies.
     """
-    acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0))
+    acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, False)
 
     def one(i: Integer) -> None:
         def store(edge: Acting) -> None:
@@ -96,15 +105,26 @@ class _Acting:
     made: Vector
     totals: Vector
     status: Variable[Integer]
+    about: About | None
+    expanded: bool
 
     def unless_refused(self, following: Callable[[], None]) -> None:
         """Go on where no component has refused."""
         self.on.when(self.on.same(self.status.value, 0), following)
 
-    def _evaluate(self, number: Integer) -> None:
-        """Call a component at the states in the memory, without increments: efforts go to e, flows to f."""
+    def _evaluate(self, number: Integer, *, stored: bool = False, moving: Integer = 0) -> None:
+        """Call a component at the states in the memory, without increments: efforts go to e, flows to f.
+
+        ``moving``: how many degrees of freedom the state of what is no storage may have.
+        """
         on, tables, w, row = self.on, self.tables, self.work, self.tables.component[number]
         dims = Integers(row.integers, row.integer_start + Component.dims.offset, 4)
+        if self.about is not None and self.expanded:
+            if stored:
+                self.about.store(on, number, dims, w)
+            else:
+                self.about.relate(on, number, dims, w, on.select(on.same(dims[2], moving), moving, 0))
+            return
         parameters = tables.parameters.part(row.at, tables.parameters.size - row.at)
         found = on.reach(
             row.law, dims, tables.scal, parameters, w.x, w.v, w.e, w.lam, w.f, w.c, w.jac, w.scratch
@@ -115,6 +135,8 @@ class _Acting:
             w.fault[0] = number
 
         on.when(on.negate(on.same(found, 0)), refuse)
+        if self.about is not None:
+            self.about.keep(on, number, dims, w, stored)
 
     def warm(self, k: Integer) -> None:
         """Write the effort of an entropy to the memory."""
@@ -123,8 +145,11 @@ class _Acting:
         self.s_rate[k] = 0.0
 
         def stored() -> None:
-            w.x[0] = w.entropy[k]
-            self._evaluate(number)
+            if self.about is not None and self.expanded:
+                self.about.local[0] = w.entropy[k] - self.about.expansion[number].state[0]
+            else:
+                w.x[0] = w.entropy[k]
+            self._evaluate(number, stored=True)
             w.temperature[k] = w.e[0]
 
         self.unless_refused(lambda: self.on.when(number >= 0, stored))
@@ -142,40 +167,56 @@ class _Acting:
 
     def attach(self) -> None:
         """Evaluate what is attached: forces on joints, rates of entropies and of its states."""
-        on, t, w = self.on, self.tables, self.work
+        t, w = self.tables, self.work
         net = Net.of(t.net, t.numbers, t.parameters, t.scal, t.supply)
+        flow, on, rates = self._flows(net), self.on, net.head[0]
+
+        def push(k: Integer) -> None:
+            w.attached[t.port[k].place] = -flow[k]
+
+        def heat(k: Integer) -> None:
+            at = net.temperature[k]
+            self.s_rate[at] = self.s_rate[at] - flow[rates + k]
+            self.totals[0] = self.totals[0] - flow[rates + k] * (w.temperature[at] + t.scal[1])
+
+        def fill(k: Integer) -> None:
+            self.s_rate[net.head[5] + k] = -flow[net.first_state + k]
+
+        on.loop(rates, push)
+        on.loop(net.head[1], heat)
+        on.loop(net.head[3], fill)
+        self.totals[1] = self.totals[1] + net.power[0]
+
+    def _flows(self, net: Net) -> Vector:
+        """Flows of what is attached."""
+        on, t, w, about = self.on, self.tables, self.work, self.about
+
+        def rate(k: Integer) -> Real:
+            return self._rate(t.port[k])
+
+        if about is not None and self.expanded:
+            return about.flows(on, net, rate, w)
 
         def meet(k: Integer) -> None:
-            net.effort[k] = self._rate(t.port[k])
+            net.effort[k] = rate(k)
 
         on.loop(t.port.size, meet)
-        found = on.reach(
+        self.status.value = on.reach(
             t.own[0].attach, t.net, t.numbers, t.parameters, t.scal, t.supply, self.q, w.entropy, w.temperature,
             self.made,
         )  # fmt: skip
 
+        def keep() -> None:
+            if about is not None:
+                self.status.value = about.attach(on, net, rate, w)
+
+        self.unless_refused(keep)
+
         def refuse() -> None:
-            self.status.value = found
             w.fault[0] = net.fault[0]
 
-        on.when(on.negate(on.same(found, 0)), refuse)
-        rates, nodes = net.head[0], net.head[1]
-
-        def push(k: Integer) -> None:
-            w.attached[t.port[k].place] = -net.flow[k]
-
-        def heat(k: Integer) -> None:
-            at = net.temperature[k]
-            self.s_rate[at] = self.s_rate[at] - net.flow[rates + k]
-            self.totals[0] = self.totals[0] - net.flow[rates + k] * (w.temperature[at] + t.scal[1])
-
-        def fill(k: Integer) -> None:
-            self.s_rate[net.head[5] + k] = -net.flow[net.first_state + k]
-
-        on.loop(rates, push)
-        on.loop(nodes, heat)
-        on.loop(net.head[3], fill)
-        self.totals[1] = self.totals[1] + net.power[0]
+        on.when(on.negate(on.same(self.status.value, 0)), refuse)
+        return net.flow
 
     def _rate(self, port: Port) -> Real:
         """The rate of a joint's degree of freedom."""
@@ -285,8 +326,13 @@ class _Acting:
             *so3.quaternion(on, product(transposed(inner), turn)),
             *apply_transposed(inner, sub(there, edge.inner_at)),
         ]
+        if self.about is not None and self.expanded:
+            at_rest = self.about.expansion[self.on.select(edge.spring < 0, edge.friction, edge.spring)].state
+            pose, into = se3.increment(on, at_rest, pose), self.about.local
+        else:
+            into = self.work.x
         for k, x in enumerate(pose):
-            self.work.x[k] = x
+            into[k] = x
 
     def _left(self, edge: Acting, j: Integer) -> list[Real]:
         row = Vector(edge.reals, edge.real_start + Acting.left.offset + 6 * j, 6)
@@ -300,7 +346,10 @@ class _Acting:
 
     def _drive(self, edge: Acting, rate: Vector, pull: Vector) -> None:
         """Start from the given forces on a joint, whose element goes to the states of components."""
-        copy(self.on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
+        if self.about is not None and self.expanded:
+            copy(self.on, self.about.increment.part(edge.r_at, edge.dim), self.about.local.part(0, edge.dim))
+        else:
+            copy(self.on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
 
         def one(j: Integer) -> None:
             given = self.tables.drive[edge.r_at + j]
@@ -320,11 +369,11 @@ class _Acting:
             copy(on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
 
         on.when(on.same(edge.kind, ON_BODIES), aside, in_joint)
-        self._evaluate(edge.spring)
+        self._evaluate(edge.spring, stored=True)
         out[1], out[2] = out[1] + energy[0], out[2] + on.absolute(energy[0])
 
     def _spring(self, edge: Acting, pull: Vector) -> None:
-        self._evaluate(edge.spring)
+        self._evaluate(edge.spring, stored=True)
 
         def one(j: Integer) -> None:
             pull[j] = pull[j] - self.work.e[j]
@@ -335,7 +384,7 @@ class _Acting:
         w, d, heat = self.work, edge.dim, edge.heat
         copy(self.on, rate.part(0, d), w.e.part(0, d))
         w.e[d] = w.temperature[heat]
-        self._evaluate(edge.friction)
+        self._evaluate(edge.friction, moving=d)
 
         def one(j: Integer) -> None:
             pull[j] = pull[j] - w.f[j]

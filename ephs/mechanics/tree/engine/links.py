@@ -55,10 +55,10 @@ class Found:
     ground: Array
     planar: bool
 
-    def packed(self, gravity: Array) -> Packed:
-        """The sweeps' records under gravity (3,) in world axes."""
+    def packed(self, gravity: Array, among: Sequence[Joint] = ()) -> Packed:
+        """The sweeps' records under gravity (3,) in world axes; ``among``: further kinds of joints of their class."""
         pull = quaternion_to_matrix(self.ground[:4]) @ np.asarray(gravity, dtype=float)
-        return packed(self.parts, pull, planar=self.planar)
+        return packed(self.parts, pull, planar=self.planar, among=among)
 
 
 def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:

@@ -66,7 +66,7 @@ class Dense:
         self._target, self._change = np.zeros(m), np.zeros(n)
         self.rate, self.multiplier = np.zeros(n), np.zeros(m)
         rows = (
-            arrays["row"], arrays["terms"], arrays["factor"], self._scaled, np.zeros((m, n)), self._triangle,
+            arrays["jacobian"], arrays["terms"], arrays["factor"], self._scaled, np.zeros((m, n)), self._triangle,
             self._chosen,
         )  # fmt: skip
         self._orthonormalise = calls["orthonormalise"].bind(*rows, m)
@@ -80,7 +80,7 @@ class Dense:
 
     def rows(self) -> Array:
         """(m, n) rows of prescribed joints, then of loops, on the tree's rates, where the mass matrix was made last."""
-        return self.residual.arrays["row"].copy()
+        return self.residual.arrays["jacobian"].copy()
 
     def gaps(self, q: Array, r: Array) -> tuple[Array, Array]:
         """Position residuals of loops at q, zeros for prescribed joints before them; and the rows (m, n) there."""
@@ -107,7 +107,7 @@ class Dense:
         self._orthonormalised()
         rows = np.concatenate([-self._lead[self._led], bare[found.rows]])
         self.rate[:] = self.solved(-bare[found.forces][:, None], rows[:, None])[:, 0]
-        self._target[:] = -rows - found.arrays["row"] @ self._free[:, 0]
+        self._target[:] = -rows - found.arrays["jacobian"] @ self._free[:, 0]
         self._corrected(self._target)
         if self._m:
             self._multipliers(self._m, self._rank)
@@ -126,7 +126,7 @@ class Dense:
         out = self._free = solve_triangular(factor, lower, lower=True, trans=1, check_finite=False)
         if self._rank:
             chosen = self._chosen[: self._rank]
-            target = (-rows - self.residual.arrays["row"] @ out)[chosen]
+            target = (-rows - self.residual.arrays["jacobian"] @ out)[chosen]
             step = solve_triangular(self._triangle[np.ix_(chosen, chosen)], target, lower=True, check_finite=False)
             along = self._scaled[chosen].T @ step
             out = out + solve_triangular(factor, along, lower=True, trans=1, check_finite=False)
@@ -145,7 +145,7 @@ class Dense:
     def work(self) -> float:
         """Power in W of what drives, prescribed joints among it, where `forward` has been."""
         prescribed = self.residual.arrays["r"][self.reduced.tables.driven == 1]
-        return self.residual.power() + float(self.multiplier[: self._driven] @ prescribed)
+        return self.residual.power + float(self.multiplier[: self._driven] @ prescribed)
 
     def rates(self, q: Array, y: Array, given: Given, heats: Heats, out: Array) -> tuple[int, int]:
         """Rates of the tree, of the entropies and of the totals, as the engine's; (status, component)."""
@@ -159,7 +159,7 @@ class Dense:
         if status:
             return status, component
         out[r], out[s] = self.rate, self.settle()[found.entropy_rates] * heats.temperatures(y[s])
-        out[at], out[at + 1], out[at + 2 :] = found.laws.heat, self.work(), heats.flows(y[s], found.laws.made)
+        out[at], out[at + 1], out[at + 2 :] = found.heat, self.work(), heats.flows(y[s], found.made)
         return 0, 0
 
     # ---- loops -------------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ class Dense:
         if not gap <= CLOSED_SINGULAR:
             raise self.opened(residual, gap)
         self._reduce(q, r)
-        row = self.residual.arrays["row"]
+        row = self.residual.arrays["jacobian"]
         target = -row @ r
         target[: motions.size] += motions
         change = self._corrected(target)
@@ -216,7 +216,7 @@ class Dense:
 
     def back(self, change: Array) -> Array:
         """Correction of a change of the rates (n,) across the constraints, where loops were closed last."""
-        return self._corrected(-self.residual.arrays["row"] @ change)
+        return self._corrected(-self.residual.arrays["jacobian"] @ change)
 
     def independent(self, q: Array, r: Array) -> list[Array]:
         """Of each cut joint, then of each gear, which of its rows no others imply."""

@@ -67,7 +67,7 @@ class Linearised:
         n, nv, ns = found.n, found.nv, found.ns
         wanted = np.setdiff1d(np.arange(nv + n + ns), self._known)
         slopes = np.zeros((found.out.size, nv + n + ns))
-        slopes[:, wanted] = self._slopes.along("residual", ("v", "r", "s"), wanted)
+        slopes[:, wanted] = self._slopes.along("residual", ("increment", "r", "entropy"), wanted)
         if fit:
             slopes[:, :n] += slopes[:, n:nv] @ slopes[found.cut_rates, nv : nv + n]
             slopes[:, n:nv] = 0.0
@@ -100,7 +100,7 @@ class Linearised:
         eq, found = self.equations, self._residual
         eq.refuse(*found.about(q, r, s, eq.drive, eq.wrench))
         n, nv = found.n, found.nv
-        slopes = self._slopes.along("action", ("v", "r", "s"))
+        slopes = self._slopes.along("action", ("increment", "r", "entropy"))
         plain = np.flatnonzero(eq.heats.plain)
         if plain.size:
             rates, columns = 2 * nv + plain, nv + n + plain
@@ -133,7 +133,7 @@ class Linearised:
         found.arrays["base"][:] = q
         found.at(r, np.zeros(found.m))
         units = np.eye(nv + n)
-        slopes, places = self._slopes.both("residual", {"v": units[:nv], "r": units[nv:]}, nv + n, "places")
+        slopes, places = self._slopes.both("residual", {"increment": units[:nv], "r": units[nv:]}, nv + n, "place")
         gravity[:] = pull
         following = slopes[found.cut_rates, nv:]
         slopes[:, :n] += slopes[:, n:nv] @ following

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.mechanics.tree.sweeps import cuts
-from ephs.mechanics.tree.sweeps.charts import Chart
 from ephs.mechanics.tree.sweeps.cuts import Cut, Place, Relative
 from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces.vectors import add, dot, scale
@@ -34,7 +33,6 @@ class Closures:
     """
 
     cuts: Table[Cut]
-    charts: Table[Chart]
     places: Matrix
     motions: Matrix
     end: Integers

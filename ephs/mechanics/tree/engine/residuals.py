@@ -1,0 +1,260 @@
+"""The program of mechanisms' dense equations: residual and momenta with exact derivatives, masses, rows of loops.
+
+The residual at elements q = q⁰·exp(v), rates r, accelerations a and multipliers λ is M a + C r + g − forces − Jᵀλ, the
+accelerations J a + J̇ r that the loops' rows forbid, the cut joints' rates and accelerations, and ṡ. The action is the
+momenta p = ∂L/∂r, and ∂L/∂q with the forces that no potential has. Run with dual numbers both are their own exact
+derivatives.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final, final
+
+from ephs.mechanics.tree.engine.forces import act
+from ephs.mechanics.tree.sweeps import charts
+from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.mechanics.tree.sweeps.charts import Kind
+from ephs.mechanics.tree.sweeps.closures import Closures
+from ephs.mechanics.tree.sweeps.cuts import Cut
+from ephs.mechanics.tree.sweeps.expanding import ABOUT, About
+from ephs.mechanics.tree.sweeps.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
+from ephs.mechanics.tree.sweeps.outward import outward
+from ephs.mechanics.tree.sweeps.pack import Class
+from ephs.mechanics.tree.sweeps.programs import Sweeps
+from ephs.mechanics.tree.sweeps.records import Tree
+from ephs.mechanics.tree.sweeps.spreading import spread
+from ephs.semantics.linear.dense import cholesky, clear
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Matrix,
+    Program,
+    Real,
+    Table,
+    Vector,
+    integer,
+    matrix,
+    vector,
+)
+
+__all__ = ["ACTIVE", "MOVING", "Residuals", "point_program", "residuals"]
+
+ACTIVE: Final = (
+    "work", "place", "relative", "value", "covector", "force", "pushed", "attached", "pulled", "temperature", "entropy",
+    "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",
+)  # fmt: skip
+"""Arguments that have derivatives, beside those that only one of the functions has."""
+MOVING: Final[dict[str, Any]] = {**TABLES, **WORK}
+"""Arguments that all functions have first."""
+_BUNDLES: Final[tuple[tuple[dict[str, Any], Callable[..., Any]], ...]] = (
+    (TABLES, Tables), (WORK, Work), (ABOUT, About)
+)  # fmt: skip
+
+
+@final
+class Residuals:
+    """The dense equations of a class of mechanisms as a program.
+
+    Parameters
+    ----------
+    kind
+        The class of their trees.
+    kinds
+        The kinds of joints.
+
+    Attributes
+    ----------
+    kinds
+        As given.
+    made_of
+        The arguments.
+    width
+        Numbers of memory that a link takes; the ground takes as many.
+    program
+        ``place``: motions. ``assemble``: the mass matrix, its Cholesky factor, rows of loops; 0, or
+        1 + a degree of freedom that moves no mass. ``rigid``: the forces that inertia and gravity need at ṙ = 0.
+        ``twists``: (n, 6) of a link by the rates. ``residual`` and ``action``: see above.
+    """
+
+    def __init__(self, kind: Class, kinds: tuple[Kind, ...]) -> None:
+        self.kinds, self.made_of = kinds, (kind, kinds)
+        self._seen = [k for k in range(6) if not kind.planar or k not in (0, 1, 5)]
+        self._sweeps = Sweeps(kind, others=self._entries)
+        self._tangents: dict[tuple[str, int], Program] = {}
+        self.width, self.program = self._sweeps.width, self._sweeps.program
+
+    def tangent(self, name: str, directions: int) -> Program:
+        """``residual`` or ``action`` with exact derivatives along so many directions: active arguments are pairs."""
+        if (name, directions) not in self._tangents:
+            entry = self.program.entries[name]
+            active = [key for key in (*ACTIVE, "a", "out") if key in entry.kinds]
+            made = Program("tangents", **{name: entry.tangent(*active, directions=directions)})
+            self._tangents[name, directions] = made
+        return self._tangents[name, directions]
+
+    def _entries(self, sweeps: Sweeps) -> dict[str, Entry]:
+        def outwards(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> tuple[Tree, Closures]:
+            tree = sweeps.tree(tables.own[0].links, tables.integers, tables.reals, work.work, tables.gravity)
+            outward(on, tree, q, r)
+            joints = Table(Cut, tables.cut.cells, tables.cut_numbers.cells, tables.cut.size // Cut.integer_width)
+            return tree, Closures(joints, work.place, work.relative, tables.end, work.value, work.covector)
+
+        def place(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> None:
+            tree, closing = outwards(on, tables, work, q, r)
+            _at_rest(on, tree)
+            closing.place(on, tree)
+
+        def assemble(
+            on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, unit: Vector, mass: Matrix,
+            factor: Matrix, jacobian: Matrix, terms: Vector, driven: Integer,
+        ) -> Integer:  # fmt: skip
+            tree, closing = outwards(on, tables, work, q, r)
+            _at_rest(on, tree)
+            closing.place(on, tree)
+            masses(on, tree, q, unit, mass)
+            found = cholesky(on, mass, factor)
+
+            def empty(a: Integer) -> None:
+                clear(on, jacobian.row(driven + a))
+                terms[driven + a] = 0.0
+
+            def one(joint: Cut, a: Integer, end: Integer) -> None:
+                into, m = jacobian.row(driven + a), driven + a
+
+                def count(at: Integer, size: Real) -> None:
+                    terms[m] = terms[m] + size / factor[at, at]
+
+                for link, e in ((joint.first, end), (joint.second, end + 1)):
+                    row_of_covector(on, tree, q, link, self._seen, closing.at_end(e), into, count)
+
+            on.loop(terms.size - driven, empty)
+            closing.each_row(on, one)
+            return found
+
+        def rigid(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, out: Vector) -> None:
+            tree, _ = outwards(on, tables, work, q, r)
+            _at_rest(on, tree)
+            clear(on, out)
+            needed_forces(on, tree, q, out)
+
+        def twists(
+            on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, unit: Vector, link: Integer, rows: Matrix
+        ) -> None:
+            tree, _ = outwards(on, tables, work, q, r)
+            clear(on, unit)
+
+            def column(k: Integer) -> None:
+                unit[k] = 1.0
+                spread(on, tree, q, unit)
+                unit[k] = 0.0
+                for j, value in enumerate(tree.states[link].change):
+                    rows[k, j] = value
+
+            on.loop(unit.size, column)
+
+        def residual(
+            on: Evaluator, tables: Tables, work: Work, about: About, base: Vector, q: Vector, r: Vector, a: Vector,
+            multiplier: Vector, out: Vector,
+        ) -> None:  # fmt: skip
+            n, m, c = r.size, work.value.rows, about.increment.size - r.size
+            force, heat = out.part(0, n), out.part(n + m + 2 * c, work.entropy.size)
+            charts.advance(on, self.kinds, tables.chart, base, about.increment, q)
+            tree, closing = outwards(on, tables, work, q, r)
+            spread(on, tree, q, a)
+            closing.place(on, tree)
+            closing.along(on, out.part(n + m, c), out.part(n + m + c, c), n)
+            _act(on, tree, tables, work, about, q, r, force, heat)
+            closing.push(on, tree, multiplier)
+            needed_forces(on, tree, q, force)
+            armatures(on, tree, a, force)
+
+            def accelerated(k: Integer) -> None:
+                out[n + k] = -work.value[k, 0]
+
+            on.loop(m, accelerated)
+
+        def momenta(
+            on: Evaluator, tables: Tables, work: Work, about: About, base: Vector, q: Vector, r: Vector, out: Vector
+        ) -> None:
+            n, c = r.size, about.increment.size - r.size
+            force, heat = out.part(n, n), out.part(2 * n + 2 * c, work.entropy.size)
+            charts.advance(on, self.kinds, tables.chart, base, about.increment, q)
+            tree, closing = outwards(on, tables, work, q, r)
+            _at_rest(on, tree)
+            closing.place(on, tree)
+            weigh(on, tree)
+            closing.along(on, out.part(2 * n, c), out.part(2 * n + c, c), n)
+            _act(on, tree, tables, work, about, q, r, force, heat)
+            action(on, tree, q, r, out.part(0, n), force)
+
+        def entry(function: Callable[..., Any], **arguments: Any) -> Entry:
+            kinds = {**MOVING, **arguments}
+            return Entry.bundled(function, kinds, *(one for one in _BUNDLES if kinds.keys() >= one[0].keys()))
+
+        at: dict[str, Any] = {"q": vector(), "r": vector()}
+        return {
+            "place": entry(place, **at),
+            "assemble": entry(
+                assemble, **at, unit=vector(), mass=matrix(), factor=matrix(), jacobian=matrix(), terms=vector(),
+                driven=integer(),
+            ),
+            "rigid": entry(rigid, **at, out=vector()),
+            "twists": entry(twists, **at, unit=vector(), link=integer(), rows=matrix(6)),
+            "residual": entry(residual, **ABOUT, base=vector(), **at, a=vector(), multiplier=vector(), out=vector()),
+            "action": entry(momenta, **ABOUT, base=vector(), **at, out=vector()),
+        }  # fmt: skip
+
+
+def _act(
+    on: Evaluator, tree: Tree, tables: Tables, work: Work, about: About, q: Vector, r: Vector, force: Vector,
+    heat: Vector,
+) -> None:  # fmt: skip
+    """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ."""
+    _clear(on, work)
+    act(on, tables, work, q, r, heat, work.idle.part(2, work.idle.size - 2), work.idle.part(0, 2), about, True)
+
+    def take(j: Integer) -> None:
+        force[j] = -work.force[j]
+
+    def load(i: Integer) -> None:
+        state = tree.states[i]
+        state.load = [x - work.pushed[i, k] for k, x in enumerate(state.load)]
+
+    on.loop(force.size, take)
+    on.loop(tree.size, load)
+
+
+def _clear(on: Evaluator, work: Work) -> None:
+    clear(on, work.force)
+    clear(on, Vector(work.pushed.cells, work.pushed.start, work.pushed.rows * 6))
+
+
+def _at_rest(on: Evaluator, tree: Tree) -> None:
+    """No accelerations beyond the biases."""
+
+    def still(i: Integer) -> None:
+        tree.states[i].change = [0.0] * 6
+
+    on.loop(tree.size, still)
+
+
+@cache
+def residuals(kind: Class, kinds: tuple[Kind, ...]) -> Residuals:
+    """The program of a class, made once."""
+    return Residuals(kind, kinds)
+
+
+@cache
+def point_program() -> Program:
+    """The program that evaluates what acts at a point, where links are placed, and keeps it there: all mechanisms'."""
+
+    def evaluate(
+        on: Evaluator, tables: Tables, work: Work, about: About, q: Vector, r: Vector, made: Vector, totals: Vector
+    ) -> Integer:
+        _clear(on, work)
+        clear(on, made)
+        return act(on, tables, work, q, r, work.idle.part(0, work.entropy.size), made, totals, about, False)
+
+    kinds: dict[str, Any] = {**MOVING, **ABOUT, "q": vector(), "r": vector(), "made": vector(), "totals": vector(2)}
+    return Program("point", about=Entry.bundled(evaluate, kinds, *_BUNDLES))

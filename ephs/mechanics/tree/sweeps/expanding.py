@@ -1,0 +1,182 @@
+"""What acts on a mechanism to first order about a point: components and attachments, evaluated there once.
+
+Forces of the point, and by how much they change with places, rates and temperatures. About the point that is exact to
+first order, which is all that equations over dual numbers need there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import prod
+from typing import Any, Final, final
+
+from ephs.mechanics.tree.sweeps.acting import Work
+from ephs.mechanics.tree.sweeps.balances import slopes_of
+from ephs.mechanics.tree.sweeps.network import Net
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.stage import (
+    Evaluator,
+    Integer,
+    Integers,
+    Matrix,
+    Real,
+    Record,
+    Table,
+    Vector,
+    matrix,
+    real,
+    reals,
+    table,
+    vector,
+)
+
+__all__ = ["ABOUT", "About", "Expansion"]
+
+
+class Expansion(Record):
+    """A component at a point.
+
+    Attributes
+    ----------
+    state, effort
+        The point: x, and the efforts of what is no storage.
+    value
+        Flows there; of a storage efforts.
+    slope
+        Their derivatives, row by row: by efforts, then by the state, left-trivialised; of a storage by the latter.
+    energy
+        Of a storage, in J.
+    """
+
+    state = reals(7)
+    effort = reals(7)
+    value = reals(7)
+    slope = reals(7, 13)
+    energy = real()
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class About:
+    """A point at which what acts has been evaluated, and changes of it.
+
+    Attributes
+    ----------
+    expansion
+        Of each component.
+    met, flow, slope
+        Of what is attached: (known + read,) rates, temperatures, prescribed efforts, states, and zeros for degrees of
+        freedom of joints that it reads; (known,) flows by the first; their derivatives.
+    increment
+        Increments of all joints from the point.
+    local, off, changed
+        Memory: increments of a component's state, of ``met``; flows.
+    """
+
+    expansion: Table[Expansion]
+    met: Vector
+    flow: Vector
+    slope: Matrix
+    increment: Vector
+    local: Vector
+    off: Vector
+    changed: Vector
+
+    # ---- components --------------------------------------------------------------------------------------------
+
+    def keep(self, on: Evaluator, number: Integer, dims: Integers, work: Work, stored: bool) -> None:
+        """Keep a component that was evaluated in the memory."""
+        n, rates, one = dims[0], dims[2], self.expansion[number]
+        value, slope = _part(one, Expansion.value), _part(one, Expansion.slope)
+        copy(on, work.x.part(0, dims[3]), _part(one, Expansion.state).part(0, dims[3]))
+        if stored:
+            copy(on, work.e.part(0, n), value.part(0, n))
+            on.loop(n * n, lambda k: _put(slope, k, 2.0 * work.f[k]))
+            one.energy = work.c[0]
+            return
+        width = n + rates
+        copy(on, work.e.part(0, n), _part(one, Expansion.effort).part(0, n))
+        copy(on, work.f.part(0, n), value.part(0, n))
+
+        def row(j: Integer) -> None:
+            at = width * j
+            on.loop(n, lambda k: _put(slope, at + k, work.jac[at + k]))
+            on.loop(rates, lambda k: _put(slope, at + (n + k), 2.0 * work.jac[at + (n + k)]))
+
+        on.loop(n, row)
+
+    def store(self, on: Evaluator, number: Integer, dims: Integers, work: Work) -> None:
+        """Write the efforts of a storage to the memory, and its energy at the point."""
+        n, one = dims[0], self.expansion[number]
+        value, slope = _part(one, Expansion.value), _part(one, Expansion.slope)
+
+        def effort(j: Integer) -> None:
+            work.e[j] = value[j] + _along(on, slope.part(n * j, n), self.local)
+
+        on.loop(n, effort)
+        work.c[0] = one.energy
+
+    def relate(self, on: Evaluator, number: Integer, dims: Integers, work: Work, moving: Integer) -> None:
+        """Write the flows of a component to the memory, whose state's first increments move so many."""
+        n, one = dims[0], self.expansion[number]
+        width, effort = n + dims[2], _part(one, Expansion.effort)
+        value, slope, off = _part(one, Expansion.value), _part(one, Expansion.slope), on.scratch(7)
+        on.loop(n, lambda k: _put(off, k, work.e[k] - effort[k]))
+
+        def flow(j: Integer) -> None:
+            by_effort = _along(on, slope.part(width * j, n), off)
+            work.f[j] = value[j] + (by_effort + _along(on, slope.part(width * j + n, moving), self.local))
+
+        on.loop(n, flow)
+
+    # ---- what is attached --------------------------------------------------------------------------------------
+
+    def attach(self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work) -> Integer:
+        """Keep a network that was evaluated, whose first efforts are rates, and its derivatives; return a status."""
+        self._depend(on, net, rate, work, lambda k, value: _put(self.met, k, value))
+        copy(on, net.flow.part(0, net.known), self.flow)
+        return slopes_of(on, net, self.slope)
+
+    def flows(self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work) -> Vector:
+        """Flows of the network."""
+        self._depend(on, net, rate, work, lambda k, value: _put(self.off, k, value - self.met[k]))
+
+        def one(k: Integer) -> None:
+            self.changed[k] = self.flow[k] + _along(on, self.slope.row(k), self.off)
+
+        on.loop(self.flow.size, one)
+        return self.changed
+
+    def _depend(
+        self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work, put: Callable[[Integer, Real], None]
+    ) -> None:
+        """Call put(k, value) with all that flows depend on."""
+        head = net.head
+        on.loop(head[0], lambda k: put(k, rate(k)))
+        on.loop(head[1], lambda k: put(head[0] + k, work.temperature[net.temperature[k]]))
+        on.loop(head[2], lambda k: put(head[0] + (head[1] + k), net.given[k]))
+        on.loop(head[3], lambda k: put(net.first_state + k, work.entropy[head[5] + k]))
+        on.loop(net.bent.size, lambda k: put(net.known + k, self.increment[net.bent[k]]))
+
+
+def _part(one: Expansion, field: Any) -> Vector:
+    return Vector(one.reals, one.real_start + field.offset, prod(field.shape))
+
+
+def _along(on: Evaluator, row: Vector, by: Vector) -> Real:
+    total = on.variable(0.0)
+
+    def add(k: Integer) -> None:
+        total.value = total.value + row[k] * by[k]
+
+    on.loop(row.size, add)
+    return total.value
+
+
+def _put(vector: Vector, k: Integer, value: Real) -> None:
+    vector[k] = value
+
+
+ABOUT: Final[dict[str, Any]] = {
+    "expansion": table(Expansion), "met": vector(), "flow": vector(), "slope": matrix(), "increment": vector(),
+    "local": vector(7), "off": vector(), "changed": vector(),
+}  # fmt: skip
