@@ -1,22 +1,26 @@
 """The scene file's tables as pydantic models: the keys, their types, units and defaults.
 
-One model a table. Values whose form depends on another key (a number, or one per degree of freedom) are taken as
-numbers or lists here and brought to shape by `resolve`.
+One model a table; where keys are the attributes of an element, the model is made of the element. Values whose form
+depends on another key (a number, or one per degree of freedom) are taken as numbers or lists here and brought to shape
+by `resolve`.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, create_model
 
+from ephs.mechanics.scene.attached import Actuator, Cylinder, GasSpring, Gear, Motor
+from ephs.mechanics.scene.bodies import Marker, Spring, World
+from ephs.mechanics.scene.flexible import Load, Tendon
 from ephs.mechanics.scene.rotations import Rotation
-from ephs.mechanics.scene.schema_flexible import BeamEntry, LoadEntry, TendonEntry
+from ephs.mechanics.scene.schema_elements import table_of
+from ephs.mechanics.scene.schema_flexible import BeamEntry
 from ephs.mechanics.scene.schema_numbers import (
     Entry,
     Flag,
     Inertia,
     Limits,
     Matrix,
-    Names,
     NonNegative,
     Number,
     Numbers,
@@ -28,14 +32,7 @@ from ephs.mechanics.scene.schema_numbers import (
     Vector,
 )
 from ephs.mechanics.scene.schema_touching import ContactEntry, SurfaceEntry
-
-
-class WorldEntry(Entry):
-    """``[world]``"""
-
-    gravity: Vector = Field(default=[0.0, 0.0, -9.81], description="gravity in the world, m/s²")
-    temperature: Positive = Field(default=293.15, description="temperature of the reference environment, K")
-    pressure: Positive = Field(default=101325.0, description="pressure of the reference environment, Pa")
+from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 
 
 class AssemblyEntry(Entry):
@@ -176,120 +173,6 @@ class JointEntry(Entry):
     )
 
 
-class SpringEntry(Entry):
-    """``[springs.NAME]``"""
-
-    bodies: Pair = Field(description="body 1 and body 2")
-    at1: Vector = Field(description="point in body 1's centre-of-mass frame (ground: world), m")
-    at2: Vector = Field(description="point in body 2's, m")
-    stiffness: Number = Field(default=0.0, description="N/m")
-    length: NonNegative = Field(default=0.0, description="length without force, m")
-    damping: NonNegative = Field(default=0.0, description="N s/m")
-    heat: Text = Field(default="environment", description="thermal node that takes up the heat")
-
-
-class MotorEntry(Entry):
-    """``[motors.NAME]``"""
-
-    joint: Text = Field(description="the driven joint, of one degree of freedom")
-    constant: Number = Field(description="torque constant: torque of the rotor per current, N m/A or V s/rad")
-    resistance: Positive = Field(description="resistance of the winding, Ω")
-    inductance: NonNegative = Field(default=0.0, description="inductance of the winding, H")
-    gear: Number = Field(
-        default=1.0, description="gear ratio: rate of the rotor per rate of the joint, rad/rad or rad/m"
-    )
-    inertia: NonNegative = Field(default=0.0, description="inertia of the rotor, kg m²")
-    voltage: Number = Field(default=0.0, description='voltage without an input "motors.NAME", V')
-    heat: Text = Field(default="environment", description="thermal node that takes up the heat of the winding")
-
-
-class GearEntry(Entry):
-    """``[gears.NAME]``"""
-
-    joints: Names = Field(
-        description="two or more joints with one degree of freedom: a gear, a belt, a differential, a mimic"
-    )
-    ratio: Numbers = Field(default=1.0, description="rate of the first joint = Σ ratio · rate of the others")
-    stiffness: NonNegative = Field(
-        default=0.0, description="stiffness of a belt, N m/rad or N/m of the first joint; 0: rigid"
-    )
-    damping: NonNegative = Field(default=0.0, description="damping of the belt's stretch, N m s/rad or N s/m")
-    stretch: Number = Field(default=0.0, description="initial stretch of a belt, rad or m of the first joint")
-    friction: NonNegative = Field(
-        default=0.0, description="viscous friction on the first joint's rate, N m s/rad or N s/m"
-    )
-    heat: Text = Field(default="environment", description="thermal node that takes up the heat of damping and friction")
-
-
-class CylinderEntry(Entry):
-    """``[cylinders.NAME]``"""
-
-    joint: Text = Field(description="a joint with one degree of freedom; chamber a pushes it to larger coordinates")
-    area: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
-        description="change of volume of chambers a and b per coordinate, m³/m or m³/rad"
-    )
-    volume: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
-        description="volume of oil in each chamber, m³"
-    )
-    bulk: Positive = Field(default=1.5e9, description="bulk modulus of the oil, Pa")
-    conductance: Positive = Field(description="conductance of the line to each chamber, m³/(s Pa)")
-    leak: NonNegative = Field(default=0.0, description="conductance of the leak across the piston, m³/(s Pa)")
-    pressure: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
-        default=[0.0, 0.0],
-        description='pressures of the supplies above world.pressure without an input "cylinders.NAME", Pa',
-    )
-    heat: Text = Field(default="environment", description="thermal node that takes up the heat of lines and leak")
-
-
-class GasSpringEntry(Entry):
-    """``[gas_springs.NAME]``"""
-
-    joint: Text = Field(description="a joint with one degree of freedom")
-    area: Number = Field(description="change of the gas volume per coordinate, m³/m or m³/rad; may be negative")
-    volume: Positive = Field(description="initial volume, m³")
-    pressure: Positive = Field(
-        description="initial absolute pressure, Pa; world.pressure acts on the other side of the piston"
-    )
-    temperature: Positive = Field(default=293.15, description="initial temperature, K")
-    gamma: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = Field(
-        default=1.4, description="ratio of specific heats"
-    )
-    conductance: NonNegative = Field(
-        default=0.0, description="thermal conductance from the gas to its thermal node, W/K; 0: adiabatic"
-    )
-    heat: Text = Field(default="environment", description="thermal node that exchanges heat with the gas")
-
-
-class ActuatorEntry(Entry):
-    """``[actuators.NAME]``"""
-
-    joints: list[Text] = Field(default=[], description="joints with one degree of freedom")
-    tendon: Text | None = Field(default=None, description="instead of joints: a tendon, on whose length it acts")
-    ratio: Numbers = Field(default=1.0, description='force on each by the control, the input "actuators.NAME"; N m, N')
-    limits: Range | None = Field(default=None, description="least and largest control")
-
-
-class ThermalEntry(Entry):
-    """``[thermal.NAME]``"""
-
-    capacity: Positive = Field(description="heat capacity, J/K")
-    temperature: Positive = Field(description="initial temperature, K")
-
-
-class ConductionEntry(Entry):
-    """``[conduction.NAME]``"""
-
-    between: Pair = Field(description='two thermal nodes, or one and "environment"')
-    conductance: NonNegative = Field(description="thermal conductance, W/K")
-
-
-class MarkerEntry(Entry):
-    """``[markers.NAME]``"""
-
-    body: Text = Field(description='the body that carries it, or "ground"')
-    at: Vector = Field(default=[0.0, 0.0, 0.0], description="point in its centre-of-mass frame (ground: world), m")
-
-
 class PartEntry(Entry):
     """``[parts.NAME]``"""
 
@@ -298,63 +181,57 @@ class PartEntry(Entry):
     rotation: Rotation = Field(default=[1.0, 0.0, 0.0, 0.0], description="its orientation, [w, x, y, z] or a table")
 
 
-class SceneFile(Entry):
-    """A scene file."""
-
-    format: Literal[1] = Field(description="version of the file format, always 1")
-    name: Text | None = Field(default=None, description="name of the scene; default: the file's name")
-    world: WorldEntry | None = Field(default=None, description="gravity and the reference environment")
-    assembly: AssemblyEntry = Field(
-        default=AssemblyEntry(), description="treatment of inconsistent initial states and inertias"
-    )
-    bodies: dict[str, BodyEntry] = Field(default_factory=dict, description="rigid bodies, and massless frames")
-    joints: dict[str, JointEntry] = Field(
-        default_factory=dict, description="joints between two bodies, or a body and the ground"
-    )
-    springs: dict[str, SpringEntry] = Field(default_factory=dict, description="springs and dampers between two points")
-    surfaces: dict[str, SurfaceEntry] = Field(default_factory=dict, description="surfaces of bodies for contact")
-    contacts: dict[str, ContactEntry] = Field(default_factory=dict, description="pairs of surfaces that can touch")
-    beams: dict[str, BeamEntry] = Field(  # pyright: ignore[reportInvalidTypeForm] - a class made at run time
-        default_factory=dict, description="rods that bend, twist and stretch"
-    )
-    tendons: dict[str, TendonEntry] = Field(default_factory=dict, description="tendons through points of bodies")
-    loads: dict[str, LoadEntry] = Field(default_factory=dict, description="forces and moments on bodies")
-    motors: dict[str, MotorEntry] = Field(default_factory=dict, description="motors with circuit and gear on joints")
-    gears: dict[str, GearEntry] = Field(
-        default_factory=dict, description="linear relations between the rates of joints"
-    )
-    cylinders: dict[str, CylinderEntry] = Field(default_factory=dict, description="hydraulic cylinders on joints")
-    gas_springs: dict[str, GasSpringEntry] = Field(default_factory=dict, description="gas springs on joints")
-    actuators: dict[str, ActuatorEntry] = Field(
-        default_factory=dict, description="actuators: forces on joints by a control"
-    )
-    thermal: dict[str, ThermalEntry] = Field(default_factory=dict, description="thermal nodes: stores of heat")
-    conduction: dict[str, ConductionEntry] = Field(
-        default_factory=dict, description="heat conduction between thermal nodes"
-    )
-    markers: dict[str, MarkerEntry] = Field(default_factory=dict, description="points on bodies")
-    parts: dict[str, PartEntry] = Field(default_factory=dict, description="other scene files as subsystems")
-
-
-SECTIONS: dict[str, type[Entry]] = {
-    "bodies": BodyEntry,
-    "joints": JointEntry,
-    "springs": SpringEntry,
-    "surfaces": SurfaceEntry,
-    "contacts": ContactEntry,
-    "beams": BeamEntry,
-    "tendons": TendonEntry,
-    "loads": LoadEntry,
-    "motors": MotorEntry,
-    "gears": GearEntry,
-    "cylinders": CylinderEntry,
-    "gas_springs": GasSpringEntry,
-    "actuators": ActuatorEntry,
-    "thermal": ThermalEntry,
-    "conduction": ConductionEntry,
-    "markers": MarkerEntry,
-    "parts": PartEntry,
+WorldEntry: Any = table_of(World, "world")
+_LENGTH = Field(default=None, description="without force, m; default: as at the start")
+_POINTS = Field(description="one in each, in its centre-of-mass frame (ground: world), m")
+_LIMITS = Field(default=None, description="least and largest control")
+_SECTIONS: dict[str, tuple[type[Entry], str]] = {
+    "bodies": (BodyEntry, "rigid bodies, and massless frames"),
+    "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
+    "springs": (
+        table_of(Spring, "springs.NAME", bodies=(Pair, Field(description="body 1 and body 2"))),
+        "springs and dampers between two points",
+    ),
+    "surfaces": (SurfaceEntry, "surfaces of bodies for contact"),
+    "contacts": (ContactEntry, "pairs of surfaces that can touch"),
+    "beams": (BeamEntry, "rods that bend, twist and stretch"),
+    "tendons": (
+        table_of(
+            Tendon,
+            "tendons.NAME",
+            points=(Annotated[list[Vector], Field(min_length=2)], _POINTS),
+            length=(NonNegative | None, _LENGTH),
+        ),
+        "tendons through points of bodies",
+    ),
+    "loads": (table_of(Load, "loads.NAME"), "forces and moments on bodies"),
+    "motors": (table_of(Motor, "motors.NAME"), "motors with circuit and gear on joints"),
+    "gears": (table_of(Gear, "gears.NAME"), "linear relations between the rates of joints"),
+    "cylinders": (table_of(Cylinder, "cylinders.NAME"), "hydraulic cylinders on joints"),
+    "gas_springs": (table_of(GasSpring, "gas_springs.NAME"), "gas springs on joints"),
+    "actuators": (
+        table_of(Actuator, "actuators.NAME", limits=(Range | None, _LIMITS)),
+        "actuators: forces on joints by a control",
+    ),
+    "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
+    "conduction": (table_of(Conduction, "conduction.NAME"), "heat conduction between thermal nodes"),
+    "markers": (table_of(Marker, "markers.NAME"), "points on bodies"),
+    "parts": (PartEntry, "other scene files as subsystems"),
 }
+SECTIONS: dict[str, type[Entry]] = {key: table for key, (table, _) in _SECTIONS.items()}
+_Name: TypeAlias = Text | None
+_FILE: dict[str, Any] = {
+    "format": (Literal[1], Field(description="version of the file format, always 1")),
+    "name": (_Name, Field(default=None, description="name of the scene; default: the file's name")),
+    "world": (WorldEntry | None, Field(default=None, description="gravity and the reference environment")),
+    "assembly": (
+        AssemblyEntry,
+        Field(default=AssemblyEntry(), description="treatment of inconsistent initial states and inertias"),
+    ),
+}
+for _key, (_table, _said) in _SECTIONS.items():
+    _FILE[_key] = dict[str, _table], Field(default_factory=dict, description=_said)
+SceneFile: Any = create_model("SceneFile", __base__=Entry, __doc__="A scene file.", **_FILE)
 
 
 def json_schema() -> dict[str, Any]:

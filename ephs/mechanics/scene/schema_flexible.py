@@ -1,10 +1,10 @@
-"""Tables of beams, tendons and loads in scene files."""
+"""Tables of beams in scene files."""
 
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.schema_numbers import Entry, Flag, NonNegative, Number, Positive, Text, Vector
+from ephs.mechanics.scene.schema_numbers import Entry, NonNegative, Number, Positive, Text, Vector
 from ephs.mechanics.scene.schema_touching import ContactLawEntry
 
 
@@ -123,29 +123,3 @@ _BEAM: dict[str, Any] = {
 }
 # a class cannot have `from` for a name
 BeamEntry: Any = create_model("BeamEntry", __base__=Entry, __doc__="``[beams.NAME]``", **_BEAM)
-
-
-class TendonEntry(Entry):
-    """``[tendons.NAME]``"""
-
-    bodies: Annotated[list[Text], Field(min_length=2)] = Field(
-        description='what carries its points, in their order; the tension is the input "actuators.NAME", in N'
-    )
-    points: Annotated[list[Vector], Field(min_length=2)] = Field(
-        description="one in each, in its centre-of-mass frame (ground: world), m"
-    )
-    stiffness: NonNegative = Field(default=0.0, description="N/m")
-    length: NonNegative | None = Field(default=None, description="without force, m; default: as at the start")
-    damping: NonNegative = Field(default=0.0, description="N s/m; 0 of one with slack")
-    slack: Flag = Field(default=False, description="no elastic force where it is shorter than its length: a cable")
-    heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
-
-
-class LoadEntry(Entry):
-    """``[loads.NAME]``"""
-
-    body: Text = Field(description="body; the load acts at its centre of mass")
-    force: Vector = Field(default=[0.0, 0.0, 0.0], description="force in world axes, N")
-    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="moment in world axes, N m")
-    follower: Flag = Field(default=False, description="force and moment are given in body axes and turn with the body")
-    ramp: NonNegative = Field(default=0.0, description="time over which the load grows linearly from 0, s")

@@ -34,6 +34,11 @@ Positive = Annotated[
     Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST),
     WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 0.0}),
 ]
+AboveOne = Annotated[
+    float,
+    Field(strict=True, allow_inf_nan=False, gt=1.0, le=LARGEST),
+    WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 1.0}),
+]
 Series = Annotated[list[Number], Field(min_length=1)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, frozen
 from ephs.mechanics.scene.resolve import Names
-from ephs.mechanics.scene.schema_flexible import TendonEntry
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
@@ -36,7 +36,7 @@ def resolve_tendons(
     return found
 
 
-def _check(name: str, table: Checked[TendonEntry], names: Names, faults: list[Fault]) -> None:
+def _check(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
     entry, key = table.entry, f"tendons.{name}"
     if table.sound("heat"):
         names.check(entry.heat, f"{key}.heat", "thermal", faults)
@@ -52,7 +52,7 @@ def _check(name: str, table: Checked[TendonEntry], names: Names, faults: list[Fa
         faults.append(fault("tendon bodies", f"{key}.bodies", shown(entry.bodies)))
 
 
-def _resolved(name: str, entry: TendonEntry, poses: Mapping[str, Array], faults: list[Fault]) -> Tendon:
+def _resolved(name: str, entry: Any, poses: Mapping[str, Array], faults: list[Fault]) -> Tendon:
     places = [_place(body, np.array(at), poses) for body, at in zip(entry.bodies, entry.points, strict=True)]
     lengths = [float(np.linalg.norm(two - one)) for one, two in pairwise(places)]
     whole = sum(lengths)
@@ -82,7 +82,7 @@ def with_pulls(
     pulls = dict(actuators)
     for name in tendons:
         if name not in document.sections["actuators"]:
-            pulls[name] = Actuator(name, (), frozen([-1.0]), None, tendon=name)
+            pulls[name] = Actuator(name, tendon=name, ratio=frozen([-1.0]))
         elif name in actuators and actuators[name].tendon != name:
             faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
     return pulls
