@@ -21,17 +21,6 @@ from ephs.semantics.trials import ROTATING, Trial
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
 
-__all__ = [
-    "MIRRORED",
-    "NEARER",
-    "STATEMENTS",
-    "check_at",
-    "constant",
-    "dirac",
-    "random_efforts",
-    "random_point",
-]
-
 LENGTHS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)
 """Lengths of steps beside the state's, for central differences of energies."""
 SHORT = 1e-8

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, final
 if TYPE_CHECKING:
     from ephs.semantics.trials import Witness
 
-__all__ = ["AssemblyError", "SemanticsError", "StructureError", "listed", "nearest_of"]
-
 _TEXTS = {
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
     "interface": ("{path}: the filling's interface is {found}, expected {expected}; rename the filling's ports"),

@@ -19,8 +19,6 @@ from ephs.semantics.numbering import Index, Interned, Numbering, Parts
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.system import Filling, System
 
-__all__ = ["number_by_kinds", "repeats"]
-
 WORTH = 8
 """Kinds are numbered from so many components for each of them on: a kind costs as much as some components."""
 COMPONENTS, WIRES, READS, STATES, JUNCTIONS = range(5)

@@ -13,8 +13,6 @@ from ephs.semantics.markup import table
 from ephs.semantics.search import search
 from ephs.semantics.system import System
 
-__all__ = ["CheckItem", "CheckReport", "check_structure", "check_system"]
-
 PROBES = 3
 """States and efforts at which a structure is evaluated again, whatever its verdict."""
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Band", "exergy_bands", "plot_exergy_flow"]
-
 SMALLEST = 5e-3
 """Bands below this fraction of the turnover are drawn as one."""
 GAP, SLOT = 0.02, 0.05

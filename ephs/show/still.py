@@ -14,8 +14,6 @@ from ephs.show.sketch import Sketch, Words, sketch
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_still", "still_svg"]
-
 WIDTH, HIGHEST = 640.0, 420.0
 """Size of an SVG in pixels: its width, and its largest height."""
 POINT = 4.0 / 3.0

@@ -23,8 +23,6 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["between_frames", "joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_joint"]
-
 UNIT = 1e-6
 """Deviation of a quaternion's length from 1 that is normalised: rounding to six digits."""
 

@@ -28,8 +28,6 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["tendon", "tension_spring"]
-
 
 def tendon(
     segments: "Sequence[tuple[ArrayLike, ArrayLike]]",

@@ -6,8 +6,6 @@ from ephs.mechanics.scene.geometry import Coupling
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import codes
 
-__all__ = ["adjoint_inverse", "compose", "gap", "included", "inverse", "product", "rotations", "turned"]
-
 SERIES = 0.01
 """Angle θ in rad below which (θ − sin θ)/θ³ is its series up to θ⁴: the next term, θ⁶/362880, is below rounding."""
 

@@ -10,8 +10,6 @@ from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import Joint
 from ephs.semantics.bundle import Array
 
-__all__ = ["open_by", "span_of"]
-
 
 class Read(Protocol):
     """Poses (n, 7) of bodies, and of C2 in C1 by the coordinates of a joint."""

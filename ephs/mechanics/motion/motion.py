@@ -31,8 +31,6 @@ from ephs.solve.result.dataset import Variable
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["BodyMotion", "JointMotion", "MarkerMotion", "SceneMotion", "ThermalMotion"]
-
 CHUNK = 512
 """Instants that are projected together; bounds the memory."""
 MANY = 40

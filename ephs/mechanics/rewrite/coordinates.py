@@ -23,8 +23,6 @@ from ephs.solve.model import compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index
 
-__all__ = ["coordinate_steps", "cyclic", "loops", "mechanisms", "unread"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,16 +10,6 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import ABOVE_ONE, ENVIRONMENT, NON_NEGATIVE, POSITIVE, Element, Named, Number, frozen
 
-__all__ = [
-    "ATTACHED",
-    "Actuator",
-    "Attachment",
-    "Cylinder",
-    "GasSpring",
-    "Gear",
-    "Motor",
-]
-
 Array = NDArray[np.float64]
 
 

@@ -33,8 +33,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import TINY
 
-__all__ = ["BeamDraft", "check_beam", "curve", "resolve_beam"]
-
 ALONG = 1.0 - 1e-9
 """Cosine above which a given direction counts as along the beam: its sine is 4e-5, well above rounding."""
 

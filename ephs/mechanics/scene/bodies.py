@@ -26,8 +26,6 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.solve.motion_law import MotionLaw
 
-__all__ = ["IDENTITY_POSE", "Body", "Joint", "Marker", "Spring", "World", "free_joint"]
-
 Array = NDArray[np.float64]
 IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 

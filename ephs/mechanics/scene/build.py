@@ -34,18 +34,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.system import Filling, System
 from ephs.solve.problem import Signal
 
-__all__ = [
-    "component_path",
-    "contact_points",
-    "drive_ports",
-    "initial_state",
-    "scene_inputs",
-    "scene_names",
-    "scene_system",
-    "tension_port",
-    "wrench_port",
-]
-
 
 def component_path(kind: str, name: str) -> Path:
     """Box of a (dotted) body, joint, …: ``left.crank`` is the box ``parts.left.bodies.crank``."""

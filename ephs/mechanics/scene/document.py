@@ -17,8 +17,6 @@ from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 
-__all__ = ["scene_from_text", "scene_to_text"]
-
 
 def scene_to_text(scene: Scene) -> str:
     """The scene as JSON."""

@@ -15,24 +15,6 @@ from typing import Any, ClassVar, Final, Self, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "ABOVE_ONE",
-    "ENVIRONMENT",
-    "FREE_END",
-    "GROUND",
-    "NON_NEGATIVE",
-    "OUTSIDE",
-    "POSE",
-    "POSITIVE",
-    "TWIST",
-    "Element",
-    "Measured",
-    "Named",
-    "Number",
-    "frozen",
-    "part_of",
-]
-
 T = TypeVar("T")
 Array = NDArray[np.float64]
 GROUND = "ground"

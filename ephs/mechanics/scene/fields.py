@@ -18,8 +18,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import INERTIA
 
-__all__ = ["FIELDS", "Field", "placed"]
-
 Array = NDArray[np.float64]
 
 

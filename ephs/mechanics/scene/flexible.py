@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Element, Measured, Named, Number, frozen
 
-__all__ = ["Beam", "Load", "Strain", "Tendon"]
-
 Array = NDArray[np.float64]
 
 

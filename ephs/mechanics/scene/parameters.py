@@ -25,8 +25,6 @@ from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.system import Filling, System
 
-__all__ = ["names", "read", "varied"]
-
 Array = NDArray[np.float64]
 Model = TypeVar("Model", Scene, System)
 _INDEX = re.compile(r"((?:\[\d+\])*)$")

@@ -13,8 +13,6 @@ from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.semantics.bundle import Array
 
-__all__ = ["element_units", "freedom_units", "rescaled"]
-
 
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:
     """The scene with every length multiplied by ``length``, every mass and time likewise; temperatures stay.

@@ -11,8 +11,6 @@ from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.model import Joint, Scene, frozen
 from ephs.mechanics.scene.resolve import Names, attributes
 
-__all__ = ["resolve_attached"]
-
 ROUNDED = 1e-12
 """Difference of initial rates that gears may leave, relative to what is added: theirs are written in decimals."""
 

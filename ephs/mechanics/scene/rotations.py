@@ -10,8 +10,6 @@ from pydantic_core import PydanticCustomError
 
 from ephs.mechanics.scene.schema_numbers import Entry, Number, Quaternion, Vector
 
-__all__ = ["FORMS", "Rotation", "RotationEntry"]
-
 FORMS = "rpy, rpy_deg, or axis with angle or angle_deg"
 
 

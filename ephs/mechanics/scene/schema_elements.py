@@ -9,8 +9,6 @@ from pydantic import Field, create_model
 from ephs.mechanics.scene import schema_numbers as forms
 from ephs.mechanics.scene.element import ABOVE_ONE, NON_NEGATIVE, POSITIVE, Measured, Number, part_of
 
-__all__ = ["table_of"]
-
 _RANGES: Final[Mapping[Any, Any]] = {
     None: forms.Number,
     POSITIVE: forms.Positive,

@@ -7,8 +7,6 @@ from pydantic import Field
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import Entry, NonNegative, Number, Pair, Positive, Sizes, Text, Vector
 
-__all__ = ["ContactEntry", "ContactLawEntry", "SurfaceEntry", "SurfaceShapeEntry"]
-
 
 class SurfaceShapeEntry(Entry):
     """``shape`` of a surface: one of six."""

@@ -15,8 +15,6 @@ from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 
-__all__ = ["Section", "circle", "rectangle", "resolve_section", "tube"]
-
 Array = NDArray[np.float64]
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
 NEEDED = {"reissner": NUMBERS, "kirchhoff": ("GJ", "EI", "rhoA", "rhoI"), "string": ("rhoA",)}

@@ -21,8 +21,6 @@ from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.pairs import SIZES
 from ephs.operad import Path as Name
 
-__all__ = ["check_scene", "meshes_within"]
-
 Sizes: TypeAlias = dict[str, tuple[Any, tuple[int, ...]]]
 """Numbers with their required shapes."""
 

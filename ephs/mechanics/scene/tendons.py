@@ -18,8 +18,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
 
-__all__ = ["resolve_tendons", "tendon_ports", "tendon_starts", "tendon_system", "with_pulls"]
-
 Array = NDArray[np.float64]
 
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Element, Named, Number
 
-__all__ = ["Conduction", "ThermalNode"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

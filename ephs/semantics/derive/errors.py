@@ -2,8 +2,6 @@
 
 from typing import Final, final
 
-__all__ = ["DeriveError"]
-
 TEXTS: Final = {
     "compared": "a number over a step is compared ({order}); an energy does not branch: write abs(…), or a function of "
     "its own for each case.",

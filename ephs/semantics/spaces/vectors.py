@@ -9,11 +9,6 @@ from typing import TypeAlias
 
 from ephs.semantics.stage import Evaluator, Real, Truth
 
-__all__ = [
-    "Columns", "Entries", "Rows", "Vector3", "add", "apply", "apply_transposed", "combine", "cross", "dot", "hat",
-    "outer_sum", "plus", "product", "scale", "sub", "symmetric", "symmetric_inverse", "transposed", "upper", "vee",
-]  # fmt: skip
-
 Entries: TypeAlias = Sequence[Real]
 Vector3: TypeAlias = list[Real]
 Rows: TypeAlias = list[list[Real]]

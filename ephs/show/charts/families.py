@@ -7,8 +7,6 @@ from typing import Literal, final
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts import family_scenes as scenes
 
-__all__ = ["FAMILIES", "Family", "scene_family"]
-
 IMPLICIT = ("natural", "natural4", "radau")
 EXPLICIT = ("rk87", "rk54")
 

@@ -13,8 +13,6 @@ from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_
 from ephs.show.charts.peer_scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
 
-__all__ = ["integrator", "mjcf", "mujoco_model", "silent"]
-
 REACHED = 1e-6
 """Allowed missing fraction of the time at the end: sums of steps round."""
 IMPEDANCE = 'solimp="0.9999 0.9999 0.001 0.5 2"'

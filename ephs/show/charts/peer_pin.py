@@ -13,8 +13,6 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.peer_scene import Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
 
-__all__ = ["SOFT", "TIGHT", "PinModel", "integrator"]
-
 SOLVED = 1e-13
 """Accuracy to which Pinocchio solves for constraint forces."""
 TIGHT, SOFT = 1e-8, 1e-2

@@ -19,8 +19,6 @@ from ephs.solve.errors import Interrupted, SimulationError
 from ephs.solve.errors import Outcome as Failure
 from ephs.solve.result.solution import Solution
 
-__all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
-
 Array = NDArray[np.float64]
 MOST_STEPS = 500_000
 """Default limit of one run."""

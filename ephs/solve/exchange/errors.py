@@ -2,8 +2,6 @@
 
 from typing import Final, final
 
-__all__ = ["ExchangeError"]
-
 TEXTS: Final = {
     "package": "a unit is loaded by FMPy, which is not installed: pip install ephs[fmi]",
     "file": "{file}: not an FMI 2.0 or 3.0 unit: {found}",
