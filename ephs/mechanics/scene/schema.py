@@ -17,6 +17,7 @@ from ephs.mechanics.scene.schema_elements import table_of
 from ephs.mechanics.scene.schema_flexible import BeamEntry
 from ephs.mechanics.scene.schema_numbers import (
     Entry,
+    Extents,
     Flag,
     Inertia,
     Limits,
@@ -28,8 +29,10 @@ from ephs.mechanics.scene.schema_numbers import (
     Positive,
     Range,
     Series,
+    Sizes,
     Text,
     Vector,
+    key,
 )
 from ephs.mechanics.scene.schema_touching import ContactEntry, SurfaceEntry
 from ephs.mechanics.scene.thermal import Conduction, ThermalNode
@@ -38,158 +41,125 @@ from ephs.mechanics.scene.thermal import Conduction, ThermalNode
 class AssemblyEntry(Entry):
     """``[assembly]``"""
 
-    adjust: Flag = Field(
-        default=False,
-        description="replace an inconsistent initial state by the nearest consistent one, and report the change",
+    adjust: Flag = key(
+        "replace an inconsistent initial state by the nearest consistent one, and report the change", False
     )
-    inertia: Literal["strict", "warn", "nearest"] = Field(
-        default="strict",
-        description='"warn" accepts a physically impossible inertia, "nearest" takes the nearest possible one',
+    inertia: Literal["strict", "warn", "nearest"] = key(
+        '"warn" accepts a physically impossible inertia, "nearest" takes the nearest possible one', "strict"
     )
 
 
 class ShapeEntry(Entry):
     """``shape``: one of four, and its pose in the body."""
 
-    box: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
-        default=None, description="edge lengths, m"
-    )
-    sphere: Positive | None = Field(default=None, description="radius, m")
-    cylinder: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="radius and length along z, m"
-    )
-    mesh: Text | None = Field(
-        default=None, description="a mesh file (.stl .obj .ply .glb .off) in the scene file's folder, or below"
-    )
-    scale: Vector | None = Field(default=None, description="scale of a mesh along its axes")
-    position: Vector | None = Field(default=None, description="origin in the centre-of-mass frame, m")
-    rotation: Rotation | None = Field(default=None, description="orientation there, [w, x, y, z] or a table")
+    box: Extents | None = key("edge lengths, m", None)
+    sphere: Positive | None = key("radius, m", None)
+    cylinder: Sizes | None = key("radius and length along z, m", None)
+    mesh: Text | None = key("a mesh file (.stl .obj .ply .glb .off) in the scene file's folder, or below", None)
+    scale: Vector | None = key("scale of a mesh along its axes", None)
+    position: Vector | None = key("origin in the centre-of-mass frame, m", None)
+    rotation: Rotation | None = key("orientation there, [w, x, y, z] or a table", None)
 
 
 class BodyEntry(Entry):
     """``[bodies.NAME]``"""
 
-    mass: NonNegative | None = Field(
-        default=None, description="kg; required unless density is given; 0 only with inertia 0"
+    mass: NonNegative | None = key("kg; required unless density is given; 0 only with inertia 0", None)
+    inertia: Inertia | None = key(
+        "about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²; default: from the shapes, homogeneous", None
     )
-    inertia: Inertia | None = Field(
-        default=None,
-        description="about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²; "
-        "default: from the shapes, homogeneous",
-    )
-    density: Positive | None = Field(
-        default=None, description="density of the shapes, kg/m³; replaces mass and inertia"
-    )
-    position: Vector | None = Field(default=None, description="centre of mass in the world, m")
-    rotation: Rotation | None = Field(default=None, description="body to world, [w, x, y, z] or a table")
-    velocity: Vector | None = Field(default=None, description="of the centre of mass, world basis, m/s")
-    angular_velocity: Vector | None = Field(default=None, description="body basis, rad/s")
-    shape: ShapeEntry | None = Field(
-        default=None, description="shape for pictures, and for the inertia where none is given"
-    )
-    shapes: list[ShapeEntry] | None = Field(default=None, description="list of shapes, instead of shape")
+    density: Positive | None = key("density of the shapes, kg/m³; replaces mass and inertia", None)
+    position: Vector | None = key("centre of mass in the world, m", None)
+    rotation: Rotation | None = key("body to world, [w, x, y, z] or a table", None)
+    velocity: Vector | None = key("of the centre of mass, world basis, m/s", None)
+    angular_velocity: Vector | None = key("body basis, rad/s", None)
+    shape: ShapeEntry | None = key("shape for pictures, and for the inertia where none is given", None)
+    shapes: list[ShapeEntry] | None = key("list of shapes, instead of shape", None)
 
 
 class FrameEntry(Entry):
     """A pose in a body's centre-of-mass frame."""
 
-    position: Vector = Field(default=[0.0, 0.0, 0.0], description="origin, m")
-    rotation: Rotation = Field(default=[1.0, 0.0, 0.0, 0.0], description="orientation, [w, x, y, z] or a table")
+    position: Vector = key("origin, m", [0.0, 0.0, 0.0])
+    rotation: Rotation = key("orientation, [w, x, y, z] or a table", [1.0, 0.0, 0.0, 0.0])
 
 
 class MotionEntry(Entry):
     """A prescribed motion: the change of the coordinate from its initial value, in one of four forms."""
 
-    rate: Number | None = Field(default=None, description="constant rate of the single degree of freedom, rad/s or m/s")
-    polynomial: Series | None = Field(
-        default=None, description="coefficients c₁, c₂, … of c₁ t + c₂ t² + …; rad/s, rad/s², … or m/s, m/s², …"
+    rate: Number | None = key("constant rate of the single degree of freedom, rad/s or m/s", None)
+    polynomial: Series | None = key(
+        "coefficients c₁, c₂, … of c₁ t + c₂ t² + …; rad/s, rad/s², … or m/s, m/s², …", None
     )
-    amplitude: Number | None = Field(
-        default=None, description="amplitude A of the harmonic A sin(2π f t + φ), rad or m"
-    )
-    frequency: Number | None = Field(default=None, description="frequency f of the harmonic, Hz")
-    phase: Number | None = Field(default=None, description="phase φ of the harmonic, rad; default: 0")
-    times: Series | None = Field(
-        default=None,
-        description="ascending times of a table, s; a spline of fifth order, at rest before and after",
-    )
-    displacements: Series | None = Field(default=None, description="displacements at these times, rad or m")
+    amplitude: Number | None = key("amplitude A of the harmonic A sin(2π f t + φ), rad or m", None)
+    frequency: Number | None = key("frequency f of the harmonic, Hz", None)
+    phase: Number | None = key("phase φ of the harmonic, rad; default: 0", None)
+    times: Series | None = key("ascending times of a table, s; a spline of fifth order, at rest before and after", None)
+    displacements: Series | None = key("displacements at these times, rad or m", None)
 
 
 class DryEntry(Entry):
     """Dry friction of a joint with one degree of freedom."""
 
-    coulomb: NonNegative = Field(description="friction force while sliding, N m or N")
-    static: NonNegative | None = Field(default=None, description="force at which sliding begins; default: coulomb")
-    stribeck: Positive = Field(default=0.01, description="rate over which the force falls to coulomb, rad/s or m/s")
-    slip: Positive = Field(default=1e-3, description="rate below which the friction is viscous, rad/s or m/s")
+    coulomb: NonNegative = key("friction force while sliding, N m or N")
+    static: NonNegative | None = key("force at which sliding begins; default: coulomb", None)
+    stribeck: Positive = key("rate over which the force falls to coulomb, rad/s or m/s", 0.01)
+    slip: Positive = key("rate below which the friction is viscous, rad/s or m/s", 1e-3)
 
 
 class JointEntry(Entry):
     """``[joints.NAME]``"""
 
-    type: Text = Field(description="kind of joint: a lower pair, universal, or a registered kind")
-    bodies: Pair = Field(description='body 1 and body 2; "ground" is the inertial frame')
-    at: Vector | None = Field(
-        default=None, description="joint origin, world coordinates in the initial configuration, m"
+    type: Text = key("kind of joint: a lower pair, universal, or a registered kind")
+    bodies: Pair = key('body 1 and body 2; "ground" is the inertial frame')
+    at: Vector | None = key("joint origin, world coordinates in the initial configuration, m", None)
+    axis: Vector | None = key("world direction of the joint frame's z axis", None)
+    xaxis: Vector | None = key("world direction of the joint frame's x axis, made normal to z", None)
+    axis2: Vector | None = key("universal only: the axis fixed in body 2", None)
+    frame1: FrameEntry | None = key("the joint frame in body 1 (ground: world)", None)
+    frame2: FrameEntry | None = key("the joint frame in body 2 (ground: world)", None)
+    coordinate: Numbers | None = key("initial coordinates, with frame1 and frame2; rad, m", None)
+    rate: Numbers | None = key("initial joint twist u_r; rad/s, m/s", None)
+    pitch: Number | None = key("screw only, m/rad", None)
+    friction: Matrix = key(
+        "viscous, on the joint twist: a number, one per degree of freedom, or a matrix; N m s, N s/m", 0.0
     )
-    axis: Vector | None = Field(default=None, description="world direction of the joint frame's z axis")
-    xaxis: Vector | None = Field(
-        default=None, description="world direction of the joint frame's x axis, made normal to z"
+    dry: DryEntry | None = key("dry friction of a joint with one degree of freedom", None)
+    stiffness: Numbers = key("stiffness k of the potential ½ k (coordinate − rest)²; N m/rad, N/m", 0.0)
+    rest: Numbers = key("coordinates at which this spring is without force; rad, m", 0.0)
+    heat: Text = key("thermal node that takes up the friction heat", "environment")
+    armature: NonNegative = key("inertia added to the joint's rate, for example that of a geared rotor; kg m², kg", 0.0)
+    drive: Numbers = key("constant generalised force on u_r; N m, N", 0.0)
+    motion: MotionEntry | None = key("prescribed motion of the single degree of freedom", None)
+    limits: Limits | None = key(
+        "least and largest coordinate of a joint with one degree of freedom; nan for no limit; rad or m", None
     )
-    axis2: Vector | None = Field(default=None, description="universal only: the axis fixed in body 2")
-    frame1: FrameEntry | None = Field(default=None, description="the joint frame in body 1 (ground: world)")
-    frame2: FrameEntry | None = Field(default=None, description="the joint frame in body 2 (ground: world)")
-    coordinate: Numbers | None = Field(default=None, description="initial coordinates, with frame1 and frame2; rad, m")
-    rate: Numbers | None = Field(default=None, description="initial joint twist u_r; rad/s, m/s")
-    pitch: Number | None = Field(default=None, description="screw only, m/rad")
-    friction: Matrix = Field(
-        default=0.0,
-        description="viscous, on the joint twist: a number, one per degree of freedom, or a matrix; N m s, N s/m",
+    limit_stiffness: Positive | None = key(
+        "stiffness of the elastic stops, N m/rad or N/m; default from the mechanism's scale", None
     )
-    dry: DryEntry | None = Field(default=None, description="dry friction of a joint with one degree of freedom")
-    stiffness: Numbers = Field(
-        default=0.0, description="stiffness k of the potential ½ k (coordinate − rest)²; N m/rad, N/m"
-    )
-    rest: Numbers = Field(default=0.0, description="coordinates at which this spring is without force; rad, m")
-    heat: Text = Field(default="environment", description="thermal node that takes up the friction heat")
-    armature: NonNegative = Field(
-        default=0.0, description="inertia added to the joint's rate, for example that of a geared rotor; kg m², kg"
-    )
-    drive: Numbers = Field(default=0.0, description="constant generalised force on u_r; N m, N")
-    motion: MotionEntry | None = Field(default=None, description="prescribed motion of the single degree of freedom")
-    limits: Limits | None = Field(
-        default=None,
-        description="least and largest coordinate of a joint with one degree of freedom; nan for no limit; rad or m",
-    )
-    limit_stiffness: Positive | None = Field(
-        default=None, description="stiffness of the elastic stops, N m/rad or N/m; default from the mechanism's scale"
-    )
-    limit_loss: NonNegative | None = Field(
-        default=None, description="Hunt–Crossley loss α of the elastic stops, s/rad or s/m (default 0.1)"
-    )
-    limit_restitution: NonNegative | None = Field(
-        default=None, le=1.0, description="coefficient of restitution of hard stops, in place of elastic ones"
+    limit_loss: NonNegative | None = key("Hunt–Crossley loss α of the elastic stops, s/rad or s/m (default 0.1)", None)
+    limit_restitution: NonNegative | None = key(
+        "coefficient of restitution of hard stops, in place of elastic ones", None, le=1.0
     )
 
 
 class PartEntry(Entry):
     """``[parts.NAME]``"""
 
-    use: Text = Field(description="another scene file or model, in the folder of this file, or below")
-    position: Vector = Field(default=[0.0, 0.0, 0.0], description="position of the part's ground in this world, m")
-    rotation: Rotation = Field(default=[1.0, 0.0, 0.0, 0.0], description="its orientation, [w, x, y, z] or a table")
+    use: Text = key("another scene file or model, in the folder of this file, or below")
+    position: Vector = key("position of the part's ground in this world, m", [0.0, 0.0, 0.0])
+    rotation: Rotation = key("its orientation, [w, x, y, z] or a table", [1.0, 0.0, 0.0, 0.0])
 
 
 WorldEntry: Any = table_of(World, "world")
-_LENGTH = Field(default=None, description="without force, m; default: as at the start")
-_POINTS = Field(description="one in each, in its centre-of-mass frame (ground: world), m")
-_LIMITS = Field(default=None, description="least and largest control")
+_LENGTH = key("without force, m; default: as at the start", None)
+_POINTS = key("one in each, in its centre-of-mass frame (ground: world), m")
+_LIMITS = key("least and largest control", None)
 _SECTIONS: dict[str, tuple[type[Entry], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
     "springs": (
-        table_of(Spring, "springs.NAME", bodies=(Pair, Field(description="body 1 and body 2"))),
+        table_of(Spring, "springs.NAME", bodies=(Pair, key("body 1 and body 2"))),
         "springs and dampers between two points",
     ),
     "surfaces": (SurfaceEntry, "surfaces of bodies for contact"),
@@ -221,16 +191,16 @@ _SECTIONS: dict[str, tuple[type[Entry], str]] = {
 SECTIONS: dict[str, type[Entry]] = {key: table for key, (table, _) in _SECTIONS.items()}
 _Name: TypeAlias = Text | None
 _FILE: dict[str, Any] = {
-    "format": (Literal[1], Field(description="version of the file format, always 1")),
-    "name": (_Name, Field(default=None, description="name of the scene; default: the file's name")),
-    "world": (WorldEntry | None, Field(default=None, description="gravity and the reference environment")),
+    "format": (Literal[1], key("version of the file format, always 1")),
+    "name": (_Name, key("name of the scene; default: the file's name", None)),
+    "world": (WorldEntry | None, key("gravity and the reference environment", None)),
     "assembly": (
         AssemblyEntry,
-        Field(default=AssemblyEntry(), description="treatment of inconsistent initial states and inertias"),
+        key("treatment of inconsistent initial states and inertias", AssemblyEntry()),
     ),
 }
 for _key, (_table, _said) in _SECTIONS.items():
-    _FILE[_key] = dict[str, _table], Field(default_factory=dict, description=_said)
+    _FILE[_key] = dict[str, _table], key(_said, default_factory=dict)
 SceneFile: Any = create_model("SceneFile", __base__=Entry, __doc__="A scene file.", **_FILE)
 
 

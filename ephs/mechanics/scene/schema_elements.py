@@ -49,4 +49,4 @@ def _key(of: Any, number: Number | None, said: str) -> tuple[Any, Any]:
         form = _RANGES[number.least]
     if default == ():  # where no name is needed, one suffices, too
         form, default = list[forms.Text], []
-    return form, Field(description=said) if default is MISSING else Field(default=default, description=said)
+    return form, forms.key(said, ... if default is MISSING else default)

@@ -46,6 +46,7 @@ Text = Annotated[str, Field(strict=True, min_length=1)]
 Flag = Annotated[bool, Field(strict=True)]
 Names = Annotated[list[Text], Field(min_length=2)]
 Pair = Annotated[list[Text], Field(min_length=2, max_length=2)]
+Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 
 
@@ -129,3 +130,8 @@ class Entry(BaseModel):
     """Base of all tables: unknown keys are faults."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def key(meaning: str, default: Any = ..., **more: Any) -> Any:
+    """A key of a table; it is required where it has no default."""
+    return Field(default=default, description=meaning, **more)
