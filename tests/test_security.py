@@ -350,7 +350,7 @@ def test_formulas_obey_no_name(solution):
 def test_results_of_a_scene_stay_in_the_folder(name, tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(f"format = 1\nname = {json.dumps(name)}\n{PENDULUM}")
-    with pytest.raises(ephs.SceneError, match="a name that a folder can have"):
+    with pytest.raises(ephs.SceneError, match="a valid name of a folder"):
         ephs.load(path)
 
 
