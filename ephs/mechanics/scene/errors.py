@@ -159,10 +159,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
     # bodies
     "quaternion": ("a unit quaternion [w, x, y, z] to 1e-6", "divide it by its norm"),
-    "inertia indefinite": (
-        "no negative principal moment",
-        'correct the tensor, or set assembly.inertia = "warn"',
-    ),
+    "inertia indefinite": ("no negative principal moment", 'correct the tensor, or set assembly.inertia = "warn"'),
     "inertia triangle": (
         "no principal moment above the sum of the two others",
         'correct the tensor, or set assembly.inertia = "warn"',
@@ -220,10 +217,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "motion number": ("{expected}", "correct the value"),
     "motion rate": ("{motion}, the prescribed initial rate", "remove rate, or make it equal to this"),
-    "coordinate at": (
-        "0 where at and axis are given",
-        "give frame1 and frame2 to start at another coordinate",
-    ),
+    "coordinate at": ("0 where at and axis are given", "give frame1 and frame2 to start at another coordinate"),
     # beams and loads
     "section": (
         "either EA, GA, GJ, EI, rhoA, rhoI, or one of circle, tube, rectangle with E, nu, rho",
@@ -275,10 +269,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "positions that close every loop",
         "no consistent state was found nearby; correct the positions of {who}",
     ),
-    "no motion": (
-        "velocities that satisfy the joints",
-        "the prescribed rates contradict each other; correct them",
-    ),
+    "no motion": ("velocities that satisfy the joints", "the prescribed rates contradict each other; correct them"),
     # numbers by path
     "unknown parameter": ("the path of a number of the scene", "{hint}"),
     "entry": ("an entry {shape}", "give the index of one entry"),
@@ -287,10 +278,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     # states
     "unknown state": ("a {what} of the scene", "{hint}"),
     "state length": ("{what}", "give one number per degree of freedom, in the order of the degrees of freedom"),
-    "no time": (
-        "one of the solution's times, {first:g} to {last:g}",
-        "save the solution at this time (save_at)",
-    ),
+    "no time": ("one of the solution's times, {first:g} to {last:g}", "save the solution at this time (save_at)"),
 }
 
 

@@ -199,7 +199,7 @@ FAULTS = {
     "a body without mass": ("xml", mjcf('<body name="a"><joint/></body>'), "", ["MuJoCo says", "mass and inertia"]),
     "two bodies of a name": ("xml", mjcf('<body name="a"/><body name="a"/>'), "", ["MuJoCo says", "repeated name"]),
     "attached models": ("xml", mjcf('<body name="a"><attach model="m"/></body>'), "attach", ["without <attach>"]),
-    "an include outside": ("xml", '<mujoco><include file="../x.xml"/></mujoco>', 'include "../x.xml"', ["folder of the"]),
+    "an include outside": ("xml", '<mujoco><include file="../x.xml"/></mujoco>', 'include "../x.xml"', ["folder of"]),
 }  # fmt: skip
 
 
