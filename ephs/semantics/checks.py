@@ -51,18 +51,13 @@ MIRRORED = STATEMENTS["irreversible"][4]
 """Condition that one-sided components need not satisfy."""
 
 
-def random_point(
-    bundle: Bundle, ports: tuple[Path, ...], rng: np.random.Generator, size: float = 1.0
-) -> dict[Path, Array]:
-    """Random states for the named ports, of a size around the identity; volumes and amounts positive."""
+def random_point(bundle: Bundle, ports: tuple[Path, ...], rng: np.random.Generator) -> dict[Path, Array]:
+    """Random states for the named ports; volumes and amounts positive."""
     out: dict[Path, Array] = {}
     for port in ports:
         quantity = bundle.interface[port].quantity
         space = manifold(quantity.space)
-        x = space.random(rng)
-        if size != 1.0:
-            x = space.retract(space.identity(), size * rng.standard_normal(space.dim))
-        out[port] = into(quantity, x)
+        out[port] = into(quantity, space.random(rng))
     return out
 
 

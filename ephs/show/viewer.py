@@ -28,7 +28,6 @@ from ephs.solve.result.record import Record
 
 LARGEST: Final = 64 * 2**20
 """Largest size of a dropped model, in bytes."""
-SUFFIXES: Final = (".toml", ".urdf", ".xml", ".sdf")
 Load = Callable[[FilePath], Scene]
 
 

@@ -5,12 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ephs.mechanics.scene.element import ABOVE_ONE, ENVIRONMENT, NON_NEGATIVE, POSITIVE, Element, Named, Number, frozen
-
-Array = NDArray[np.float64]
+from ephs.semantics.bundle import Array
 
 
 class Attachment(Element):

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import (
     ENVIRONMENT,
@@ -24,9 +23,9 @@ from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
+from ephs.semantics.bundle import Array
 from ephs.solve.motion_law import MotionLaw
 
-Array = NDArray[np.float64]
 IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 

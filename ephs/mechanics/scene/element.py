@@ -13,10 +13,11 @@ from inspect import get_annotations
 from typing import Any, ClassVar, Final, Self, TypeVar, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ephs.semantics.bundle import Array
 
 T = TypeVar("T")
-Array = NDArray[np.float64]
 GROUND = "ground"
 ENVIRONMENT = "environment"
 FREE_END = "free"

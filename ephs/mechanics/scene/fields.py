@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
@@ -14,11 +13,10 @@ from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, GROUND, IDENTITY_POSE, Joint, Scene, World, frozen, mapped
 from ephs.mechanics.scene.motions import changed, number_of_law
 from ephs.mechanics.scene.surfaces import Contact
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import INERTIA
-
-Array = NDArray[np.float64]
 
 
 def _sound(_scene: Scene, _name: str, _before: Scene) -> list[Fault]:

@@ -5,11 +5,9 @@ from itertools import pairwise
 from typing import Annotated, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Element, Measured, Named, Number, frozen
-
-Array = NDArray[np.float64]
+from ephs.semantics.bundle import Array
 
 
 @final

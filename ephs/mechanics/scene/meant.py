@@ -13,18 +13,16 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.adjust import across_rows, project_velocities
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap
 from ephs.mechanics.scene.model import Scene, frozen, mapped
 from ephs.mechanics.scene.state import Snapshot, rebuilt
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of
 from ephs.solve.threads import in_one_thread
-
-Array = NDArray[np.float64]
 
 STRIDE, STRIDES = 0.2, 5
 """Steps of the finite motion that is tried, in rad or parts of the mechanism's length, and their number each way."""

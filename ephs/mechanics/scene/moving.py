@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.flexible import Load, Tendon
 from ephs.mechanics.scene.model import GROUND, Scene, Spring, World, frozen, mapped
-from ephs.semantics.spaces import SE3
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces import rotations as so3
-
-Array = NDArray[np.float64]
 
 
 def moved(scene: Scene, pose: Array, world: World) -> Scene:
@@ -50,7 +48,7 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
 def spring_length(scene: Scene, spring: Spring) -> float:
     """The distance of a spring's two points."""
     ends = [
-        at if name == GROUND else SE3.compose(scene.body(name).pose, np.concatenate(([1.0, 0.0, 0.0, 0.0], at)))[4:]
+        at if name == GROUND else SE3.compose(scene.body(name).pose, translation(at))[4:]
         for name, at in ((spring.body1, spring.at1), (spring.body2, spring.at2))
     ]
     return float(np.linalg.norm(ends[0] - ends[1]))

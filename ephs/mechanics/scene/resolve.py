@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.element import Element, Measured
@@ -25,9 +24,8 @@ from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry
 from ephs.mechanics.scene.text import MESHES
 from ephs.mechanics.shapes.dry import Dry
+from ephs.semantics.bundle import Array
 from ephs.solve.motion_law import MotionLaw
-
-Array = NDArray[np.float64]
 
 
 @final

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
@@ -16,6 +16,7 @@ from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, 
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.tree import spanning_hops
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -24,7 +25,6 @@ from ephs.solve.control import SLIVER
 MOVED = 1e-12
 """Least reported change of a body's state in m, rad, m/s, rad/s: rounding of poses of size one."""
 
-Array = NDArray[np.float64]
 
 # Largest joint displacement per closing of the loops, rad or m.
 STRIDE = 0.2

@@ -4,16 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ephs.mechanics.scene.element import POSE, Element, Named
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
+from ephs.semantics.bundle import Array
 
 __all__ = ["Contact", "Surface"]
-
-Array = NDArray[np.float64]
 
 
 @final

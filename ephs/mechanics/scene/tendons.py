@@ -5,7 +5,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.elements.tendon import tendon
 from ephs.mechanics.scene.attached import Actuator
@@ -14,11 +13,10 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, frozen
 from ephs.mechanics.scene.resolve import Names
-from ephs.semantics.spaces import SE3
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
-
-Array = NDArray[np.float64]
 
 
 def resolve_tendons(
@@ -66,11 +64,7 @@ def _resolved(name: str, entry: Any, poses: Mapping[str, Array], faults: list[Fa
 
 
 def _place(body: str, at: Array, poses: Mapping[str, Array]) -> Array:
-    return at if body == GROUND else SE3.compose(poses[body], _frame(at))[4:]
-
-
-def _frame(at: Array) -> Array:
-    return np.concatenate([[1.0, 0.0, 0.0, 0.0], at])
+    return at if body == GROUND else SE3.compose(poses[body], translation(at))[4:]
 
 
 def with_pulls(
@@ -108,7 +102,7 @@ def tendon_starts(of: Tendon, poses: Mapping[str, Array]) -> dict[str, Array]:
     out: dict[str, Array] = {}
     length = 0.0
     for k, ends in enumerate(of.segments, 1):
-        one, two = (SE3.compose(poses[body], _frame(at)) for body, at in ends)
+        one, two = (SE3.compose(poses[body], translation(at)) for body, at in ends)
         out[f"segment{k}.pe.q_r"] = SE3.normalise(SE3.compose(SE3.inverse(one), two))
         length += float(np.linalg.norm(two[4:] - one[4:]))
     if of.stiffness:

@@ -96,11 +96,6 @@ def upper(matrix: Columns) -> list[Real]:
     return [matrix[i][j] for i in range(len(matrix)) for j in range(i, len(matrix))]
 
 
-def outer_sum(left: Columns, right: Columns, i: int, j: int) -> Real:
-    """Entry (i, j) of Σ lₖ rₖᵀ."""
-    return dot([a[i] for a in left], [b[j] for b in right])
-
-
 def symmetric_inverse(on: Evaluator, matrix: Columns) -> tuple[Rows, Truth]:
     """The inverse of a symmetric matrix, and whether the matrix is positive definite.
 

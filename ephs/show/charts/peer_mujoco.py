@@ -129,7 +129,7 @@ def mjcf(given: PeerScene, method: str, step: float) -> str:
         place = f'pos="{_text(pose[4:])}" quat="{_text(pose[:4])}"'
         text = f'<body name="{branch.outer}" {place}>{_joint(branch)}{own}{inside}</body>'
         below.setdefault(branch.inner, []).append(text)
-    loops = "".join(_closure(closure, bodies, step) for closure in given.closures)
+    loops = "".join(_closure(closure, step) for closure in given.closures)
     unused = '<flag contact="disable"/>' if loops else '<flag contact="disable" constraint="disable"/>'
     solver = 'tolerance="1e-14" iterations="100" solver="Newton"' if loops else ""
     return (
@@ -150,7 +150,7 @@ def _joint(branch: Branch) -> str:
     return f'<freejoint name="{name}"/>' if branch.kind == "free" else ""
 
 
-def _closure(closure: tuple[str, str, Array, Array], bodies: Any, step: float) -> str:
+def _closure(closure: tuple[str, str, Array, Array], step: float) -> str:
     """A point of body 1 in which the two are connected; body 2's point coincides with it at the start."""
     one, two, point, other = closure
     if one == GROUND:
