@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from heapq import nsmallest
 from typing import Any, final
 
+from ephs.operad.messages import legible as legible
+from ephs.operad.messages import nearest_name as nearest_name
+
 
 @final
 @dataclass(frozen=True, slots=True)
@@ -282,35 +285,12 @@ TEXTS: dict[str, tuple[str, str]] = {
 }
 
 
-_LONGEST = 600
-_NEAR_LETTERS, _NEAR_NAMES = 80, 500
-
-
 def fault(code: str, key: str, found: object, **values: Any) -> Fault:
     """Fault of this code, its texts filled with ``values``; texts from files are abbreviated and escaped."""
     expected, advice = TEXTS[code]
     key = legible(key)
     words = {name: legible(value) if isinstance(value, str) else value for name, value in values.items()}
     return Fault(key, legible(str(found)), expected.format(key=key, **words), advice.format(key=key, **words))
-
-
-def legible(text: str) -> str:
-    """A text abbreviated in the middle where it is long, with control characters escaped."""
-    if len(text) > _LONGEST:
-        text = f"{text[:200]}… ({len(text)} letters) …{text[-60:]}"
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
-
-
-def nearest_name(name: str, known: Iterable[str]) -> str | None:
-    """The known name nearest to a misspelled one, if any is near; among many names none is looked for."""
-    from difflib import get_close_matches
-
-    names = [other for other in known if len(other) <= _NEAR_LETTERS]
-    if len(name) > _NEAR_LETTERS or len(names) > _NEAR_NAMES:
-        return None
-    return next(iter(get_close_matches(name, names, n=1, cutoff=0.6)), None)
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:

@@ -2,6 +2,8 @@
 
 from typing import Final, final
 
+from ephs.operad.messages import TextError
+
 TEXTS: Final = {
     "package": "a unit is loaded by FMPy, which is not installed: pip install ephs[fmi]",
     "file": "{file}: not an FMI 2.0 or 3.0 unit: {found}",
@@ -34,17 +36,7 @@ TEXTS: Final = {
 
 
 @final
-class ExchangeError(ValueError):
-    """An invalid unit, or an invalid exchange between units and a system.
+class ExchangeError(TextError, ValueError):
+    """An invalid unit, or an invalid exchange between units and a system."""
 
-    Parameters
-    ----------
-    fault
-        The key of the text.
-    **details
-        What the text names.
-    """
-
-    def __init__(self, fault: str, /, **details: object) -> None:
-        super().__init__(TEXTS[fault].format(**details))
-        self.fault: str = fault
+    _texts = TEXTS
