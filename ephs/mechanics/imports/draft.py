@@ -16,9 +16,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["WORLD", "Draft", "along", "pose", "turned_tensor"]
-
-
 LONGEST_NAME = 200
 WORLD = ""
 """Name of the ground in joints: no link has it."""

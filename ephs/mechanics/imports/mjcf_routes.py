@@ -14,8 +14,6 @@ from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.semantics.bundle import Array
 
-__all__ = ["Route", "route_of"]
-
 MEETING = 1e-9
 """Length of a segment between two bodies, relative to the whole, below which it has no direction."""
 

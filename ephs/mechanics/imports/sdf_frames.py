@@ -12,9 +12,6 @@ from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 
-__all__ = ["MODEL", "Frames", "read_pose"]
-
-
 MODEL = "__model__"
 
 
