@@ -2,6 +2,8 @@
 
 from typing import Final, final
 
+from ephs.operad.messages import TextError
+
 __all__ = ["ExportError"]
 
 TEXTS: Final = {
@@ -24,17 +26,7 @@ TEXTS: Final = {
 
 
 @final
-class ExportError(ValueError):
-    """A model that cannot be exported with these options.
+class ExportError(TextError, ValueError):
+    """A model that cannot be exported with these options."""
 
-    Parameters
-    ----------
-    fault
-        The key of the text.
-    **details
-        What the text names.
-    """
-
-    def __init__(self, fault: str, /, **details: object) -> None:
-        super().__init__(TEXTS[fault].format(**details))
-        self.fault: str = fault
+    _texts = TEXTS

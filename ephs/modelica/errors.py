@@ -2,6 +2,8 @@
 
 from typing import Final, final
 
+from ephs.operad.messages import TextError
+
 __all__ = ["ModelicaError"]
 
 TEXTS: Final = {
@@ -39,17 +41,7 @@ TEXTS: Final = {
 
 
 @final
-class ModelicaError(ValueError):
-    """A component of Modelica that cannot be imported.
+class ModelicaError(TextError, ValueError):
+    """A component of Modelica that cannot be imported."""
 
-    Parameters
-    ----------
-    fault
-        The key of the text.
-    **details
-        What the text names.
-    """
-
-    def __init__(self, fault: str, /, **details: object) -> None:
-        super().__init__(TEXTS[fault].format(**details))
-        self.fault: str = fault
+    _texts = TEXTS

@@ -2,6 +2,8 @@
 
 from typing import final
 
+from ephs.operad.messages import legible
+
 __all__ = ["PatternError"]
 
 _TEXTS = {
@@ -59,8 +61,6 @@ _TEXTS = {
     "parameter": "space {what}: the parameter {found} is not finite; expected a finite number",
 }
 
-_LONGEST = 2000
-
 
 @final
 class PatternError(ValueError):
@@ -109,11 +109,8 @@ class PatternError(ValueError):
 def _brief(word: object) -> object:
     """Word of a message, abbreviated in the middle where it is long, with control characters escaped."""
     text = word if isinstance(word, str) else repr(word)
-    if len(text) > _LONGEST:
-        text = word = f"{text[:120]}… ({len(text)} characters) …{text[-40:]}"
-    if text.isprintable():
-        return word
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    brief = legible(text, 2000, 120, 40)
+    return word if brief == text else brief
 
 
 def _rebuild(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
+from ephs.operad.disjoint import DisjointSets
 from ephs.operad.names import Path
 
 __all__ = ["closure"]
@@ -9,20 +10,14 @@ __all__ = ["closure"]
 
 def closure(groups: Iterable[Iterable[Path]]) -> Mapping[Path, frozenset[Path]]:
     """The least equivalence that joins the members of each group: the classes of two members or more, by member."""
-    parent: dict[Path, Path] = {}
-
-    def find(path: Path) -> Path:
-        while parent.setdefault(path, path) != path:
-            parent[path] = parent[parent[path]]
-            path = parent[path]
-        return path
-
+    sets = DisjointSets[Path]()
     for group in groups:
         first, *others = group
         for other in others:
-            parent[find(other)] = find(first)
+            sets.join(first, other)
     members: dict[Path, list[Path]] = {}
-    for path in parent:
-        members.setdefault(find(path), []).append(path)
-    classes = {root: frozenset(paths) for root, paths in members.items() if len(paths) > 1}
-    return {path: classes[root] for path in parent if (root := find(path)) in classes}
+    for path in sets:
+        members.setdefault(sets.leader(path), []).append(path)
+    classes = [frozenset(paths) for paths in members.values() if len(paths) > 1]
+    found = {path: each for each in classes for path in each}
+    return {path: found[path] for path in sets if path in found}

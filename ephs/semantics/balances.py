@@ -18,15 +18,6 @@ from ephs.semantics.probe import Probe, Verdict
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import TINY
 
-__all__ = [
-    "conservation",
-    "energy_balance",
-    "entropy_balance",
-    "entropy_production",
-    "exergy_balance",
-    "naturality",
-]
-
 UNSOLVED = 1e-6
 """A step whose residual stays above this has no solution near by; the laws of steps are vacuous there."""
 ROUNDING = float(np.finfo(float).eps)

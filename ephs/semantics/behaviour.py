@@ -13,8 +13,6 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage, midpoint
 
-__all__ = ["GRADIENTS", "Behaviour", "Continuous", "Gradient", "Natural", "Relating", "Storing"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from ephs.operad import Interface, Path, PortType, Quantity
 from ephs.operad.charges import ENTROPY, VOLUME
 
-__all__ = ["Array", "Bundle", "Reference"]
-
 Array = NDArray[np.float64]
 Span = slice
 """A range of indices: `slice`, whose own name a method of `Bundle` bears."""

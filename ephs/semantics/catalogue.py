@@ -13,8 +13,6 @@ from ephs.operad import Interface
 from ephs.semantics import library
 from ephs.semantics.primitives import Formula, Primitive
 
-__all__ = ["Part", "find_part", "part_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -21,17 +21,6 @@ from ephs.semantics.trials import ROTATING, Trial
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
 
-__all__ = [
-    "MIRRORED",
-    "NEARER",
-    "STATEMENTS",
-    "check_at",
-    "constant",
-    "dirac",
-    "random_efforts",
-    "random_point",
-]
-
 LENGTHS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)
 """Lengths of steps beside the state's, for central differences of energies."""
 SHORT = 1e-8
@@ -62,18 +51,13 @@ MIRRORED = STATEMENTS["irreversible"][4]
 """Condition that one-sided components need not satisfy."""
 
 
-def random_point(
-    bundle: Bundle, ports: tuple[Path, ...], rng: np.random.Generator, size: float = 1.0
-) -> dict[Path, Array]:
-    """Random states for the named ports, of a size around the identity; volumes and amounts positive."""
+def random_point(bundle: Bundle, ports: tuple[Path, ...], rng: np.random.Generator) -> dict[Path, Array]:
+    """Random states for the named ports; volumes and amounts positive."""
     out: dict[Path, Array] = {}
     for port in ports:
         quantity = bundle.interface[port].quantity
         space = manifold(quantity.space)
-        x = space.random(rng)
-        if size != 1.0:
-            x = space.retract(space.identity(), size * rng.standard_normal(space.dim))
-        out[port] = into(quantity, x)
+        out[port] = into(quantity, space.random(rng))
     return out
 
 

@@ -22,8 +22,6 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.given import finite_matrix, flat_vector, real_number, require_arguments, value_of
 from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 
-__all__ = ["constraint", "gyrator", "irreversible", "reversible", "storage", "transformer"]
-
 Ports = Mapping[str, Quantity]
 Matrix = ArrayLike | Callable[..., ArrayLike]
 

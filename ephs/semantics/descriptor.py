@@ -22,8 +22,6 @@ from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.system import System
 
-__all__ = ["Descriptor", "Input", "assemble", "descriptor_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

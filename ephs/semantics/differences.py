@@ -11,8 +11,6 @@ from ephs.semantics.extents import room
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Point, Storage
 
-__all__ = ["differences", "increments"]
-
 NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
 """Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)

@@ -17,8 +17,6 @@ from ephs.semantics.errors import SemanticsError
 from ephs.semantics.primitive_documents import primitive_from, primitive_record
 from ephs.semantics.system import Filling, System
 
-__all__ = ["SCHEMA_FILE", "from_dict", "from_json", "to_dict", "to_json"]
-
 FORMAT = 1
 SCHEMA_FILE = FilePath(__file__).with_name("system.schema.json")
 LARGEST = 10_000_000

@@ -9,8 +9,6 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Domain, Point
 from ephs.semantics.spaces import codes, manifold
 
-__all__ = ["Bounds", "bounded", "domain_of", "within_domain"]
-
 Bounds = Mapping[str, tuple[float, float]]
 """Port name -> (least, greatest) number."""
 T = TypeVar("T")

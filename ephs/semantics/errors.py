@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, final
 
+from ephs.operad.messages import nearest_name
+
 if TYPE_CHECKING:
     from ephs.semantics.trials import Witness
-
-__all__ = ["AssemblyError", "SemanticsError", "StructureError", "listed", "nearest_of"]
 
 _TEXTS = {
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
@@ -118,10 +118,8 @@ class SemanticsError(ValueError):
 
 def nearest_of(found: object, known: Iterable[str]) -> str:
     """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(str(found), list(known), n=1, cutoff=0.6)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest_name(str(found), known)
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def listed(found: object, known: Iterable[object]) -> str:

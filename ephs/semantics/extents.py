@@ -7,8 +7,6 @@ import numpy as np
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
 
-__all__ = ["between", "expected", "inside", "into", "room"]
-
 
 def inside(quantity: Quantity, x: Array) -> bool:
     """Whether all numbers of a state lie in the quantity's domain."""

@@ -16,18 +16,6 @@ from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Poi
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN
 
-__all__ = [
-    "StorageForm",
-    "coupled",
-    "dissipated",
-    "irreversible_kernel",
-    "obstacle",
-    "reversible_kernel",
-    "stacked",
-    "storage_form",
-    "stored",
-]
-
 LARGEST = 32
 """Largest number of state and effort coordinates together: a relation is written out, every derivative for itself."""
 WITHOUT_SLOPE = ("sign", "sinhc", "choose")

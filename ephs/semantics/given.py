@@ -11,8 +11,6 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
 
-__all__ = ["finite_matrix", "flat_vector", "named_numbers", "real_number", "require_arguments", "value_of"]
-
 
 def real_number(name: str, value: Any) -> float:
     """Return an energy as a number."""

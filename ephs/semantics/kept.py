@@ -4,8 +4,6 @@ from collections.abc import Callable, Hashable
 from threading import Lock
 from typing import Any, TypeVar, cast, final
 
-__all__ = ["MOST", "Kept", "once"]
-
 T = TypeVar("T")
 
 MOST = 8

@@ -22,19 +22,6 @@ from ephs.semantics.spaces.rank import DIFFERENCE
 from ephs.semantics.stage import Signature
 from ephs.semantics.stage.reaching import Atom
 
-__all__ = [
-    "DOMAIN",
-    "EXTENT",
-    "OK",
-    "RAISED",
-    "SIGNATURE",
-    "TEMPERATURE",
-    "TURN",
-    "Callback",
-    "address_of",
-    "prototype",
-]
-
 OK, TURN, TEMPERATURE, RAISED, EXTENT, DOMAIN = 0, 1, 2, 3, 4, 5
 """Results of kernels: done; half a turn in a step; θ ≤ 0; a Python function raised; a length or volume ≤ 0; a value
 that is not a finite number."""

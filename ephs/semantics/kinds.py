@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Path, Pattern, Quantity
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.numbering import Index, Interned, Numbering, Parts
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.system import Filling, System
-
-__all__ = ["number_by_kinds", "repeats"]
 
 WORTH = 8
 """Kinds are numbered from so many components for each of them on: a kind costs as much as some components."""
@@ -346,17 +345,11 @@ def _labels(pattern: Pattern, copies: list[Copies]) -> Index:
         first = c.kind.first[c.kind.classes]
         for port in np.flatnonzero(first != np.arange(first.size)):
             pairs += zip(c.at[:, first[port]].tolist(), c.at[:, port].tolist(), strict=True)
-    leader = list(range(len(index)))
-
-    def find(i: int) -> int:
-        while leader[i] != i:
-            leader[i] = leader[leader[i]]
-            i = leader[i]
-        return i
-
+    sets = DisjointSets[int]()
     for a, b in pairs:
-        leader[find(a)] = find(b)
-    return _index([find(i) for i in leader] if pairs else leader)
+        sets.join(b, a)
+    every = range(len(index))
+    return _index(sets.leaders(every) if pairs else every)
 
 
 def _map(start: Index, inner: int, outside: Index) -> Index:

@@ -14,8 +14,6 @@ from ephs.semantics.primitives import Irreversible, Storage
 if TYPE_CHECKING:
     from ephs.semantics.system import System
 
-__all__ = ["Account", "Ledger"]
-
 State = Mapping[str, object]
 
 

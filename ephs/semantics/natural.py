@@ -23,8 +23,6 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import CONSTRAINT, DIFFERENCE
 from ephs.semantics.system import System, fold
 
-__all__ = ["Solved", "solve_flat", "solve_nested", "step"]
-
 NEAR = 1e-9
 """Error beside the unknowns below which whole steps are taken: Newton's method converges there."""
 SOLVED = 1e-12

@@ -12,8 +12,6 @@ from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.system import System
 
-__all__ = ["Index", "Interned", "Numbering", "Parts", "bearing_junctions", "number_flat", "spans", "starts", "sums"]
-
 Index = NDArray[np.int64]
 T = TypeVar("T", bound=Hashable)
 

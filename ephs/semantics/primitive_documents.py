@@ -24,8 +24,6 @@ from ephs.semantics.symbols.algebra import sp
 from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, term_from, term_of
 from ephs.semantics.symbols.tracing import Untraceable, symbols_of, trace
 
-__all__ = ["primitive_from", "primitive_record"]
-
 KINDS = ("part", "storage", "reversible", "irreversible")
 AGREEMENT = 1e-9
 """Largest relative difference between a primitive and its document read back: rounding of formulas with 10⁴ terms."""

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from ephs.semantics.derive.relations import Relation
     from ephs.semantics.system import Filling
 
-__all__ = ["Domain", "Formula", "Irreversible", "Kernel", "Point", "Primitive", "Reversible", "Storage"]
-
 Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
 Domain = tuple[tuple[Path, float, float], ...]

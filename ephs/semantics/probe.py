@@ -13,8 +13,6 @@ from ephs.semantics.descriptor import Input
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.system import System
 
-__all__ = ["Probe", "SystemLaw", "Verdict", "random_probe"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

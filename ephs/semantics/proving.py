@@ -11,8 +11,6 @@ from ephs.semantics.verdict import Condition
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive
 
-__all__ = ["conditions_of"]
-
 
 def conditions_of(primitive: "Primitive") -> tuple[Condition, ...]:
     """The conditions on a primitive that has a formula, each with its proof or without one.

@@ -20,8 +20,6 @@ from ephs.semantics.derive.relations import Storage
 from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible
 from ephs.semantics.verdict import Condition
 
-__all__ = ["Map", "pull_back", "pulled_ports"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

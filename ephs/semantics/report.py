@@ -2,18 +2,17 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Reference
+from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.forms import obstacle
 from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
 from ephs.semantics.markup import table
 from ephs.semantics.search import search
 from ephs.semantics.system import System
-
-__all__ = ["CheckItem", "CheckReport", "check_structure", "check_system"]
 
 PROBES = 3
 """States and efforts at which a structure is evaluated again, whatever its verdict."""
@@ -85,24 +84,31 @@ def check_structure(system: System) -> CheckItem:
                 searched.append(path)
         except SemanticsError as error:
             return CheckItem("structure", False, f"{path}: {error}")
-    detail = f"{count} components are the structures that they claim to be, {count - len(searched)} of them proved"
+    detail = f"{count} components have the structure that they declare, {count - len(searched)} of them by proof"
     if searched:
-        detail += f"; searched, and watched in runs: {_listed(searched)}"
+        detail += f"; searched for counterexamples, and watched in runs: {', '.join(map(str, searched))}"
     if slow:
-        detail += f"; called back in Python, which is slow: {', '.join(slow)}"
+        detail += f"; evaluated in Python, which is slow: {', '.join(slow)}"
     return CheckItem("structure", True, detail)
 
 
-def _listed(paths: list[Path]) -> str:
-    return ", ".join(map(str, paths))
+def check_types(system: System) -> CheckItem:
+    """Number of boxes and junctions, with remarks on junctions that do nothing."""
+    flat = system.flatten().pattern
+    remarks = "".join(f"; {remark}" for remark in flat.lint())
+    return CheckItem("types", True, f"{len(flat.boxes)} boxes at {len(flat.junctions)} junctions{remarks}")
+
+
+def check_assembly(d: Descriptor, inputs: Mapping[Path, Any]) -> CheckItem:
+    """Number of states and equations."""
+    unknowns = d.unknowns(inputs)
+    return CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations in {unknowns} unknowns")
 
 
 def _items(
     system: System, reference: Reference, state: Mapping[str, object] | None, probes: int, h: float
 ) -> Iterator[CheckItem]:
-    flat = system.flatten().pattern
-    remarks = "".join(f"; {remark}" for remark in flat.lint())
-    yield CheckItem("types", True, f"{len(flat.boxes)} boxes at {len(flat.junctions)} junctions{remarks}")
+    yield check_types(system)
     yield check_structure(system)
     try:
         d = system.descriptor()
@@ -110,8 +116,7 @@ def _items(
     except SemanticsError as error:
         yield CheckItem("assembly", False, str(error))
         return
-    unknowns = d.unknowns(found[0].inputs)
-    yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
+    yield check_assembly(d, found[0].inputs)
     # probe after probe, as one step serves all its laws
     verdicts = [[_verdict(law, probe) for law in SYSTEM_LAWS] for probe in found]
     for law, measured in zip(SYSTEM_LAWS, zip(*verdicts, strict=True), strict=False):

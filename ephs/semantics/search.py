@@ -18,8 +18,6 @@ from ephs.semantics.trials import REFERENCES, Trial, chosen, coordinates, simple
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive
 
-__all__ = ["COUNT", "failure", "search", "shrunk", "simplest"]
-
 COUNT = 400
 """Numerical trials of a structure without a proof."""
 DEFINED = 40

@@ -10,8 +10,6 @@ from ephs.semantics.derive.functions import FUNCTIONS
 from ephs.semantics.derive.recording import Recorded
 from ephs.semantics.stage.plain import PLAIN
 
-__all__ = ["SHORT", "choose", "log_mean", "sinhc", "squared_turn", "turn_curve", "turn_curve_slope", "turn_ratio"]
-
 SHORT = 1e-2
 """Below this a series serves, whose first term left out is below rounding: z⁸/9!."""
 

@@ -15,8 +15,6 @@ from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proo
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.verdict import Condition, proved
 
-__all__ = ["constant_structure", "coupling", "dissipation", "dissipation_proof", "exponential", "onsager", "quadratic"]
-
 
 def quadratic(
     name: str,

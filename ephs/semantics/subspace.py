@@ -13,8 +13,6 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import ELIMINATION, TINY, rank_of
 
-__all__ = ["Subspace"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

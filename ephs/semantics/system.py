@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from ephs.semantics.report import CheckReport
     from ephs.semantics.symbols.equations import Equations
 
-__all__ = ["Filling", "System", "as_system", "fold", "read_state", "require_fillings"]
-
 T = TypeVar("T")
 
 

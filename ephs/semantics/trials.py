@@ -19,19 +19,6 @@ from ephs.semantics.spaces import SO3, codes, manifold
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Point, Primitive
 
-__all__ = [
-    "Choose",
-    "Coordinate",
-    "Trial",
-    "Witness",
-    "chosen",
-    "coordinates",
-    "extent",
-    "simpler",
-    "smallest",
-    "trial_of",
-]
-
 Choose = Callable[[int], int]
 """A choice among so many: 0 is the simplest."""
 SIMPLE = (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0.5, 1.5, 2.5, 3.5, 4.5, 20, 50, 100, 200, 300, 400, 1000)

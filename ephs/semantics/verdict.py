@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, final
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive
 
-__all__ = ["Condition", "StructureVerdict", "examine", "proved"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,6 @@ from ephs.show.solids import held_at
 from ephs.show.stage import Stage, stage_of
 from ephs.show.symbols import METAL, Colour, add_body, add_joint, add_spring, add_stick, ink
 
-__all__ = ["animate"]
-
 LONGEST = 0.35
 """Length of the longest arrow, in parts of the scene's size."""
 FAR = 4.0

@@ -9,8 +9,6 @@ from ephs.show.flows import Band, exergy_bands
 from ephs.show.palette import BLUE, GREEN, GREY, ORANGE, RED, SKY
 from ephs.show.panels import entropy_panels
 
-__all__ = ["balances"]
-
 _COLOURS = {"storage": (BLUE, SKY), "destroyed": (RED, RED), "boundary": (ORANGE, GREEN)}
 _VERBS = {("storage", True): "gives", ("storage", False): "takes", ("destroyed", False): "destroys"}
 

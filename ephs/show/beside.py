@@ -15,8 +15,6 @@ from ephs.show.still import draw_still
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_mechanism"]
-
 WIDTH = 7.2
 GAP = 0.15
 

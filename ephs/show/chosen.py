@@ -12,8 +12,6 @@ from ephs.solve.result.labels import Labels
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_signals", "signal_names"]
-
 _FIRST = {"joints": "coordinate", "bodies": "position", "markers": "position", "thermal": "temperature"}
 """Default quantity of a joint, body, marker or thermal node."""
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_wrenches"]
-
 BLANK = 1e-9
 """N or N m below which a panel shows a line at zero."""
 MOST = 6

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["new_figure", "plain"]
-
 
 def new_figure(width: float, height: float) -> "Figure":
     """An empty figure of this size in inches."""

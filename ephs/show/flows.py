@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Band", "exergy_bands", "plot_exergy_flow"]
-
 SMALLEST = 5e-3
 """Bands below this fraction of the turnover are drawn as one."""
 GAP, SLOT = 0.02, 0.05
@@ -29,8 +27,8 @@ class Band(NamedTuple):
     kind: str
 
 
-def exergy_bands(sol: Any, path: Any = ".", first: int = 0, last: int = -1) -> list[Band]:
-    """The sources and sinks of a system or subsystem between two instants; both sides add up to the same.
+def exergy_bands(sol: Any, path: Any = ".") -> list[Band]:
+    """The sources and sinks of a system or subsystem over the run; both sides add up to the same.
 
     Sources are storages that gave exergy, and supply; sinks are storages that took it, delivery, and destruction. What
     steps made or lost of the whole is the defect, on the side where it counts.
@@ -39,7 +37,7 @@ def exergy_bands(sol: Any, path: Any = ".", first: int = 0, last: int = -1) -> l
     bands: list[Band] = []
 
     def change(values: Any) -> float:
-        return float(values[last] - values[first])
+        return float(values[-1] - values[0])
 
     for leaf in _leaves(entry):
         name = str(leaf.path.relative_to(entry.path)) if leaf.path != entry.path else str(leaf.path)

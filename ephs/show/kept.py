@@ -12,8 +12,6 @@ from ephs.show.graph import read
 if TYPE_CHECKING:
     from ephs.semantics import System
 
-__all__ = ["pattern_svg"]
-
 
 def pattern_svg(system: "System") -> str:
     """The picture of a system's outermost pattern as the text of an SVG file."""

@@ -15,8 +15,6 @@ from ephs.show.portraits import plot_phase
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["KINDS", "plot"]
-
 KINDS: "dict[str, Callable[..., Figure]]" = {
     "motion": plot_motion,
     "phase": plot_phase,

@@ -6,8 +6,6 @@ from types import MappingProxyType
 from ephs.show.geometry import PlacedBox, Point, Text, hatching
 from ephs.show.graph import width_of
 
-__all__ = ["legend", "title"]
-
 WORDS: Mapping[str, str] = MappingProxyType(
     {
         "storage": "storage",

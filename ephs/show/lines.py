@@ -6,8 +6,6 @@ from typing import Any, final
 
 from ephs.show.motion import Array
 
-__all__ = ["Line", "lines_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

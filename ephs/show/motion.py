@@ -7,14 +7,13 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import DIRECTION, TINY
 
 OPPOSITE = 1e-9
 """Distance of a cosine from −1 within which a rotation's axis is arbitrary."""
 PLANAR = 1e-12
 """Relative squared distance of collinear points from a line."""
-
-Array = NDArray[np.float64]
 
 
 @final

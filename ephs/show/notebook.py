@@ -11,8 +11,6 @@ from ephs.show.palette import BLUE, GREY, INK, RED
 from ephs.show.still import still_svg
 from ephs.solve.result.tables import solution_table
 
-__all__ = ["dynamics_html", "equilibrium_html", "solution_html", "state_space_html"]
-
 WIDTH, HEIGHT, MARGIN, DOT = 260.0, 200.0, 24.0, 4.0
 """Size of the plane of eigenvalues, its margin, and the radius of a dot, in pixels."""
 MANY = 40

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from ephs.show.motion import Array, Film, between_instants, nearest, point_of, rotate
 from ephs.show.symbols import METAL, Colour
 
-__all__ = ["ARROWS", "Arrows", "Heat", "Loads", "heat_of", "loads_of", "tint"]
-
 ARROWS: dict[str, Colour] = {
     "force": (214, 51, 108), "moment": (112, 72, 232), "contact": (9, 146, 104), "slip": (245, 159, 0),
 }  # fmt: skip

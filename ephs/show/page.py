@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import final
 
-__all__ = ["Page"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -8,18 +8,6 @@ import numpy as np
 from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, ORANGE, PURPLE, RED, SKY
 from ephs.show.series import Array, scene_panels, state_panels
 
-__all__ = [
-    "ROUNDING",
-    "Curve",
-    "Panel",
-    "constraint_panels",
-    "energy_panels",
-    "entropy_panels",
-    "exergy_panels",
-    "motion_panels",
-]
-
-
 ROUNDING = 1e-12
 """Relative size of differences that count as rounding."""
 

@@ -15,8 +15,6 @@ from ephs.show.solids import Solid, box, cylinder, held_at, sphere
 from ephs.show.stage import Stage
 from ephs.show.symbols import METAL, MUTED, ink
 
-__all__ = ["player"]
-
 MOST_FACES = 1500
 """Faces of a body above which its convex hull is drawn."""
 LONGEST = 0.35

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_phase"]
-
 STILL = 1e-9
 """Least change of a drawn coordinate, in m or rad."""
 MOST = 6

@@ -5,14 +5,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.motion.readout import freedoms_of
+from ephs.semantics.bundle import Array
 
 MOVES = 1e-9
 """Least relative change of a drawn value."""
-
-Array = NDArray[np.float64]
 
 
 def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:

@@ -10,8 +10,6 @@ import numpy as np
 from ephs.show.panels import ROUNDING, Panel
 from ephs.show.series import Array
 
-__all__ = ["Group", "packed"]
-
 MOST = 2000
 """Instants of a panel without thinning."""
 FEW = 6

@@ -15,8 +15,6 @@ from ephs.show.palette import GREY, INK, PAPER
 from ephs.show.solids import Solid, held_at, solids_of
 from ephs.show.symbols import MUTED, ink
 
-__all__ = ["Mark", "Sketch", "Words", "sketch"]
-
 GROUND = "ground"
 ROUND = 28
 """Corners of a circle."""

@@ -15,8 +15,6 @@ from ephs.mechanics.scene.text import MESHES
 from ephs.show.errors import ShowError
 from ephs.show.motion import Array, equivalent_box, rotate
 
-__all__ = ["Solid", "box", "cylinder", "held_at", "solid_of", "solids_of", "sphere"]
-
 MOST_MB = 100
 """Largest mesh that is drawn."""
 SIDES = 28

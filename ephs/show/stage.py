@@ -11,8 +11,6 @@ from ephs.show.motion import Array, Film, film, point_of
 from ephs.show.overlays import GROUND, Heat, Loads, heat_of, loads_of, strain_of
 from ephs.show.solids import Solid, solids_of
 
-__all__ = ["Stage", "stage_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

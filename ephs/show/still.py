@@ -14,8 +14,6 @@ from ephs.show.sketch import Sketch, Words, sketch
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_still", "still_svg"]
-
 WIDTH, HIGHEST = 640.0, 420.0
 """Size of an SVG in pixels: its width, and its largest height."""
 POINT = 4.0 / 3.0
@@ -66,9 +64,9 @@ def draw_still(
         axes.annotate(words.text, at, shift, textcoords="offset points", zorder=9, **style).set_path_effects(halo)
 
 
-def still_svg(scene: Any, poses: dict[str, Array], way: Array | None = None) -> str:
+def still_svg(scene: Any, poses: dict[str, Array]) -> str:
     """The same as an SVG element; parameters as of `sketch`."""
-    made = sketch(scene, poses, way)
+    made = sketch(scene, poses)
     low, high = made.bounds()
     span = np.maximum(high - low, THIN * float(np.max(high - low)))
     scale = float(min((WIDTH - 2.0 * MARGIN) / span[0], (HIGHEST - 2.0 * MARGIN) / span[1]))

@@ -9,8 +9,6 @@ from ephs.mechanics.scene.build import component_path
 from ephs.show.palette import CYCLE
 from ephs.show.panels import Curve, Panel
 
-__all__ = ["contact_panels", "contact_table"]
-
 _HEAD = (
     "least gap [m]", "largest force [N]", "largest slip [m/s]", "most energy stored [J]", "energy at the end [J]",
     "exergy destroyed [J]",

@@ -12,8 +12,6 @@ from ephs.show.sketch import sketch
 from ephs.show.stage import stage_of
 from ephs.show.still import draw_still
 
-__all__ = ["VIDEOS", "write_video"]
-
 VIDEOS: Final = {".gif": "pillow", ".mp4": "ffmpeg", ".webm": "ffmpeg"}
 """File endings and the writers of matplotlib for them."""
 LONGEST, DPI = 6.4, 100

@@ -26,11 +26,8 @@ from ephs.show.stage import Stage, stage_of
 from ephs.solve.ending import solution_of
 from ephs.solve.result.record import Record
 
-__all__ = ["Posed", "served"]
-
 LARGEST: Final = 64 * 2**20
 """Largest size of a dropped model, in bytes."""
-SUFFIXES: Final = (".toml", ".urdf", ".xml", ".sdf")
 Load = Callable[[FilePath], Scene]
 
 

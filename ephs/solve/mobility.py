@@ -13,6 +13,7 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.primitives import Reversible
@@ -163,15 +164,7 @@ def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
 def _rank_of_loops(left: list[_Condition], solved: _Solved, dims: Index) -> int:
     """Rank of the loop-closing constraints in the free efforts."""
     written: list[tuple[Mapping[int, Array], Array]] = []
-    leader: dict[int, int] = {}
-
-    def find(junction: int) -> int:
-        leader.setdefault(junction, junction)
-        while leader[junction] != junction:
-            leader[junction] = leader[leader[junction]]
-            junction = leader[junction]
-        return junction
-
+    sets = DisjointSets[int]()
     for condition in left:
         terms: dict[int, Array] = {}
         for junction, block in condition.blocks.items():
@@ -179,13 +172,12 @@ def _rank_of_loops(left: list[_Condition], solved: _Solved, dims: Index) -> int:
                 term = block @ matrix
                 terms[free] = terms[free] + term if free in terms else term
         written.append((terms, condition.size))
-        roots = [find(free) for free in terms]
-        for root in roots:
-            leader[root] = roots[0]
+        for free in terms:
+            sets.join(next(iter(terms)), free)
     groups: dict[int, list[tuple[Mapping[int, Array], Array]]] = {}
     for written_terms, size in written:
         if written_terms:
-            groups.setdefault(find(next(iter(written_terms))), []).append((written_terms, size))
+            groups.setdefault(sets.leader(next(iter(written_terms))), []).append((written_terms, size))
     return sum(_rank(group, dims) for group in groups.values())
 
 

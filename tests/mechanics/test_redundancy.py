@@ -316,7 +316,7 @@ def test_a_check_says_what_repeats_what(scene):
     assert items["mobility"] == "1 independent motion in this configuration"
     assert items["redundant constraints"] == (
         f"3 constraint equations depend on others (in world axes): pivot repeats main, pin and knee: {FLAT}; "
-        "the motion is unique all the same"
+        "the motion is still unique"
     )
     assert items["joint wrenches"] == (
         "main, pin, knee and pivot: force along z, moment about x and y indeterminate (joint axes)"

@@ -82,4 +82,4 @@ def test_what_is_called_back_in_python_is_named():
     parts = {"pe": opaque, "ke": ephs.library.point_mass(m=1.0), "pkc": ephs.library.pkc()}
     report = oscillator.closed(osc=oscillator.oscillator(**parts)).check()
     assert report.ok
-    assert "called back in Python, which is slow: osc.pe" in str(report)
+    assert "evaluated in Python, which is slow: osc.pe" in str(report)

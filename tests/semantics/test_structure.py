@@ -294,4 +294,4 @@ def test_printed_components_and_checks_say_the_verdict():
     system = pattern(hot=body, cold=body, wall=HIDDEN["radiation"]())
     assert "[irreversible, searched]" in str(system) and "[storage, proved]" in str(system)
     item = next(item for item in system.check().items if item.name == "structure")
-    assert item.ok and "2 of them proved" in item.detail and "watched in runs: wall" in item.detail
+    assert item.ok and "2 of them by proof" in item.detail and "watched in runs: wall" in item.detail

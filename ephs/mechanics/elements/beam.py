@@ -33,8 +33,6 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["beam_damper", "beam_element", "beam_spring", "beam_stretch", "elastic", "thermoelastic"]
-
 RELATIVE = quantity.relative_pose("free")
 
 

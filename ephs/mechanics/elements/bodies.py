@@ -16,8 +16,6 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["body_pattern", "rigid_body"]
-
 SYMMETRIC = 1e-12
 """Relative asymmetry of an inertia that counts as rounding."""
 GRAVITY = (0.0, 0.0, -9.81)

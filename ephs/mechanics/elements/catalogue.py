@@ -14,8 +14,6 @@ from ephs.semantics.catalogue import Part
 from ephs.semantics.primitives import Primitive
 from ephs.semantics.spaces import Pair, pair
 
-__all__ = ["PARTS"]
-
 Numbers = Mapping[str, Any]
 
 

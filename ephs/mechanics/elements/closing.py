@@ -19,8 +19,6 @@ from ephs.semantics.primitives import Kernel, Point, Reversible
 from ephs.semantics.spaces import SE3, Pair
 from ephs.semantics.verdict import proved
 
-__all__ = ["Q1", "Q2", "Q_R", "closing"]
-
 Q1, Q2, Q_R = Path.of("q1"), Path.of("q2"), Path.of("q_r")
 MULTIPLIERS: Final = 6
 

@@ -27,26 +27,6 @@ from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.special import squared_turn, turn_ratio
 from ephs.semantics.verdict import proved
 
-__all__ = [
-    "columns_of",
-    "gap_over",
-    "gravity",
-    "ground",
-    "holonomic",
-    "joint_friction",
-    "joint_matrix",
-    "joint_momentum",
-    "kinematic_coupling",
-    "kinetic",
-    "lie_poisson",
-    "no_potential",
-    "pair_coupling",
-    "pair_spring",
-    "potential",
-    "relative",
-    "thermal_node",
-]
-
 POSES = {"SE3": quantity.pose, "SO3xR3": quantity.direct_pose}
 MOMENTA = {"SE3": quantity.body_momentum, "SO3xR3": quantity.direct_momentum}
 

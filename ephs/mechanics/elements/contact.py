@@ -27,8 +27,6 @@ from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.system import System
 from ephs.semantics.verdict import proved
 
-__all__ = ["contact", "contact_energy", "contact_loss", "impact", "lever", "losses"]
-
 RELATIVE = quantity.relative_pose("free")
 Q_R = Path.of("q_r")
 UNITS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -11,8 +11,6 @@ from ephs.semantics.forms import stored
 from ephs.semantics.primitives import power_ports
 from ephs.semantics.system import Filling, System
 
-__all__ = ["gas_spring", "hydraulic_cylinder"]
-
 
 def _compressed(v_a: Any, v_b: Any, q: Any, area_a: Any, area_b: Any, volume_a: Any, volume_b: Any, bulk: Any) -> Any:
     """Energy of the oil in both chambers, from its compression."""

@@ -12,8 +12,6 @@ from ephs.semantics.spaces import pair
 from ephs.semantics.structures import quadratic
 from ephs.semantics.system import Filling, System
 
-__all__ = ["gear", "turns"]
-
 
 def gear(
     of: Sequence[Quantity],

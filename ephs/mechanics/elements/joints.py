@@ -17,13 +17,11 @@ from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
-from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
+from ephs.semantics.spaces import PAIRS, SE3, Pair, pair, translation
 from ephs.semantics.system import System
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-__all__ = ["between_frames", "joint", "joint_pattern", "mbs_pattern", "spring_damper", "universal_joint"]
 
 UNIT = 1e-6
 """Deviation of a quaternion's length from 1 that is normalised: rounding to six digits."""
@@ -185,7 +183,7 @@ def spring_damper(
         k in N/m, L in m of ½ k (distance − L)², c in N s/m.
     """
     damper = springs.point_damper(damping) if damping else components.joint_friction(pair("free"), np.zeros((6, 6)))
-    one, two = (np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (at1, at2))
+    one, two = map(translation, (at1, at2))
     return between_frames(one, two, springs.point_spring(stiffness, length), damper, heat=heat)
 
 

@@ -24,8 +24,6 @@ from ephs.semantics.verdict import proved
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Stops", "limited_friction", "limited_spring", "stops"]
-
 Stops = tuple[tuple[float, float], ...]
 """(side, bound): +1 at the least coordinate, −1 at the largest; the gap is side·(coordinate − bound)."""
 

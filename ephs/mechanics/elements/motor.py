@@ -9,8 +9,6 @@ from ephs.semantics.primitives import Storage, power_ports
 from ephs.semantics.structures import quadratic
 from ephs.semantics.system import System
 
-__all__ = ["armature", "motor"]
-
 
 def armature(of: Quantity, inertia: float) -> Storage:
     """Inertia of a joint's rate itself, as of a rotor that it turns; port p of the joint's momentum.

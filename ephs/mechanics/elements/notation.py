@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # SymPy is loaded when equations are asked for
     from ephs.semantics.symbols.voices import Voice
 
-__all__ = ["frame_change", "friction", "holonomic", "idle", "kinetic", "lengthening", "lie_poisson", "nothing"]
-
 Relations = tuple[dict[str, Any], tuple[Any, ...]]
 
 

@@ -15,8 +15,6 @@ from ephs.semantics.spaces import SE3
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["frame_change"]
-
 CARRIED: Final = Linear("frame_change")
 
 

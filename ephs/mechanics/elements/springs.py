@@ -16,8 +16,6 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import choose
 from ephs.semantics.verdict import proved
 
-__all__ = ["point_damper", "point_spring", "point_stretch"]
-
 RELATIVE = quantity.relative_pose("free")
 
 

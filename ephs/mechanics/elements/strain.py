@@ -21,8 +21,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import squared_turn, turn_curve, turn_curve_slope, turn_ratio
 
-__all__ = ["ORDERS", "displacement", "logarithm", "mean_stress", "strain_energy", "strain_resistance", "stretching"]
-
 ORDERS = (2, 4)
 """Orders in the length of the elements that rest converges by."""
 

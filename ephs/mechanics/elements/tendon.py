@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.shapes.gap import ramp
@@ -21,14 +19,12 @@ from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.constructors import gyrator
 from ephs.semantics.forms import stored
 from ephs.semantics.primitives import Storage, power_ports
-from ephs.semantics.spaces import pair
+from ephs.semantics.spaces import pair, translation
 from ephs.semantics.system import Filling, System
 from ephs.semantics.verdict import proved
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-__all__ = ["tendon", "tension_spring"]
 
 
 def tendon(
@@ -105,7 +101,7 @@ def _segment(one: "ArrayLike", two: "ArrayLike") -> System:
     """The relative pose of frames at two points (3,) without energy, and the rate of its length at the port e."""
     free = pair("free")
     q_r, p_r = components.relative(free), components.joint_momentum(free)
-    first, second = (np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)]) for at in (one, two))
+    first, second = map(translation, (one, two))
     return System.of(
         _segment_pattern(),
         {

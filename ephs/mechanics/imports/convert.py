@@ -10,8 +10,6 @@ from typing import Any
 
 from ephs.mechanics.scene.errors import Fault, SceneError, fault
 
-__all__ = ["convert", "toml_text"]
-
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 

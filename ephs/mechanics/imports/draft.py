@@ -5,19 +5,16 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.errors import Fault, legible
 from ephs.mechanics.scene.geometry import frame_rotation
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.text import MESHES
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-
-__all__ = ["WORLD", "Draft", "along", "pose", "turned_tensor"]
-
-Array = NDArray[np.float64]
 
 LONGEST_NAME = 200
 WORLD = ""

@@ -5,8 +5,6 @@ from xml.etree.ElementTree import Element
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 
-__all__ = ["check_kind", "check_link", "check_mass", "named", "tensor"]
-
 
 def named(root: Element, tag: str, faults: list[Fault]) -> dict[str, Element]:
     """The elements of a kind by their names; a fault for each without a name of its own."""

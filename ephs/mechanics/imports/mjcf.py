@@ -21,8 +21,6 @@ from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.semantics.spaces import SE3
 
-__all__ = ["read_mjcf"]
-
 Inertias = dict[int, tuple[float, Any]]
 DIMENSIONS = {"free": 6, "spherical": 3, "prismatic": 1, "revolute": 1}
 READ = (

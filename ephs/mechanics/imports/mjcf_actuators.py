@@ -14,8 +14,6 @@ from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.imports.mjcf_routes import Route, route_of
 
-__all__ = ["actuators", "tendons"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,6 @@ from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.shapes.pairs import PAIRS
 
-__all__ = ["contacts"]
-
 LOSS, SLIP = 1.0, 1e-2
 """Loss in s/m at a damping ratio of 1, and slip velocity in m/s: MuJoCo has neither."""
 

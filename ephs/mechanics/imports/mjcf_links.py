@@ -10,8 +10,6 @@ import numpy as np
 from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_names import Names
 
-__all__ = ["Thread", "loops", "screws"]
-
 ROUNDED_COSINE = 1e-12
 """Tolerance of the cosine between equal axes: unit vectors round by less."""
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import WORLD, Draft
 
-__all__ = ["Names", "noted"]
-
 KINDS = ("free", "spherical", "prismatic", "revolute")
 
 

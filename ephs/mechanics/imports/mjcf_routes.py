@@ -9,14 +9,11 @@ from importlib import import_module
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_names import Names
+from ephs.semantics.bundle import Array
 
-__all__ = ["Route", "route_of"]
-
-Array = NDArray[np.float64]
 MEETING = 1e-9
 """Length of a segment between two bodies, relative to the whole, below which it has no direction."""
 

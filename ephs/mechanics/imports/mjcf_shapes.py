@@ -9,8 +9,6 @@ from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_source import Source
 from ephs.semantics.spaces import SE3
 
-__all__ = ["shapes"]
-
 
 def shapes(model: Any, b: int, body: str, source: Source, draft: Draft) -> None:
     """The geoms of a body; a capsule is a cylinder with two balls, an ellipsoid the box in it."""

@@ -12,8 +12,6 @@ from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.xml import MOST_LEVELS, numbers, read_tree
 from ephs.mechanics.scene.errors import fault
 
-__all__ = ["Source"]
-
 # Sections without counterpart in scenes, and names of their contents.
 _SECTIONS = {
     "sensor": "sensors",

@@ -9,8 +9,6 @@ from ephs.mechanics.imports.urdf import read_urdf
 from ephs.mechanics.imports.xml import read_tree
 from ephs.mechanics.scene.errors import Fault, fault
 
-__all__ = ["read_model"]
-
 KINDS = ("robot", "mujoco", "sdf")
 
 

@@ -16,8 +16,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["read_sdf"]
-
 # SDF's kind: (kind, how many axes)
 KINDS = {
     "revolute": ("revolute", 1),

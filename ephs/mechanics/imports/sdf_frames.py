@@ -5,16 +5,12 @@ from typing import final
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.imports.draft import pose
 from ephs.mechanics.imports.xml import MOST_LEVELS, numbers
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
-
-__all__ = ["MODEL", "Frames", "read_pose"]
-
-Array = NDArray[np.float64]
 
 MODEL = "__model__"
 

@@ -12,8 +12,6 @@ from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.geometry import coupling
 from ephs.semantics.spaces import SE3
 
-__all__ = ["read_urdf"]
-
 KINDS = {
     "revolute": "revolute",
     "continuous": "revolute",

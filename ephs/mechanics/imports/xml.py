@@ -11,8 +11,6 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.scene.text import file_text
 
-__all__ = ["numbers", "read_tree", "vector"]
-
 MOST_MB = 100
 MOST_LEVELS = 200
 _DECLARATION = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)

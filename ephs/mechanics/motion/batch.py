@@ -5,8 +5,7 @@ import numpy as np
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import codes
-
-__all__ = ["adjoint_inverse", "compose", "gap", "included", "inverse", "product", "rotations", "turned"]
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 SERIES = 0.01
 """Angle θ in rad below which (θ − sin θ)/θ³ is its series up to θ⁴: the next term, θ⁶/362880, is below rounding."""
@@ -14,14 +13,7 @@ SERIES = 0.01
 
 def rotations(q: Array) -> Array:
     """(n, 3, 3) of unit quaternions (n, 4)."""
-    w, x, y, z = q.T
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    ).transpose(2, 0, 1)
+    return quaternion_to_matrix(q.T).transpose(2, 0, 1)
 
 
 def compose(a: Array, b: Array) -> Array:

@@ -11,8 +11,6 @@ from ephs.mechanics.scene.flexible import Beam
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
 
-__all__ = ["BeamMotion", "beam_motion"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,8 +18,6 @@ from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.semantics.bundle import Array
 
-__all__ = ["ContactMotion", "contact_motion"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,7 @@ from ephs.mechanics.motion.batch import compose, gap, product
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import Joint
 from ephs.semantics.bundle import Array
-
-__all__ = ["open_by", "span_of"]
+from ephs.semantics.spaces import translation
 
 
 class Read(Protocol):
@@ -48,7 +47,6 @@ def span_of(tendon: Tendon, read: Read) -> Array:
 
     def point(end: tuple[str, Array]) -> Array:
         poses = read.poses(end[0])
-        frame = np.concatenate([[1.0, 0.0, 0.0, 0.0], end[1]])
-        return compose(poses, np.broadcast_to(frame, poses.shape))[:, 4:]
+        return compose(poses, np.broadcast_to(translation(end[1]), poses.shape))[:, 4:]
 
     return np.sum([np.linalg.norm(point(two) - point(one), axis=1) for one, two in tendon.segments], axis=0)

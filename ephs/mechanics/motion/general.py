@@ -20,8 +20,6 @@ from ephs.solve.motion_law import MotionLaw
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread
 
-__all__ = ["GeneralMotion"]
-
 
 @final
 class GeneralMotion:

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
     from ephs.solve.result.solution import Solution
 
-__all__ = ["Inside"]
-
 
 @final
 class Inside:

@@ -17,8 +17,6 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
 from ephs.solve.auditing.audit import LEAP
 
-__all__ = ["Leap", "leaps"]
-
 THIRDS = 48
 """Iterations of the search, each reducing the interval by two thirds: (2/3)⁴⁸ is 4e-9."""
 

@@ -20,8 +20,6 @@ from ephs.solve.errors import nearest_of
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["LinkMotion"]
-
 STILL = frozen(np.zeros(6))
 
 

@@ -6,7 +6,7 @@ Velocities are those of the continuous relations: the stored momenta projected o
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, final
+from typing import TYPE_CHECKING, Any, TypeVar, final
 
 import numpy as np
 
@@ -31,8 +31,7 @@ from ephs.solve.result.dataset import Variable
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["BodyMotion", "JointMotion", "MarkerMotion", "SceneMotion", "ThermalMotion"]
-
+Item = TypeVar("Item")
 CHUNK = 512
 """Instants that are projected together; bounds the memory."""
 MANY = 40
@@ -176,10 +175,7 @@ class SceneMotion:
 
     def thermal(self, name: str) -> ThermalMotion:
         """The temperature of a thermal node."""
-        nodes = dict(self._scene.all_thermal())
-        if name not in nodes:
-            raise KeyError(f"{name}: no such thermal node; the nodes are {', '.join(nodes) or 'none'}")
-        node = nodes[name]
+        node = _of_name("thermal node", name, dict(self._scene.all_thermal()))
         at = component_path("thermal", name)
         return ThermalMotion(node.temperature_of(lambda state: self._solution[at / state]), self._solution[at / "s"])
 
@@ -189,28 +185,21 @@ class SceneMotion:
 
     def contact(self, name: str) -> ContactMotion:
         """Gap, force, slip and heat of a contact."""
-        contacts = dict(self._scene.all_contacts())
-        if name not in contacts:
-            raise KeyError(f"{name}: no such contact; the contacts are {', '.join(contacts) or 'none'}")
-        return contact_motion(self._scene, contacts[name], self)
+        return contact_motion(self._scene, _of_name("contact", name, dict(self._scene.all_contacts())), self)
 
     def beam(self, name: str) -> BeamMotion:
         """Nodes, strains, forces and moments of a beam."""
-        beams = dict(self._scene.all_beams())
-        if name not in beams:
-            raise KeyError(f"{name}: no such beam; the beams are {', '.join(beams) or 'none'}")
+        beam = _of_name("beam", name, dict(self._scene.all_beams()))
 
         def warmth(node: str) -> Array:
             return self.thermal(node).temperature
 
-        return beam_motion(self._scene, beams[name], self.poses, self.inclusion, self.wrench, warmth)
+        return beam_motion(self._scene, beam, self.poses, self.inclusion, self.wrench, warmth)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker."""
-        markers = dict(self._scene.all_markers())
-        if name not in markers:
-            raise KeyError(f"{name}: no such marker; the markers are {', '.join(markers) or 'none'}")
-        at, carrier = markers[name].at, markers[name].body
+        marker = _of_name("marker", name, dict(self._scene.all_markers()))
+        at, carrier = marker.at, marker.body
         if carrier == GROUND:
             still = np.tile(at, (len(self._solution), 1))
             return MarkerMotion(still, np.zeros_like(still))
@@ -373,3 +362,9 @@ class SceneMotion:
     def summary(self) -> dict[str, Any]:
         """Values at the end, mobility, and the number of redundant constraints."""
         return summary(self._scene, self._solution, self, [*self._joints, *self._implicit])
+
+
+def _of_name(kind: str, name: str, known: Mapping[str, Item]) -> Item:
+    if name not in known:
+        raise KeyError(f"{name}: no such {kind}; the {kind}s are {', '.join(known) or 'none'}")
+    return known[name]

@@ -7,8 +7,6 @@ from typing import Protocol, final
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["ByPath", "Moving", "Part"]
-
 
 class Moving(Protocol):
     """Source of the motion of bodies and joints."""

@@ -13,8 +13,6 @@ from ephs.mechanics.scene.rescaled import freedom_units
 from ephs.semantics.bundle import Array
 from ephs.solve.result.solution import Solution
 
-__all__ = ["OwnMotion", "own_motion"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

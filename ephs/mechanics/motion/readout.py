@@ -14,8 +14,6 @@ from ephs.solve.result.dataset import Variable
 from ephs.solve.result.labels import POSE, TWIST, WRENCH, Labels, freedoms
 from ephs.solve.result.solution import Solution
 
-__all__ = ["freedoms_of", "summary", "variables"]
-
 AXIS = ("axis", ("x", "y", "z"))
 UNIVERSAL = Labels("universal", ("angle 1", "angle 2"), ("rad", "rad"))
 

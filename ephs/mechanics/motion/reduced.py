@@ -31,8 +31,6 @@ from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread
 
-__all__ = ["ReducedMotion", "motion_of"]
-
 
 @final
 class ReducedMotion:

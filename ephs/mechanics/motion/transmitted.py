@@ -22,8 +22,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["Transmission"]
-
 TURN, PLACE, TWIST, BIAS = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 24)
 """Columns of a link's place: frame in the world, twist, acceleration where no rate changes, gravity in it."""
 

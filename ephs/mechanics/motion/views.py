@@ -25,8 +25,6 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import nearest_of
 from ephs.solve.problem import State
 
-__all__ = ["BodyState", "JointState", "MarkerState", "Names", "StateView", "ThermalState", "view_of"]
-
 Item = TypeVar("Item")
 AXIAL = frozenset({"revolute", "prismatic", "cylindrical", "screw"})
 """Pairs about one axis: components of twists along it are the same in all frames that they move to."""

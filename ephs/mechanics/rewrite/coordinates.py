@@ -16,14 +16,13 @@ from ephs.mechanics.rewrite.steps import Step, listed
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.finding.mechanism import Reduced, reduce_system
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, rank_of
 from ephs.solve.errors import OptionError
 from ephs.solve.model import compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index
-
-__all__ = ["coordinate_steps", "cyclic", "loops", "mechanisms", "unread"]
 
 
 @final
@@ -93,23 +92,15 @@ def coordinate_steps(scene: Scene, problem: Problem, before: int) -> Iterator[St
 
 def mechanisms(reduced: Reduced) -> tuple[Part, ...]:
     """The mechanisms, connected only through the ground and heat, in the order of their links."""
-    leader = list(range(reduced.links))
-
-    def find(link: int) -> int:
-        while leader[link] != link:
-            link = leader[link]
-        return link
-
+    sets = DisjointSets[int]()
     ends = [(int(a), int(b)) for a, b in zip(reduced.tables.first, reduced.tables.second, strict=True)]
     for a, b in ends:
         if a >= 0 and b >= 0:
-            one, two = find(a), find(b)
-            leader[max(one, two)] = min(one, two)
+            sets.join(*sorted(sets.leaders((a, b))))  # the least one leads
     out: list[Part] = []
-    for root in range(reduced.links):
-        links = frozenset(link for link in range(reduced.links) if find(link) == root)
-        if not links:
-            continue
+    leaders = sets.leaders(range(reduced.links))
+    for root in sorted(set(leaders)):
+        links = frozenset(link for link, leader in enumerate(leaders) if leader == root)
         edges = tuple(i for i, pair in enumerate(ends) if links & set(pair))
         twists = [reduced.twists[i].T for i in edges if reduced.tables.kind[i] != SPRING]
         names = tuple(name for link in sorted(links) if (name := reduced.bodies[link]) is not None)

@@ -16,8 +16,6 @@ from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Stora
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 
-__all__ = ["DROP_FRICTION", "DROP_GYROSCOPIC", "DROP_JOINT", "DROP_POSE"]
-
 ROUNDING = 1e-12
 FIRST = "comes first"
 SAMPLES = 6

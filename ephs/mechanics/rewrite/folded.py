@@ -11,8 +11,6 @@ from ephs.mechanics.rewrite.rewrite import rewrite
 from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record
 
-__all__ = ["folded_problem"]
-
 
 def folded_problem(problem: Problem) -> Problem:
     """The problem with its transformers folded; solutions refer to the original problem.

@@ -17,8 +17,6 @@ from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Stora
 from ephs.semantics.pullback import Map, pull_back
 from ephs.semantics.spaces.rank import IMPLICIT
 
-__all__ = ["FOLD", "transformations"]
-
 NAME = "fold a transformer"
 
 

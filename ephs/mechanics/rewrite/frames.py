@@ -18,8 +18,6 @@ from ephs.semantics.pullback import pulled_ports
 from ephs.semantics.spaces import SE3, Pair
 from ephs.semantics.spaces.rotations import matrix_to_quaternion
 
-__all__ = ["Body", "Joint", "bodies", "joints", "reach"]
-
 State = Mapping[Path, Array]
 CONSTRAINED = "holonomic"
 

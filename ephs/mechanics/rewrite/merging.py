@@ -21,8 +21,6 @@ from ephs.semantics.pullback import Map, pull_back
 from ephs.semantics.spaces import SE3
 from ephs.semantics.verdict import Condition
 
-__all__ = ["MERGE"]
-
 NAME = "merge rigidly connected bodies"
 REFERENCE = Reference()
 

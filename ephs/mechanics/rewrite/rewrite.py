@@ -16,8 +16,6 @@ from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.system import System
 
-__all__ = ["Draft", "Rewritten", "Rule", "Site", "StateMap", "Strength", "rewrite", "sites_of"]
-
 State = Mapping[Path, Array]
 
 

@@ -5,6 +5,4 @@ from ephs.mechanics.rewrite.folding import FOLD
 from ephs.mechanics.rewrite.merging import MERGE
 from ephs.mechanics.rewrite.rewrite import Rule
 
-__all__ = ["RULES"]
-
 RULES: tuple[Rule, ...] = (FOLD, DROP_FRICTION, MERGE, DROP_JOINT, DROP_GYROSCOPIC, DROP_POSE)

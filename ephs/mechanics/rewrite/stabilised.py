@@ -9,8 +9,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.system import System
 
-__all__ = ["stabilised"]
-
 NAME = "stabilised"
 
 

@@ -7,8 +7,6 @@ from typing import final
 
 from ephs.mechanics.rewrite.rewrite import Strength
 
-__all__ = ["Reduction", "Step"]
-
 WIDTH = 120
 SHOWN = 6
 

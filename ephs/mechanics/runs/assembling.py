@@ -25,8 +25,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.solve.result.solution import Solution
 
-__all__ = ["FlatJoints", "assembled", "flat_joints"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from ephs.mechanics.scene.own_units import in_own_units, mobility_of
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import Probe, system_law
-from ephs.semantics.report import CheckItem, CheckReport, check_structure
+from ephs.semantics.report import CheckItem, CheckReport, check_assembly, check_structure, check_types
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
 from ephs.solve.auditing.audit import LAWFUL
@@ -55,13 +55,9 @@ def _items(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None) -> 
         yield CheckItem("assembly", False, str(error))
         return
     system, d = problem.system, problem.descriptor
-    flat = d.system.flatten().pattern
-    remarks = "; ".join(map(str, flat.lint()))
-    boxes, junctions = len(flat.boxes), len(flat.junctions)
-    yield CheckItem("types", True, f"{boxes} boxes at {junctions} junctions" + (f"; {remarks}" if remarks else ""))
+    yield check_types(d.system)
     yield check_structure(system)
-    unknowns = d.unknowns(problem.inputs(0.0, problem.initial))
-    yield CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations for as many unknowns")
+    yield check_assembly(d, problem.inputs(0.0, problem.initial))
     if problem.scene is not None and problem.scene.adjusted is not None:
         yield CheckItem("adjusted", True, str(problem.scene.adjusted).removeprefix("adjusted: "))
     probe = Probe(system, problem.initial, reference=problem.reference)
@@ -96,7 +92,7 @@ def _parts(problem: Problem) -> Iterator[CheckItem]:
             worst, count = max(worst, verdict.defect), count + 1
             if not verdict.holds:
                 yield CheckItem(f"functoriality: {law.statement}", False, f"{box}: {verdict.detail}")
-    detail = f"each of {count} subsystems by itself: projectors differ by {worst:.1e}; the whole is large"
+    detail = f"checked for each of {count} subsystems, as the whole is large: projectors differ by {worst:.1e}"
     yield CheckItem(f"functoriality: {law.statement}", True, detail)
 
 
@@ -116,19 +112,19 @@ def _motion(problem: Problem) -> Iterator[CheckItem]:
     if problem.scene is not None:
         now = Snapshot.of(problem.scene)
         near = ASSEMBLY * now.scale(problem.scene.world.gravity).length
-        yield CheckItem("closure", gap < near, f"joints are closed to {gap:.1e} m or rad, velocities fit to {slip:.1e}")
+        yield CheckItem("closure", gap < near, f"largest gap {gap:.1e} m or rad, largest velocity residual {slip:.1e}")
     elif problem.gaps is not None:
-        yield CheckItem("closure", gap < ASSEMBLY, f"joints are closed to {gap:.1e} m or rad")
+        yield CheckItem("closure", gap < ASSEMBLY, f"largest gap {gap:.1e} m or rad")
     error, ledgers = float(start.energy_error.max()), start.ledgers
     stored = float(np.max(np.sum([np.abs(energy) for energy in ledgers.storages.values()], axis=0), initial=0.0))
     stored += _weight(problem.scene) if problem.scene is not None else 0.0
-    detail = f"energy over {STEPS} steps of {STEP * own.seconds:g} s is balanced to {error:.1e} of what moves"
+    detail = f"relative error of the energy over {STEPS} steps of {STEP * own.seconds:g} s: {error:.1e}"
     balanced = error < LAWFUL or error * ledgers.scale < ROUNDING * stored
     if error >= LAWFUL and balanced:  # next to nothing moves
-        detail += f", {error * ledgers.scale / stored:.1e} of what is stored or could be"
+        detail += f", {error * ledgers.scale / stored:.1e} of the stored energy"
     yield CheckItem("power balance", balanced, detail)
     least = float(start.stats["least_production"])
-    yield CheckItem("entropy production", least >= 0.0, f"the least of a component in these steps is {least:.1e} J/K")
+    yield CheckItem("entropy production", least >= 0.0, f"least of a component in these steps: {least:.1e} J/K")
 
 
 def _weight(scene: Scene) -> float:
@@ -151,6 +147,6 @@ def _redundancy(problem: Problem, count: int) -> Iterator[CheckItem]:
     repeated = dependences(problem.scene)
     detail = in_words(repeated) or "none"
     if repeated and not any(each.here for each in repeated):  # where motions part, none is unique
-        detail += "; the motion is unique all the same"
+        detail += "; the motion is still unique"
     yield CheckItem("redundant constraints", True, detail)
     yield CheckItem("joint wrenches", True, wrenches_in_words(indeterminate(problem.scene)))

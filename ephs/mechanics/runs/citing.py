@@ -7,8 +7,6 @@ from types import MappingProxyType
 
 from ephs.solve.result.solution import Solution
 
-__all__ = ["METHOD_SOURCES", "bibliography", "cite"]
-
 ALWAYS = ("ephs", "LohmayerCapobiancoLeyendecker2024", "LohmayerLynchLeyendecker2024")
 """The program and the theory of its models."""
 METHOD_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType(

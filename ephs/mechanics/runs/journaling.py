@@ -15,8 +15,6 @@ from ephs.operad import Path
 from ephs.solve.journal import Journal, Written
 from ephs.solve.problem import Problem
 
-__all__ = ["heading_of", "journaled"]
-
 _PROGRAMS = ("ephs", "numpy", "scipy", "llvmlite")
 
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
     from ephs.semantics.bundle import Array
 
-__all__ = ["longest_step"]
-
 TURN = 0.1
 """Step limit for prescribed motions: largest displacement in rad, or as a fraction of the scene's extent."""
 TIMES = 100.0

@@ -18,8 +18,6 @@ from ephs.semantics.errors import AssemblyError, listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.problem import Signal, State
 
-__all__ = ["part_of", "scene_signals", "sum_of"]
-
 
 def part_of(whole: Signal, where: slice) -> Signal:
     """Some of a signal's numbers."""

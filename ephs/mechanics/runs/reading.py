@@ -26,8 +26,6 @@ from ephs.solve.result.guard import check_file
 from ephs.solve.result.record import Rows
 from ephs.solve.result.solution import Solution
 
-__all__ = ["load_solution"]
-
 
 def load_solution(path: str | File, model: System | Scene | None = None) -> Solution:
     """Read a solution that `Solution.save` wrote, or the part of a run in its journal.

@@ -9,8 +9,6 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.system import System
 from ephs.solve.threads import in_one_thread
 
-__all__ = ["reduce"]
-
 
 @in_one_thread
 def reduce(model: System | Scene) -> Reduction:

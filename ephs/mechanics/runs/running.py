@@ -20,8 +20,6 @@ from ephs.solve.problem import Problem
 from ephs.solve.result.solution import Solution
 from ephs.solve.watching import Progress
 
-__all__ = ["Course", "by_constant_steps"]
-
 CLOSE = 1e-4
 """Tolerance of the steps of an independent run."""
 

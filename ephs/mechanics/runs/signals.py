@@ -21,8 +21,6 @@ View = Callable[[State], Mapping[Path, Array]]
 EXAMPLES = {"inputs": '{"joints.waist": 1.0}', "initial": '{"osc.pe.q": 1.0}'}
 """Options that are mappings, with an example for messages."""
 
-__all__ = ["View", "asked_of", "check_mappings", "jumps_of", "numbers_of", "signal", "takes_state", "times_of"]
-
 
 def signal(value: Any, *, effort: bool, name: str, size: int | None, view: View = States) -> Signal:
     """A signal from a constant, f(t), or f(t, state), of ``size`` numbers; ``view`` makes what f reads of the states.

@@ -58,8 +58,6 @@ from ephs.solve.watching import guarded
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["control_of", "problem_of_scene", "problem_of_system", "simulate"]
-
 OPEN = 1e-6
 """Largest joint residual of given initial states, in m or rad."""
 OFF = 1e-3

@@ -9,14 +9,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, LIGHT
 from ephs.solve.threads import in_one_thread
-
-Array = NDArray[np.float64]
 
 ITERATIONS = 60
 

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import final
 
-__all__ = ["Adjustment", "Changed", "Displacement"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

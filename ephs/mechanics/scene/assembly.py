@@ -12,7 +12,6 @@ from dataclasses import fields
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist
@@ -20,10 +19,10 @@ from ephs.mechanics.scene.kinematics import Link, Scale, at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 
-Array = NDArray[np.float64]
 Bodies: TypeAlias = dict[str, Body]
 Joints: TypeAlias = dict[str, Joint]
 

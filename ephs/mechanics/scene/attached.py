@@ -2,32 +2,17 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, final
+from dataclasses import dataclass, field
+from typing import Annotated, final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Element, Number
-
-__all__ = [
-    "ATTACHED",
-    "Actuator",
-    "Attachment",
-    "Cylinder",
-    "GasSpring",
-    "Gear",
-    "Motor",
-]
-
-Array = NDArray[np.float64]
+from ephs.mechanics.scene.element import ABOVE_ONE, ENVIRONMENT, NON_NEGATIVE, POSITIVE, Element, Named, Number, frozen
+from ephs.semantics.bundle import Array
 
 
 class Attachment(Element):
     """Attachments to joints with one degree of freedom each."""
 
     __slots__ = ()
-    names: ClassVar[Mapping[str, str]] = {"joint": "joint", "heat": "node"}
     heat: str
 
     @property
@@ -53,40 +38,22 @@ class Attachment(Element):
 @final
 @dataclass(frozen=True, slots=True)
 class Motor(Attachment):
-    """A direct-current motor on a joint with one degree of freedom.
-
-    Attributes
-    ----------
-    constant
-        N m/A, which is V s/rad.
-    resistance, inductance
-        Of the winding in Ω and H.
-    gear
-        Rate of the rotor by the joint's, rad/rad or rad/m.
-    inertia
-        Of the rotor in kg m².
-    voltage
-        V, where no input is given.
-    """
+    """A direct-current motor on a joint with one degree of freedom."""
 
     # Currents do not depend on the unit of time.
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "constant": Number(energy=1, time=1),
-        "resistance": Number(energy=1, time=1, least=POSITIVE),
-        "inductance": Number(energy=1, time=2, least=NON_NEGATIVE),
-        "gear": Number(first=-1),
-        "inertia": Number(energy=1, time=2, least=NON_NEGATIVE),
-        "voltage": Number(energy=1),
-    }
     name: str
-    joint: str
-    constant: float
-    resistance: float
-    inductance: float
-    gear: float
-    inertia: float
-    voltage: float
-    heat: str
+    joint: Annotated[str, Named("joint"), "the driven joint, of one degree of freedom"]
+    constant: Annotated[
+        float, Number(energy=1, time=1), "torque constant: torque of the rotor per current, N m/A or V s/rad"
+    ]
+    resistance: Annotated[float, Number(energy=1, time=1, least=POSITIVE), "resistance of the winding, Ω"]
+    inductance: Annotated[float, Number(energy=1, time=2, least=NON_NEGATIVE), "inductance of the winding, H"] = 0.0
+    gear: Annotated[
+        float, Number(first=-1), "gear ratio: rate of the rotor per rate of the joint, rad/rad or rad/m"
+    ] = 1.0
+    inertia: Annotated[float, Number(energy=1, time=2, least=NON_NEGATIVE), "inertia of the rotor, kg m²"] = 0.0
+    voltage: Annotated[float, Number(energy=1), 'voltage without an input "motors.NAME", V'] = 0.0
+    heat: Annotated[str, Named("node"), "thermal node that takes up the heat of the winding"] = ENVIRONMENT
 
     @property
     def warms(self) -> bool:
@@ -99,37 +66,34 @@ class Motor(Attachment):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Gear(Attachment):
-    """A relation of the rates of joints: that of the first is Σ ratio · rate of the others.
+    """A relation of the rates of joints: that of the first is Σ ratio · rate of the others."""
 
-    Attributes
-    ----------
-    ratio
-        A number for each joint but the first.
-    stiffness, damping
-        Of a belt or a tendon that stretches, N m/rad and N m s/rad, or N/m and N s/m, of the first joint; a rigid gear
-        has none.
-    friction
-        On the first joint's rate.
-    stretch
-        Of the belt at the start, rad or m of the first joint.
-    """
-
-    names: ClassVar[Mapping[str, str]] = {"joints": "joint", "heat": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "ratio": Number(first=1, others=-1, each=1),
-        "stiffness": Number(energy=1, first=-2, least=NON_NEGATIVE),
-        "damping": Number(energy=1, time=1, first=-2, least=NON_NEGATIVE),
-        "friction": Number(energy=1, time=1, first=-2, least=NON_NEGATIVE),
-        "stretch": Number(first=1),
-    }
     name: str
-    joints: tuple[str, ...]
-    ratio: Array
-    stiffness: float
-    damping: float
-    friction: float
-    heat: str
-    stretch: float = 0.0
+    joints: Annotated[
+        tuple[str, ...],
+        Named("joint"),
+        "two or more joints with one degree of freedom: a gear, a belt, a differential, a mimic",
+    ]
+    ratio: Annotated[
+        Array, Number(first=1, others=-1, each=1), "rate of the first joint = Σ ratio · rate of the others"
+    ] = field(default_factory=lambda: frozen([1.0]))
+    stiffness: Annotated[
+        float,
+        Number(energy=1, first=-2, least=NON_NEGATIVE),
+        "stiffness of a belt, N m/rad or N/m of the first joint; 0: rigid",
+    ] = 0.0
+    damping: Annotated[
+        float,
+        Number(energy=1, time=1, first=-2, least=NON_NEGATIVE),
+        "damping of the belt's stretch, N m s/rad or N s/m",
+    ] = 0.0
+    stretch: Annotated[float, Number(first=1), "initial stretch of a belt, rad or m of the first joint"] = 0.0
+    friction: Annotated[
+        float,
+        Number(energy=1, time=1, first=-2, least=NON_NEGATIVE),
+        "viscous friction on the first joint's rate, N m s/rad or N s/m",
+    ] = 0.0
+    heat: Annotated[str, Named("node"), "thermal node that takes up the heat of damping and friction"] = ENVIRONMENT
 
     @property
     def warms(self) -> bool:
@@ -142,39 +106,35 @@ class Gear(Attachment):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Cylinder(Attachment):
-    """A hydraulic cylinder on a joint that slides, or a hydraulic motor on one that turns.
+    """A hydraulic cylinder on a joint that slides, or a hydraulic motor on one that turns."""
 
-    Attributes
-    ----------
-    area
-        (2,) volume of chambers a and b by the coordinate, m³/m or m³/rad; a pushes towards larger coordinates.
-    volume
-        (2,) oil in each, m³.
-    bulk
-        Its bulk modulus, Pa.
-    conductance, leak
-        Of the line to each chamber, and across the piston, m³/(s Pa).
-    pressure
-        (2,) of the supplies of a and b above the environment's, Pa, where no input is given; the chambers start there.
-    """
-
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "area": Number(length=3, first=-1, count=2),
-        "volume": Number(length=3, count=2, least=POSITIVE),
-        "bulk": Number(energy=1, length=-3, least=POSITIVE),
-        "conductance": Number(energy=-1, time=-1, length=6, least=POSITIVE),
-        "leak": Number(energy=-1, time=-1, length=6, least=NON_NEGATIVE),
-        "pressure": Number(energy=1, length=-3, count=2),
-    }
     name: str
-    joint: str
-    area: Array
-    volume: Array
-    bulk: float
-    conductance: float
-    leak: float
-    pressure: Array
-    heat: str
+    joint: Annotated[
+        str, Named("joint"), "a joint with one degree of freedom; chamber a pushes it to larger coordinates"
+    ]
+    area: Annotated[
+        Array,
+        Number(length=3, first=-1, count=2),
+        "change of volume of chambers a and b per coordinate, m³/m or m³/rad",
+    ]
+    volume: Annotated[Array, Number(length=3, count=2, least=POSITIVE), "volume of oil in each chamber, m³"]
+    conductance: Annotated[
+        float,
+        Number(energy=-1, time=-1, length=6, least=POSITIVE),
+        "conductance of the line to each chamber, m³/(s Pa)",
+    ]
+    bulk: Annotated[float, Number(energy=1, length=-3, least=POSITIVE), "bulk modulus of the oil, Pa"] = 1.5e9
+    leak: Annotated[
+        float,
+        Number(energy=-1, time=-1, length=6, least=NON_NEGATIVE),
+        "conductance of the leak across the piston, m³/(s Pa)",
+    ] = 0.0
+    pressure: Annotated[
+        Array,
+        Number(energy=1, length=-3, count=2),
+        'pressures of the supplies above world.pressure without an input "cylinders.NAME", Pa',
+    ] = field(default_factory=lambda: frozen([0.0, 0.0]))
+    heat: Annotated[str, Named("node"), "thermal node that takes up the heat of lines and leak"] = ENVIRONMENT
 
     @property
     def warms(self) -> bool:
@@ -187,37 +147,29 @@ class Cylinder(Attachment):
 @final
 @dataclass(frozen=True, slots=True)
 class GasSpring(Attachment):
-    """An ideal gas behind a piston on a joint, the environment's pressure before it.
+    """An ideal gas behind a piston on a joint, the environment's pressure before it."""
 
-    Attributes
-    ----------
-    area
-        Volume of the gas by the coordinate, m³/m or m³/rad; negative where it shrinks towards larger coordinates.
-    volume, pressure, temperature
-        Of the gas at the start: m³, Pa (absolute), K.
-    gamma
-        Its ratio of specific heats.
-    conductance
-        From the gas to ``heat``, W/K.
-    """
-
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "area": Number(length=3, first=-1),
-        "volume": Number(length=3, least=POSITIVE),
-        "pressure": Number(energy=1, length=-3, least=POSITIVE),
-        "temperature": Number(least=POSITIVE),
-        "gamma": Number(least=(1.0, True)),
-        "conductance": Number(energy=1, time=-1, least=NON_NEGATIVE),
-    }
     name: str
-    joint: str
-    area: float
-    volume: float
-    pressure: float
-    temperature: float
-    gamma: float
-    conductance: float
-    heat: str
+    joint: Annotated[str, Named("joint"), "a joint with one degree of freedom"]
+    area: Annotated[
+        float,
+        Number(length=3, first=-1),
+        "change of the gas volume per coordinate, m³/m or m³/rad; may be negative",
+    ]
+    volume: Annotated[float, Number(length=3, least=POSITIVE), "initial volume, m³"]
+    pressure: Annotated[
+        float,
+        Number(energy=1, length=-3, least=POSITIVE),
+        "initial absolute pressure, Pa; world.pressure acts on the other side of the piston",
+    ]
+    temperature: Annotated[float, Number(least=POSITIVE), "initial temperature, K"] = 293.15
+    gamma: Annotated[float, Number(least=ABOVE_ONE), "ratio of specific heats"] = 1.4
+    conductance: Annotated[
+        float,
+        Number(energy=1, time=-1, least=NON_NEGATIVE),
+        "thermal conductance from the gas to its thermal node, W/K; 0: adiabatic",
+    ] = 0.0
+    heat: Annotated[str, Named("node"), "thermal node that exchanges heat with the gas"] = ENVIRONMENT
 
     @property
     def warms(self) -> bool:
@@ -230,27 +182,18 @@ class GasSpring(Attachment):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Actuator(Attachment):
-    """A control as forces on joints, or on the length of a tendon: an input by name, for motors without dynamics.
+    """A control as forces on joints, or on the length of a tendon: an input by name, for motors without dynamics."""
 
-    Attributes
-    ----------
-    ratio
-        Force on each joint, or on the length, by the control, N m or N.
-    limits
-        (2,) least and largest control; None for none.
-    """
-
-    names: ClassVar[Mapping[str, str]] = {"joints": "joint", "tendon": "tendon", "heat": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "ratio": Number(energy=1, others=-1, each=0),
-        "limits": Number(count=2),
-    }
     name: str
-    joints: tuple[str, ...]
-    ratio: Array
-    limits: Array | None
-    heat: str = "environment"
-    tendon: str | None = None
+    joints: Annotated[tuple[str, ...], Named("joint"), "joints with one degree of freedom"] = ()
+    tendon: Annotated[str | None, Named("tendon"), "instead of joints: a tendon, on whose length it acts"] = None
+    ratio: Annotated[
+        Array,
+        Number(energy=1, others=-1, each=0),
+        'force on each by the control, the input "actuators.NAME"; N m, N',
+    ] = field(default_factory=lambda: frozen([1.0]))
+    limits: Annotated[Array | None, Number(count=2), "least and largest control"] = None
+    heat: Annotated[str, Named("node")] = ENVIRONMENT
 
     @property
     def warms(self) -> bool:

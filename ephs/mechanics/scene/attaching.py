@@ -16,8 +16,6 @@ from ephs.operad import Path, Quantity, quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
 
-__all__ = ["SUPPLIED", "Supply", "starts_of", "supplies", "supplies_of", "system_of"]
-
 SUPPLIED = {"voltages": quantity.charge, "pressures": quantity.liquid}
 """First names of the outer ports of attachments -> the quantity there."""
 

@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.entries import Checked, shown
@@ -29,16 +28,14 @@ from ephs.mechanics.scene.schema_touching import ContactLawEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import TINY
 
-__all__ = ["BeamDraft", "check_beam", "curve", "resolve_beam"]
-
 ALONG = 1.0 - 1e-9
 """Cosine above which a given direction counts as along the beam: its sine is 4e-5, well above rounding."""
 
-Array = NDArray[np.float64]
 PARALLEL = 0.9
 """Cosine above which a world axis counts as along a tangent, and the next one is taken for ``up``."""
 ALIKE = 1e-9

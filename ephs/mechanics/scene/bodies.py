@@ -2,10 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, final
+from typing import Annotated, Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import (
     ENVIRONMENT,
@@ -16,6 +15,7 @@ from ephs.mechanics.scene.element import (
     TWIST,
     Element,
     Measured,
+    Named,
     Number,
     frozen,
 )
@@ -23,27 +23,24 @@ from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
+from ephs.semantics.bundle import Array
 from ephs.solve.motion_law import MotionLaw
 
-__all__ = ["IDENTITY_POSE", "Body", "Joint", "Marker", "Spring", "World", "free_joint"]
-
-Array = NDArray[np.float64]
 IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class World(Measured):
-    """Gravity ``(3,)`` in m/s², and the reference environment: temperature in K, pressure in Pa."""
+    """Gravity, and the reference environment."""
 
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "gravity": Number(length=1, time=-2, count=3),
-        "temperature": Number(least=POSITIVE),
-        "pressure": Number(energy=1, length=-3, least=POSITIVE),
-    }
-    gravity: Array = field(default_factory=lambda: frozen([0.0, 0.0, -9.81]))
-    temperature: float = 293.15
-    pressure: float = 101325.0
+    gravity: Annotated[Array, Number(length=1, time=-2, count=3), "gravity in the world, m/s²"] = field(
+        default_factory=lambda: frozen([0.0, 0.0, -9.81])
+    )
+    temperature: Annotated[float, Number(least=POSITIVE), "temperature of the reference environment, K"] = 293.15
+    pressure: Annotated[
+        float, Number(energy=1, length=-3, least=POSITIVE), "pressure of the reference environment, Pa"
+    ] = 101325.0
 
 
 @final
@@ -61,17 +58,11 @@ class Body(Element):
         [radius, length]}``, ``{"mesh": file, "scale": …}``, with ``position`` and ``rotation`` in the body
     """
 
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "mass": Number(energy=1, length=-2, time=2, least=NON_NEGATIVE),
-        "inertia": Number(energy=1, time=2, count=3, square=True),
-        "pose": POSE,
-        "twist": TWIST,
-    }
     name: str
-    mass: float
-    inertia: Array
-    pose: Array
-    twist: Array
+    mass: Annotated[float, Number(energy=1, length=-2, time=2, least=NON_NEGATIVE)]
+    inertia: Annotated[Array, Number(energy=1, time=2, count=3, square=True)]
+    pose: Annotated[Array, POSE]
+    twist: Annotated[Array, TWIST]
     shape: Mapping[str, Any] | None = None
     shapes: tuple[Mapping[str, Any], ...] = ()
 
@@ -102,40 +93,27 @@ class Joint(Element):
     strain : of a beam element, which is a free joint; then friction and stiffness are 0
     """
 
-    names: ClassVar[Mapping[str, str]] = {"body1": "body", "body2": "body", "heat": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "frame1": POSE,
-        "frame2": POSE,
-        "middle": POSE,
-        "pitch": Number(length=1),
-        "friction": Number(energy=1, time=1, others=-1, each=0, square=True),
-        "stiffness": Number(energy=1, others=-2, each=0),
-        "rest": Number(others=1, each=0),
-        "drive": Number(energy=1, others=-1, each=0),
-        "rate": Number(time=-1, others=1, each=0),
-        "armature": Number(energy=1, time=2, first=-2, least=NON_NEGATIVE),
-    }
     name: str
     kind: str
-    body1: str
-    body2: str
-    frame1: Array
-    frame2: Array
-    pitch: float
-    friction: Array
-    stiffness: Array
-    rest: Array
-    heat: str
-    drive: Array
+    body1: Annotated[str, Named("body")]
+    body2: Annotated[str, Named("body")]
+    frame1: Annotated[Array, POSE]
+    frame2: Annotated[Array, POSE]
+    pitch: Annotated[float, Number(length=1)]
+    friction: Annotated[Array, Number(energy=1, time=1, others=-1, each=0, square=True)]
+    stiffness: Annotated[Array, Number(energy=1, others=-2, each=0)]
+    rest: Annotated[Array, Number(others=1, each=0)]
+    heat: Annotated[str, Named("node")]
+    drive: Annotated[Array, Number(energy=1, others=-1, each=0)]
     motion: MotionLaw | None
     coordinate: Array
-    rate: Array
-    middle: Array | None = None
+    rate: Annotated[Array, Number(time=-1, others=1, each=0)]
+    middle: Annotated[Array | None, POSE] = None
     limits: Array | None = None
     stop: Law | Impact | None = None
     dry: Dry | None = None
     strain: Strain | None = None
-    armature: float = 0.0
+    armature: Annotated[float, Number(energy=1, time=2, first=-2, least=NON_NEGATIVE)] = 0.0
 
     @property
     def dim(self) -> int:
@@ -146,41 +124,29 @@ class Joint(Element):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Spring(Element):
-    """A massless spring-damper between two points, ``½ k (distance − length)²``.
+    """A massless spring-damper between two points, ``½ k (distance − length)²``."""
 
-    ``at1`` and ``at2`` ``(3,)`` are in the bodies' centre-of-mass frames (ground: world); stiffness N/m,
-    length m, damping N s/m.
-    """
-
-    names: ClassVar[Mapping[str, str]] = {"body1": "body", "body2": "body", "heat": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "stiffness": Number(energy=1, length=-2),
-        "length": Number(length=1, least=NON_NEGATIVE),
-        "damping": Number(energy=1, length=-2, time=1, least=NON_NEGATIVE),
-        "at1": Number(length=1, count=3),
-        "at2": Number(length=1, count=3),
-    }
     name: str
-    body1: str
-    body2: str
-    at1: Array
-    at2: Array
-    stiffness: float
-    length: float
-    damping: float
-    heat: str = ENVIRONMENT
+    body1: Annotated[str, Named("body")]
+    body2: Annotated[str, Named("body")]
+    at1: Annotated[Array, Number(length=1, count=3), "point in body 1's centre-of-mass frame (ground: world), m"]
+    at2: Annotated[Array, Number(length=1, count=3), "point in body 2's, m"]
+    stiffness: Annotated[float, Number(energy=1, length=-2), "N/m"] = 0.0
+    length: Annotated[float, Number(length=1, least=NON_NEGATIVE), "length without force, m"] = 0.0
+    damping: Annotated[float, Number(energy=1, length=-2, time=1, least=NON_NEGATIVE), "N s/m"] = 0.0
+    heat: Annotated[str, Named("node"), "thermal node that takes up the heat"] = ENVIRONMENT
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Marker(Element):
-    """A point of interest: ``at`` ``(3,)`` in its body's centre-of-mass frame (ground: world)."""
+    """A point of interest."""
 
-    names: ClassVar[Mapping[str, str]] = {"body": "body"}
-    numbers: ClassVar[Mapping[str, Number]] = {"at": Number(length=1, count=3)}
     name: str
-    body: str
-    at: Array
+    body: Annotated[str, Named("body"), 'the body that carries it, or "ground"']
+    at: Annotated[Array, Number(length=1, count=3), "point in its centre-of-mass frame (ground: world), m"] = field(
+        default_factory=lambda: frozen([0.0, 0.0, 0.0])
+    )
 
 
 def free_joint(body: Body) -> Joint:

@@ -30,21 +30,9 @@ from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
 from ephs.semantics.primitives import Storage
-from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.system import Filling, System
 from ephs.solve.problem import Signal
-
-__all__ = [
-    "component_path",
-    "contact_points",
-    "drive_ports",
-    "initial_state",
-    "scene_inputs",
-    "scene_names",
-    "scene_system",
-    "tension_port",
-    "wrench_port",
-]
 
 
 def component_path(kind: str, name: str) -> Path:
@@ -118,7 +106,7 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         at = component_path("tendons", name)
         out |= {Path([*at, *path.split(".")]): value for path, value in tendon_starts(tendon, poses).items()}
     between = [
-        (component_path("springs", name), (s.body1, s.body2), (_point(s.at1), _point(s.at2)))
+        (component_path("springs", name), (s.body1, s.body2), (translation(s.at1), translation(s.at2)))
         for name, s in scene.all_springs()
     ]
     warm = [(component_path("springs", name), s.heat) for name, s in scene.all_springs()]
@@ -137,10 +125,6 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         if _needs_environment(part):
             out[prefix / "environment" / "s"] = np.zeros(1)
     return out
-
-
-def _point(at: Array) -> Array:
-    return np.concatenate([[1.0, 0.0, 0.0, 0.0], at])
 
 
 def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:

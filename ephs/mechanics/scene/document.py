@@ -4,24 +4,18 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any
+from types import UnionType
+from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
-from ephs.mechanics.scene.flexible import Strain, Tendon
-from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, World, frozen
+from ephs.mechanics.scene.flexible import Strain
+from ephs.mechanics.scene.model import ELEMENTS, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
-
-__all__ = ["scene_from_text", "scene_to_text"]
-
-_BESIDE: Mapping[Any, frozenset[str]] = {Joint: frozenset({"coordinate", "limits"}), Tendon: frozenset({"points"})}
-"""Arrays beside those among the numbers."""
-_SEVERAL = frozenset({"shapes", "between", "surfaces", "joints", "bodies", "ends", "outline", "lengths"})
-"""Attributes that are tuples."""
 
 
 def scene_to_text(scene: Scene) -> str:
@@ -35,8 +29,14 @@ def scene_from_text(text: str) -> Scene:
 
 
 @cache
-def _kept(of: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(of) if field.init)
+def _kept(of: type[Any]) -> dict[str, set[Any]]:
+    """Attributes of a class that are kept -> the types that each may be, without their parameters."""
+    return {field.name: _types(field.type) for field in fields(of) if field.init}
+
+
+def _types(annotation: Any) -> set[Any]:
+    plain = annotation.__origin__ if get_origin(annotation) is Annotated else annotation
+    return {get_origin(each) or each for each in (get_args(plain) if isinstance(plain, UnionType) else (plain,))}
 
 
 def _plain(value: Any) -> Any:
@@ -64,13 +64,13 @@ def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
 
     def made(key: str, value: Any) -> Any:
-        if key in arrays:
+        if np.ndarray in types[key]:
             return _array(value)
-        if key in _SEVERAL:
+        if tuple in types[key]:
             return tuple(value)
         return _INSIDE[key](value) if value is not None and key in _INSIDE else value
 
-    arrays = {key for key, number in cls.numbers.items() if number.shape(1)} | _BESIDE.get(cls, frozenset())
+    types = _kept(cls)
     return cls(**{key: made(key, value) for key, value in data.items()})
 
 

@@ -1,33 +1,23 @@
-"""Numbers and references of a resolved scene's elements: shape, dimension and range of each number, kind of each name.
+"""Attributes of a resolved scene's elements: shape, dimension and range of numbers, kinds of names, meanings.
 
-Reading and writing, checks of files, other units, parameters by path and names seen from outside a part follow.
+An attribute is declared once, as ``Annotated[float, Number(energy=1), "meaning, unit"]``. Keys of scene files with
+their page of documentation, reading and writing, checks, other units, parameters by path and names seen from outside a
+part follow. Attributes without a meaning are not keys of scene files.
 """
 
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Final, Self, final
+from inspect import get_annotations
+from typing import Any, ClassVar, Final, Self, TypeVar, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-__all__ = [
-    "ENVIRONMENT",
-    "FREE_END",
-    "GROUND",
-    "NON_NEGATIVE",
-    "OUTSIDE",
-    "POSE",
-    "POSITIVE",
-    "TWIST",
-    "Element",
-    "Measured",
-    "Number",
-    "frozen",
-]
+from ephs.semantics.bundle import Array
 
-Array = NDArray[np.float64]
+T = TypeVar("T")
 GROUND = "ground"
 ENVIRONMENT = "environment"
 FREE_END = "free"
@@ -41,7 +31,7 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "surface": frozenset(),
 }
 """Kind of a name that refers to something -> the names that are the same in all parts."""
-POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
+POSITIVE, NON_NEGATIVE, ABOVE_ONE = (0.0, True), (0.0, False), (1.0, True)
 """A lower bound, and whether it is excluded."""
 
 
@@ -50,6 +40,19 @@ def frozen(values: ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def part_of(annotation: Any, kind: type[T]) -> T | None:
+    """What an attribute's annotation says of a kind: its `Number`, its `Named`, or its meaning."""
+    return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, kind)), None)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Named:
+    """Kind of the elements that an attribute names, one, several or None: a key of `OUTSIDE`."""
+
+    kind: str
 
 
 @final
@@ -111,10 +114,22 @@ TWIST: Final = Number(time=-1, length=1, ahead=3, count=6)
 
 
 class Measured(ABC):  # noqa: B024 - what differs are values
-    """Something with numbers."""
+    """Something with numbers.
+
+    Attributes
+    ----------
+    numbers, names
+        Attributes with a `Number`; attributes that name elements, and of which kind.
+    """
 
     __slots__ = ()
     numbers: ClassVar[Mapping[str, Number]] = {}
+    names: ClassVar[Mapping[str, str]] = {}
+
+    def __init_subclass__(cls) -> None:
+        given = get_annotations(cls).items()
+        cls.numbers = {key: of for key, annotation in given if (of := part_of(annotation, Number))}
+        cls.names = {key: of.kind for key, annotation in given if (of := part_of(annotation, Named))}
 
     def values(self, coordinates: int = 0) -> dict[str, tuple[Any, tuple[int, ...]]]:
         """Its numbers with their required shapes, without omitted ones."""
@@ -131,16 +146,9 @@ class Measured(ABC):  # noqa: B024 - what differs are values
 
 
 class Element(Measured):
-    """Something in a scene that has a name.
-
-    Attributes
-    ----------
-    names
-        Attributes that name other elements, one, several or None, and of which kind: a key of `OUTSIDE`.
-    """
+    """Something in a scene that has a name."""
 
     __slots__ = ()
-    names: ClassVar[Mapping[str, str]] = {}
     name: str
 
     def named(self, kind: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from pydantic import ValidationError, WrapValidator
 
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name
 from ephs.mechanics.scene.rotations import FORMS
-from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, CylinderEntry, SceneFile, WorldEntry
+from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, SceneFile, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
 from ephs.mechanics.scene.schema_touching import SurfaceShapeEntry
@@ -88,7 +88,7 @@ class Document:
     file has none."""
 
     name: str
-    world: WorldEntry | None
+    world: Any
     assembly: AssemblyEntry
     sections: Mapping[str, Mapping[str, Checked[Any]]]
 
@@ -131,7 +131,7 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
             spoiled |= misspelled
     sound = {k: v for k, v in raw.items() if k not in spoiled}
     required = {k for k, field in model.model_fields.items() if field.is_required()}
-    known = _NEUTRAL | (_NEUTRAL_PAIRS if model is CylinderEntry else {})
+    known = _NEUTRAL | (_NEUTRAL_PAIRS if model is SECTIONS["cylinders"] else {})
     neutral = {k: known[k] for k in spoiled & required}
     return Checked(model.model_validate({**sound, **neutral}), frozenset(spoiled))
 

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from heapq import nsmallest
 from typing import Any, final
 
+from ephs.operad.messages import legible as legible
+from ephs.operad.messages import nearest_name as nearest_name
+
 
 @final
 @dataclass(frozen=True, slots=True)
@@ -70,92 +73,86 @@ TEXTS: dict[str, tuple[str, str]] = {
     "base": ('"fixed" or "free"', "choose the connection of the imported root with the ground"),
     "inertia mode": ('"strict", "warn" or "nearest"', "choose the treatment of impossible inertias"),
     "format": ("1", "write format = 1 as the first line"),
-    "long key": ("keys of at most {most} names", "no scene has tables nested so deeply"),
-    "outside scene": ("a file in the scene's own folder, or below it", "copy it there; nothing else is read"),
-    "many parts": ("at most {most} uses of parts, those of parts counted", "join some of them into one file"),
-    "cycle": ("a scene that is no part of itself", "take one of these uses out: {chain}"),
-    "world differs": (
-        "{wanted}, that of the scene that uses it",
-        "take [world] out of the part, or make it equal",
-    ),
+    "long key": ("keys of at most {most} names", "nest tables less deeply"),
+    "outside scene": ("a file in the folder of the scene or below", "copy it there; files elsewhere are not read"),
+    "many parts": ("at most {most} uses of parts, nested ones included", "combine some of them in one file"),
+    "cycle": ("a scene that does not contain itself", "remove one of these uses: {chain}"),
+    "world differs": ("{wanted}, as in the scene that uses it", "remove [world] from the part, or make it equal"),
     # models in other formats
     "model suffix": ("a file that ends in .urdf, .xml or .sdf", "check the file's name"),
     "link": (
-        "a place that is no link, for copies of meshes",
-        "take it away, or choose another name for the scene file",
+        "a path that is not a link, for copies of meshes",
+        "remove the link, or choose another name for the scene file",
     ),
     "scene suffix": ("a file that ends in .toml", "choose another name for the scene file"),
     "size": ("at most {most:g} MB", "the file is text; meshes have files of their own"),
-    "entities": ("XML without <!DOCTYPE and <!ENTITY", "take these declarations out, comments included"),
+    "entities": ("XML without <!DOCTYPE and <!ENTITY", "remove these declarations, also from comments"),
     "xml": ("well-formed XML", "correct the syntax at the place named"),
-    "deep": ("at most {most} levels", "no model is nested so deeply"),
-    "copies": ("at most {most} elements, copies counted", "make fewer copies"),
-    "root element": ("one of {known}", "check what the file holds"),
+    "deep": ("at most {most} levels", "nest tables or elements less deeply"),
+    "copies": ("at most {most} elements, copies included", "make fewer copies"),
+    "root element": ("one of {known}", "check the content of the file"),
     "xacro": ("plain URDF", "expand the macros first: xacro FILE > MODEL.urdf"),
     "value": ("{what}", "correct the value"),
-    "twice": ("a name of its own", "rename one of the two"),
+    "twice": ("a unique name", "rename one of the two"),
     "unknown link": ("a link of this model", "{hint}"),
     "no link": ("at least one link", "check that the file is complete"),
     "two parents": ("one parent", "a URDF is a tree; close loops in an SDF or a scene file"),
-    "link cycle": ("links that lead to a root", "take one of these joints out"),
-    "roots": ("one root link", "join the others to it"),
+    "link cycle": ("a tree of links", "remove one of these joints"),
+    "roots": ("one root link", "connect the other roots to it by joints"),
     "unknown frame": ("a frame of this model", "{hint}"),
-    "frame cycle": ("frames that lead to the model's", "place one of them relative to the model"),
+    "frame cycle": ("frames without a cycle", "place one of them relative to the model"),
     "one model": ("one model", "split the file, or join the models"),
     "not supported": ("a model without {what}", "{hint}"),
-    "outside": ("a file in the model's own folder", "copy it there; nothing else is read"),
-    "not compiled": ("a model that MuJoCo compiles", "correct the reported fault"),
+    "outside": ("a file in the folder of the model", "copy it there; files elsewhere are not read"),
+    "not compiled": ("a model that MuJoCo can compile", "correct the reported fault"),
     "no importer": ("the module mujoco", "python -m pip install 'ephs[models]'"),
     # keys, types and names
     "unknown key": ("one of {known}", "{hint}"),
     "missing": ("{what}", "add this key"),
     "table": ("a table", "write it as [{key}] with keys below"),
     "type": ("{what}", "correct the value"),
-    "length": ("{what}", "give as many numbers as this"),
+    "length": ("{what}", "correct the number of entries"),
     "one freedom": ("a number", "a pair with one degree of freedom takes one number"),
     "large": ("a number of at most {most:g} in size", "check the unit"),
     "finite": ("a finite number", "nan and inf are not allowed"),
     "range": ("{what}", "correct the value"),
-    "name": (
-        "a name without dots and blanks, of at most 200 printable letters, the first no ~",
-        "rename it",
-    ),
+    "name": ("at most 200 printable characters, without dots and blanks, not beginning with ~", "rename it"),
     "scene name": (
-        "a name that a folder can have: printable, of at most 200 letters, without / and \\",
-        "rename the scene: results are kept under its name",
+        "a valid name of a folder: at most 200 printable characters, without / and \\",
+        "rename the scene; its results are saved in a folder of this name",
     ),
-    "reserved": ("a name of your own", "{reserved} have a fixed meaning; rename it"),
-    "collision": ("a name that is not taken by {other}", "rename one of them"),
+    "reserved": ("another name", "{reserved} have a fixed meaning; rename it"),
+    "collision": ("a name that {other} does not use", "rename one of them"),
     "unknown body": ('"ground" or a body', "{hint}"),
     "unknown thermal": ('"environment" or a [thermal] name', "{hint}"),
     "unknown type": ("one of {known}", "{hint}"),
     "overlap": (
         "less than {most:.3g} m at the start",
-        "the energy of this overlap is in the balance from the start; move one of the bodies",
+        "the energy of this overlap is part of the initial energy; move one of the bodies",
     ),
-    "dry joint": ("a joint with one degree of freedom that is free to move", "take dry out"),
-    "dry static": ("a number ≥ coulomb = {coulomb:g}", "friction at rest is no less than while sliding"),
-    "limited joint": ("a joint with one degree of freedom that is free to move", "take limits out"),
-    "beyond stop": ("a start between hard stops", "move the joint, or take limit_restitution out"),
-    "no scale": ("a stiffness, as nothing in the scene moves or falls", "add this key"),
+    "dry joint": ("a joint with one degree of freedom and no prescribed motion", "remove dry"),
+    "dry static": ("a number ≥ coulomb = {coulomb:g}", "static friction is at least as large as sliding friction"),
+    "limited joint": ("a joint with one degree of freedom and no prescribed motion", "remove limits"),
+    "beyond stop": ("an initial coordinate between the hard stops", "move the joint, or remove limit_restitution"),
+    "no scale": ("a stiffness, since the scene gives no time scale for a default", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
-    "convex mesh": ("an STL file of a convex body", "take its convex hull, or several convex pieces"),
+    "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),
     "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}, mesh", "a surface has exactly one shape"),
-    "surface pair": ("a pair of shapes that can touch: {pairs}", "list the contacts that are meant, or take others"),
-    "two exponents": ("one exponent", "give both surfaces the same, or the contact its own"),
+    "surface pair": ("a pair of shapes that can touch: {pairs}", "list the pairs in contacts, or use other shapes"),
+    "two exponents": ("one exponent", "give both surfaces the same exponent, or one to the contact"),
     "no stiffness": (
-        "the stiffness of one surface or of the contact, or the restitution of hard ones",
+        "a stiffness of a surface or of the contact, or a restitution of both surfaces or the contact",
         "add one of these keys",
     ),
-    "hard and soft": ("stiffness or restitution", "what is hard has no {soft}: take one of both out"),
+    "hard and soft": ("stiffness or restitution", "hard contacts have no {soft}: remove one of the two"),
     "hard overlap": (
-        "hard surfaces that do not overlap at the start",
+        "hard surfaces without initial overlap",
         "move one of the bodies, or give one of the surfaces a stiffness",
     ),
-    "mesh": ("a file in the scene's folder or below", "move it there, and give its path from the scene file"),
+    "mesh": ("a file in the scene's folder or below", "move it there, and write its path relative to the scene file"),
     "mesh kind": ("a mesh that ends in one of {known}", "convert it to one of these"),
-    "both shapes": ("either shape or shapes", "take one of the two out"),
-    "density": ("density without mass and inertia", "leave out mass and inertia, or density"),
+    "both shapes": ("either shape or shapes", "remove one of the two"),
+    "density": ("density without mass and inertia", "remove mass and inertia, or density"),
     "density shape": ("box, sphere or cylinder shapes", "give mass and inertia, or such shapes"),
     "centre": (
         "shapes whose common centre of mass is the origin of the body's frame",
@@ -165,122 +162,127 @@ TEXTS: dict[str, tuple[str, str]] = {
     "shape": ("one of box, sphere, cylinder, mesh", "a shape has exactly one of these keys"),
     # bodies
     "quaternion": ("a unit quaternion [w, x, y, z] to 1e-6", "divide it by its norm"),
-    "inertia indefinite": (
-        "no negative principal moment",
-        'correct the tensor, or set assembly.inertia = "warn"',
-    ),
+    "inertia indefinite": ("no negative principal moment", 'correct the tensor, or set assembly.inertia = "warn"'),
     "inertia triangle": (
         "no principal moment above the sum of the two others",
         'correct the tensor, or set assembly.inertia = "warn"',
     ),
     "inertia singular": (
         "positive principal moments",
-        'give it some inertia about every axis, or set assembly.inertia = "nearest"',
+        'give it inertia about every axis, or set assembly.inertia = "nearest"',
     ),
     "inertia kept": (
-        "those of a distribution of mass",
-        'kept; inertia "nearest" would take the nearest possible ones',
+        "moments of a possible mass distribution",
+        'kept; inertia "nearest" takes the nearest possible ones',
     ),
-    "inertia nearest": ("those of a distribution of mass", "took the nearest possible ones: {taken}"),
-    "inertia zero": ("positive principal moments", "took those below {least:.3g} kg m² as this"),
-    "mass zero": ("a mass that has this inertia, or inertia 0", "took {mass:.3g} kg"),
+    "inertia nearest": ("moments of a possible mass distribution", "replaced by the nearest possible ones: {taken}"),
+    "inertia zero": ("positive principal moments", "moments below {least:.3g} kg m² are replaced by it"),
+    "mass zero": ("a mass for this inertia, or inertia 0", "replaced by {mass:.3g} kg"),
     "massless": ("0 for a body of mass 0", "give it a mass, or inertia = [0, 0, 0]"),
     # joints
     "same body": ("two different bodies", "a joint connects two bodies, or a body and the ground"),
-    "both places": ("either at and axis, or frame1 and frame2", "take one of the two ways out"),
+    "both places": ("either at and axis, or frame1 and frame2", "remove one of the two pairs"),
     "no place": ("{what}", "give at and axis, or frame1 and frame2"),
     "direction": ("a direction of non-zero length", "correct the vector"),
-    "xaxis": ("a direction that is not along axis", "take another xaxis, or none"),
-    "parallel": ("a direction that is not along {other}", "the two axes of a universal joint must differ"),
+    "xaxis": ("a direction not parallel to axis", "choose another xaxis, or remove it"),
+    "parallel": ("a direction not parallel to {other}", "the two axes of a universal joint must differ"),
     "only universal": ("no axis2 for a {kind} joint", "axis2 belongs to universal joints only"),
     "only screw": ("no pitch for a {kind} joint", "pitch belongs to screw joints only"),
-    "xaxis with frames": ("no xaxis beside frame1 and frame2", "the frames give the x axis"),
+    "xaxis with frames": ("no xaxis together with frame1 and frame2", "remove it; the frames define the x axis"),
     "friction shape": ("a number, {d} numbers, or a symmetric {d} by {d} matrix", "correct the value"),
-    "friction sign": ("a symmetric, positive semidefinite matrix", "friction may not produce energy"),
+    "friction sign": ("a symmetric, positive semidefinite matrix", "friction cannot produce energy; correct the value"),
     "friction asymmetric": ("a symmetric matrix", "make entry [i][j] equal to entry [j][i]"),
     "rest rotation": ("rest 0 on a rotation vector", "turn frame1 or frame2 instead"),
     "motion freedoms": (
         "a joint with one degree of freedom",
         "motion prescribes a single rate; this joint has {d} degrees of freedom",
     ),
-    "armature": ("inertia of a joint with one degree of freedom whose motion is free", "give it to another joint"),
-    "motor joint": ("a joint with one degree of freedom whose motion is free", "name another joint"),
-    "gear freedoms": ("a joint with one degree of freedom", "tie other joints to each other"),
+    "armature": (
+        "0, or a joint with one degree of freedom and no prescribed motion",
+        "remove armature, or choose another joint",
+    ),
+    "motor joint": ("a joint with one degree of freedom and no prescribed motion", "name another joint"),
+    "gear freedoms": ("a joint with one degree of freedom", "choose other joints"),
     "gear joints": ("different joints", "name each joint once"),
-    "gear ratio": ("{count} numbers, one for each joint, of gears but the first", "give as many"),
-    "gear rates": ("the first rate, of {first}, at {rate:.6g}", "give rates that the gear ties together"),
+    "gear ratio": (
+        "{count} numbers: one for each joint; of a gear, one for each joint after the first",
+        "correct the number of entries",
+    ),
+    "gear rates": ("a rate of {first} of {rate:.6g}", "correct the initial rates; they must satisfy the gear"),
     "unknown joint": ("a joint of the scene", "{hint}"),
-    "motion and drive": ("either motion or drive", "a prescribed rate leaves nothing for a drive to do"),
+    "motion and drive": (
+        "either motion or drive",
+        "remove one of the two; a drive has no effect on a prescribed motion",
+    ),
     "motion form": (
         "rate, or polynomial, or amplitude and frequency (and phase), or times and displacements",
         "give the keys of one form",
     ),
     "motion number": ("{expected}", "correct the value"),
-    "motion rate": ("{motion}, the prescribed rate", "take rate out, or make it equal to the motion's at the start"),
-    "coordinate at": (
-        "0 where at and axis are given",
-        "give frame1 and frame2 to start at another coordinate",
-    ),
+    "motion rate": ("{motion}, the prescribed initial rate", "remove rate, or make it equal to this"),
+    "coordinate at": ("0 where at and axis are given", "give frame1 and frame2 to start at another coordinate"),
     # beams and loads
     "section": (
         "either EA, GA, GJ, EI, rhoA, rhoI, or one of circle, tube, rectangle with E, nu, rho",
-        "give the one or the other, complete",
+        "give all keys of one of the two forms",
     ),
     "tube": ("an inner radius below the outer one", "give the outer radius first"),
     "beam place": ("either from and to, or points", "give one of the two"),
-    "beam points": ("a point away from the one before", "take it out, or move it"),
-    "beam elements": ("a multiple of the {segments} segments, at most {most}", "there is a node at every point"),
-    "beam heat": ("no heat beside thermal, where each element warms itself", "take one of them out"),
-    "rod radius": ("a radius, for the section is no circle and no tube", "say how thick the rod is where it touches"),
-    "rod expansion": ("0 for {rod}, which does not stretch", "take reissner"),
-    "rod order": ("2 for {rod}", "elements of order 4 stretch and shear"),
-    "rod strain": ("0 where {rod} takes no strain", "kirchhoff takes torsion and bending, a string takes none"),
-    "string damping": ("0 for a string, which does not resist bending", "take kirchhoff"),
-    "up": ("a direction along no tangent of the beam", "give another up"),
-    "load ground": ("a body", "loads on the ground do nothing"),
-    "tendon points": ("{count} points, one in each of its bodies", "give as many"),
-    "tendon bodies": ("two different bodies after each other", "route it from one body to another"),
-    "slack damping": ("0 of a tendon with slack", "leave out one of the two; joints and bodies may have friction"),
+    "beam points": ("a point different from the previous one", "remove it, or move it"),
+    "beam elements": (
+        "a multiple of the {segments} segments, at most {most}",
+        "every point is a node; change the number",
+    ),
+    "beam heat": ("either heat or thermal, which has a thermal node for each element", "remove one of the two"),
+    "rod radius": (
+        "a radius, since the section is neither a circle nor a tube",
+        "add the radius of the contact surface",
+    ),
+    "rod expansion": ("0 for {rod}, which is inextensible", 'use rod = "reissner"'),
+    "rod order": ("2 for {rod}", "only reissner has elements of order 4"),
+    "rod strain": (
+        "0 for the strains that {rod} does not have",
+        "kirchhoff has torsion and bending, a string has none",
+    ),
+    "string damping": ("0 for a string, which has no bending stiffness", 'use rod = "kirchhoff"'),
+    "up": ("a direction not parallel to any tangent of the beam", "choose another up"),
+    "load ground": ("a body", "choose a body; loads on the ground have no effect"),
+    "tendon points": ("{count} points, one for each body", "correct the number of points"),
+    "tendon bodies": ("a segment between two different bodies", "route it from one body to another"),
+    "slack damping": ("0 for a tendon with slack", "remove one of the two; joints may have friction"),
     "actuator target": ("either joints or a tendon", "give one of the two"),
     "unknown tendon": ("a tendon of this file", "{hint}"),
     "same ends": ("two different points or nodes", "correct one of the two"),
     # assembly
     "gap": ("gaps below {limit}", "correct {who}, or set assembly.adjust = true"),
     "velocity": ("residuals below {limit}", "correct the velocities of {who}, or set assembly.adjust = true"),
-    "rate differs": ("{actual}, that of the bodies", "take rate out, or correct the velocities of {who}"),
+    "rate differs": (
+        "{actual}, as the velocities of the bodies give it",
+        "remove rate, or correct the velocities of {who}",
+    ),
     "motion differs": (
         "{motion}, the prescribed rate",
         "correct the velocities of {who}, or set assembly.adjust = true",
     ),
     "nearly movable": (
-        "one that moves with gaps below {limit} of its length, or does not move",
-        "align the axes of its joints, or leave out what holds it",
+        "a mechanism that moves with gaps below {limit} of its length, or does not move",
+        "align the axes of its joints, or remove the constraint that blocks it",
     ),
     "no assembly": (
         "positions that close every loop",
-        "no consistent state is near; correct the positions of {who}",
+        "no consistent state was found nearby; correct the positions of {who}",
     ),
-    "no motion": (
-        "velocities that satisfy the joints",
-        "the prescribed rates contradict each other; correct them",
-    ),
+    "no motion": ("velocities that satisfy the joints", "the prescribed rates contradict each other; correct them"),
     # numbers by path
-    "unknown parameter": ("a number of the scene, by its path", "{hint}"),
-    "entry": ("an entry {shape}", "give the index of one number"),
-    "one number": ("one number for all degrees of freedom", "vary its entries one by one"),
+    "unknown parameter": ("the path of a number of the scene", "{hint}"),
+    "entry": ("an entry {shape}", "give the index of one entry"),
+    "one number": ("the same number for all degrees of freedom", "vary its entries one by one"),
     "held velocity": ("a free body", "vary the rate of a joint instead: joints.{joint}.rate"),
     # states
     "unknown state": ("a {what} of the scene", "{hint}"),
     "state length": ("{what}", "give one number per degree of freedom, in the order of the degrees of freedom"),
-    "no time": (
-        "one of the solution's times, {first:g} to {last:g}",
-        "save the solution at this time (save_at)",
-    ),
+    "no time": ("one of the solution's times, {first:g} to {last:g}", "save the solution at this time (save_at)"),
 }
-
-
-_LONGEST = 600
-_NEAR_LETTERS, _NEAR_NAMES = 80, 500
 
 
 def fault(code: str, key: str, found: object, **values: Any) -> Fault:
@@ -289,25 +291,6 @@ def fault(code: str, key: str, found: object, **values: Any) -> Fault:
     key = legible(key)
     words = {name: legible(value) if isinstance(value, str) else value for name, value in values.items()}
     return Fault(key, legible(str(found)), expected.format(key=key, **words), advice.format(key=key, **words))
-
-
-def legible(text: str) -> str:
-    """A text abbreviated in the middle where it is long, with control characters escaped."""
-    if len(text) > _LONGEST:
-        text = f"{text[:200]}… ({len(text)} letters) …{text[-60:]}"
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
-
-
-def nearest_name(name: str, known: Iterable[str]) -> str | None:
-    """The known name nearest to a misspelled one, if any is near; among many names none is looked for."""
-    from difflib import get_close_matches
-
-    names = [other for other in known if len(other) <= _NEAR_LETTERS]
-    if len(name) > _NEAR_LETTERS or len(names) > _NEAR_NAMES:
-        return None
-    return next(iter(get_close_matches(name, names, n=1, cutoff=0.6)), None)
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
@@ -320,6 +303,13 @@ def listing(names: Iterable[str], limit: int = 12) -> str:
     """The first names, for a message."""
     known = nsmallest(limit + 1, names)
     return ", ".join(known[:limit]) + (", …" if len(known) > limit else "") if known else "nothing"
+
+
+def unknown(kind: str, key: str, name: str, known: Iterable[str]) -> Fault:
+    """The fault of a reference to an element that is not there."""
+    names = list(known)
+    hint = did_you_mean(name, names, f"there are: {listing(names)}")
+    return fault(f"unknown {kind}", key, f'"{name}"', hint=hint)
 
 
 def unknown_name(what: str, name: str, known: Iterable[str], scene: str = "scene") -> SceneError:

@@ -5,22 +5,18 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
-from ephs.mechanics.scene.model import ELEMENTS, GROUND, IDENTITY_POSE, Joint, Scene, World, frozen
+from ephs.mechanics.scene.model import ELEMENTS, GROUND, IDENTITY_POSE, Joint, Scene, World, frozen, mapped
 from ephs.mechanics.scene.motions import changed, number_of_law
 from ephs.mechanics.scene.surfaces import Contact
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import INERTIA
-
-__all__ = ["FIELDS", "Field", "placed"]
-
-Array = NDArray[np.float64]
 
 
 def _sound(_scene: Scene, _name: str, _before: Scene) -> list[Fault]:
@@ -117,9 +113,8 @@ def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
 def _world(key: str) -> Field:
     """A number of the world, which is the same in all parts."""
 
-    def put(scene: Scene, name: str, values: Array) -> Scene:
-        world = replace(scene.world, **{key: frozen(values) if values.ndim else float(values)})
-        return replace(scene, world=world, parts={n: put(part, name, values) for n, part in scene.parts.items()})
+    def put(scene: Scene, _: str, values: Array) -> Scene:
+        return mapped(scene, {}, replace(scene.world, **{key: frozen(values) if values.ndim else float(values)}))
 
     return Field(lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), put, World.numbers[key].least)
 

@@ -1,18 +1,13 @@
 """Resolved beams, tendons and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import ClassVar, final
+from typing import Annotated, final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ephs.mechanics.scene.element import NON_NEGATIVE, Element, Measured, Number
-
-__all__ = ["Beam", "Load", "Strain", "Tendon"]
-
-Array = NDArray[np.float64]
+from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Element, Measured, Named, Number, frozen
+from ephs.semantics.bundle import Array
 
 
 @final
@@ -31,16 +26,10 @@ class Strain(Measured):
     order : 2, the strain is the same all along, or 4, the stress is in balance; see `elements.strain`
     """
 
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "length": Number(length=1),
-        "stiffness": Number(energy=1, length=-1, head=1, ahead=3, count=6),
-        "rest": Number(head=-1, ahead=3, count=6),
-        "damping": Number(time=1),
-    }
-    length: float
-    stiffness: Array
-    rest: Array
-    damping: float = 0.0
+    length: Annotated[float, Number(length=1)]
+    stiffness: Annotated[Array, Number(energy=1, length=-1, head=1, ahead=3, count=6)]
+    rest: Annotated[Array, Number(head=-1, ahead=3, count=6)]
+    damping: Annotated[float, Number(time=1)] = 0.0
     order: int = 2
 
 
@@ -56,10 +45,9 @@ class Beam(Element):
     lengths : of the elements in m, where these are spherical joints between rigid pieces
     """
 
-    names: ClassVar[Mapping[str, str]] = {"ends": "end"}
     name: str
     elements: int
-    ends: tuple[str, str]
+    ends: Annotated[tuple[str, str], Named("end")]
     outline: tuple[float, ...]
     lengths: tuple[float, ...] = ()
 
@@ -79,29 +67,23 @@ class Beam(Element):
 class Tendon(Element):
     """A tendon without mass, straight from point to point of bodies, through which it slides.
 
-    Attributes
-    ----------
-    bodies : what carries its points, in their order
-    points : (n, 3) in the bodies' centre-of-mass frames (ground: world), m
-    stiffness, length, damping : of the whole: N/m, m without force, N s/m
-    slack : whether it exerts no elastic force where it is shorter
-    heat : where the heat of damping goes
+    ``points`` (n, 3) in m are one in each body, in its centre-of-mass frame (ground: world).
     """
 
-    names: ClassVar[Mapping[str, str]] = {"bodies": "body", "heat": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "stiffness": Number(energy=1, length=-2, least=NON_NEGATIVE),
-        "length": Number(length=1, least=NON_NEGATIVE),
-        "damping": Number(energy=1, time=1, length=-2, least=NON_NEGATIVE),
-    }
     name: str
-    bodies: tuple[str, ...]
+    bodies: Annotated[
+        tuple[str, ...],
+        Named("body"),
+        'what carries its points, in their order; the tension is the input "actuators.NAME", in N',
+    ]
     points: Array
-    stiffness: float
-    length: float
-    damping: float
-    slack: bool
-    heat: str
+    stiffness: Annotated[float, Number(energy=1, length=-2, least=NON_NEGATIVE), "N/m"] = 0.0
+    length: Annotated[float, Number(length=1, least=NON_NEGATIVE), "without force, m; default: as at the start"] = 0.0
+    damping: Annotated[float, Number(energy=1, time=1, length=-2, least=NON_NEGATIVE), "N s/m; 0 of one with slack"] = (
+        0.0
+    )
+    slack: Annotated[bool, "no elastic force where it is shorter than its length: a cable"] = False
+    heat: Annotated[str, Named("node"), "where the heat goes: a thermal name"] = ENVIRONMENT
 
     @property
     def segments(self) -> list[tuple[tuple[str, Array], tuple[str, Array]]]:
@@ -119,20 +101,17 @@ class Tendon(Element):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Load(Element):
-    """A force (3,) in N and a moment (3,) in N m on a body's centre of mass, which grow over ``ramp`` seconds.
+    """A force and a moment on a body's centre of mass."""
 
-    In world axes; those of a follower are in the axes of the body.
-    """
-
-    names: ClassVar[Mapping[str, str]] = {"body": "body"}
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "force": Number(energy=1, length=-1, count=3),
-        "moment": Number(energy=1, count=3),
-        "ramp": Number(time=1, least=NON_NEGATIVE),
-    }
     name: str
-    body: str
-    force: Array
-    moment: Array
-    follower: bool = False
-    ramp: float = 0.0
+    body: Annotated[str, Named("body"), "body; the load acts at its centre of mass"]
+    force: Annotated[Array, Number(energy=1, length=-1, count=3), "force in world axes, N"] = field(
+        default_factory=lambda: frozen([0.0, 0.0, 0.0])
+    )
+    moment: Annotated[Array, Number(energy=1, count=3), "moment in world axes, N m"] = field(
+        default_factory=lambda: frozen([0.0, 0.0, 0.0])
+    )
+    follower: Annotated[bool, "force and moment are given in body axes and turn with the body"] = False
+    ramp: Annotated[float, Number(time=1, least=NON_NEGATIVE), "time over which the load grows linearly from 0, s"] = (
+        0.0
+    )

@@ -8,17 +8,15 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.model import IDENTITY_POSE, Joint
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.codes import SE3 as SE3_CODE
 from ephs.semantics.spaces.codes import SO3 as SO3_CODE
 from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.spaces.rank import ALIGNED, DIRECTION
-
-Array = NDArray[np.float64]
 
 UNIVERSAL = "universal"
 # Pairs whose degrees of freedom do not depend on the direction of the joint axes.

@@ -15,8 +15,6 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 if TYPE_CHECKING:
     from ephs.semantics.bundle import Array
 
-__all__ = ["mass_and_moments"]
-
 
 def mass_and_moments(table: Checked[BodyEntry], key: str, faults: list[Fault]) -> tuple[float, list[float]] | None:
     """Mass, and inertia as xx yy zz [xy xz yz], of a body, specified or by its shapes; None after a fault.

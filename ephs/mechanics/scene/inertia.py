@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.values import TOLERANCE
-
-Array = NDArray[np.float64]
+from ephs.semantics.bundle import Array
 
 TINY = 1e-11
 """Kinetic energy is a function of momentum only where no principal moment is zero: one that is counts as this much of

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.model import IDENTITY_POSE
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
-
-Array = NDArray[np.float64]
 
 
 @final

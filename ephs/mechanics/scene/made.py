@@ -17,8 +17,6 @@ from ephs.mechanics.scene.model import ENVIRONMENT, Body, Joint, Spring
 from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
 
-__all__ = ["Made", "spring_system"]
-
 NOT_OF_SYSTEM = frozenset(
     {"name", "body1", "body2", "heat", "drive", "motion", "coordinate", "rate", "armature"}
 )  # fmt: skip

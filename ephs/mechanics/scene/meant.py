@@ -13,18 +13,16 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.adjust import across_rows, project_velocities
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap
-from ephs.mechanics.scene.model import Joint, Scene, frozen
+from ephs.mechanics.scene.model import Scene, frozen, mapped
 from ephs.mechanics.scene.state import Snapshot, rebuilt
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of
 from ephs.solve.threads import in_one_thread
-
-Array = NDArray[np.float64]
 
 STRIDE, STRIDES = 0.2, 5
 """Steps of the finite motion that is tried, in rad or parts of the mechanism's length, and their number each way."""
@@ -64,7 +62,8 @@ def as_meant(scene: Scene) -> tuple[Scene, str, list[Fault]]:
     shifts = [SE3.log(SE3.compose(SE3.inverse(a.frame2), b.frame2)) for a, b in zip(links, exact, strict=True)]
     by = float(np.abs(shifts).max())
     frames = {link.name: link.frame2 for link in exact}
-    out = rebuilt(_framed(scene, "", frames), now, poses, now.twists if twists is None else twists, xs)
+    framed = mapped(scene, {"joints": lambda path, j: replace(j, frame2=frozen(frames[path + j.name]))})
+    out = rebuilt(framed, now, poses, now.twists if twists is None else twists, xs)
     return out, f"joint frames are moved by up to {by:.1g} m or rad, so that the mechanism moves as it is meant to", []
 
 
@@ -190,14 +189,3 @@ def _stiffest(links: Sequence[Link], poses: Array, ways: Array, scale: Scale) ->
     """The joint with the largest residual along these motions."""
     opened = [float(np.abs(rows @ ways.T).max(initial=0.0)) for _, rows in _rows(links, poses, scale)]
     return links[int(np.argmax(opened))].name
-
-
-def _framed(scene: Scene, path: str, frames: dict[str, Array]) -> Scene:
-    def joint(j: Joint) -> Joint:
-        return replace(j, frame2=frozen(frames[path + j.name]))
-
-    return replace(
-        scene,
-        joints={name: joint(j) for name, j in scene.joints.items()},
-        parts={name: _framed(part, f"{path}{name}.", frames) for name, part in scene.parts.items()},
-    )

@@ -4,8 +4,8 @@ Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; twists are 6-vectors (angular,
 frame. All arrays are read-only. Nothing here knows of files; `load` makes these values from them.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar, final
 
 from numpy.typing import ArrayLike
@@ -35,6 +35,7 @@ __all__ = [
     "World",
     "free_joint",
     "frozen",
+    "mapped",
 ]
 
 T = TypeVar("T")
@@ -242,6 +243,22 @@ ELEMENTS: Mapping[str, type[Element]] = {
     **attached.ATTACHED,
 }
 """Sections of a scene -> what stands in them."""
+
+
+def mapped(
+    scene: Scene, changes: Mapping[str, Callable[[str, Any], Any]], world: World | None = None, path: str = ""
+) -> Scene:
+    """The scene with its elements changed, parts included, and in another world where one is given.
+
+    ``changes`` has, by section, a function that gives the changed element from the path of its level, empty or with a
+    dot at its end, and the element.
+    """
+    made: dict[str, Any] = {
+        section: {name: change(path, each) for name, each in getattr(scene, section).items()}
+        for section, change in changes.items()
+    }
+    parts = {name: mapped(part, changes, world, f"{path}{name}.") for name, part in scene.parts.items()}
+    return replace(scene, parts=parts, world=world or scene.world, **made)
 
 
 def _find(values: Mapping[str, T], name: str, what: str) -> T:

@@ -9,8 +9,6 @@ from ephs.mechanics.scene.schema import MotionEntry
 from ephs.solve.errors import OptionError
 from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
 
-__all__ = ["changed", "first_rate", "law_from", "law_of", "number_of_law"]
-
 STILL: Final = PolynomialMotion((0.0,))
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "rate": ("rate",),

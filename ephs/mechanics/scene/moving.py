@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.flexible import Load, Tendon
-from ephs.mechanics.scene.model import GROUND, Body, Joint, Marker, Scene, Spring, World, frozen
-from ephs.semantics.spaces import SE3
+from ephs.mechanics.scene.model import GROUND, Scene, Spring, World, frozen, mapped
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces import rotations as so3
-
-Array = NDArray[np.float64]
 
 
 def moved(scene: Scene, pose: Array, world: World) -> Scene:
@@ -25,43 +23,32 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
     def point(body: str, position: Array) -> Array:
         return frozen(so3.quaternion_to_matrix(pose[:4]) @ position + pose[4:]) if body == GROUND else position
 
-    def body(b: Body) -> Body:
-        return replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose))))
-
-    def joint(j: Joint) -> Joint:
-        return replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2))
-
-    def spring(s: Spring) -> Spring:
-        return replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2))
-
-    def load(x: Load) -> Load:
+    def load(_: str, x: Load) -> Load:
         turn = np.eye(3) if x.follower else so3.quaternion_to_matrix(pose[:4])
         return replace(x, force=frozen(turn @ x.force), moment=frozen(turn @ x.moment))
 
-    def tendon(t: Tendon) -> Tendon:
+    def tendon(_: str, t: Tendon) -> Tendon:
         return replace(t, points=frozen([point(body, at) for body, at in zip(t.bodies, t.points, strict=True)]))
 
-    def marker(m: Marker) -> Marker:
-        return replace(m, at=point(m.body, m.at))
-
-    return replace(
+    return mapped(
         scene,
-        world=world,
-        loads={name: load(x) for name, x in scene.loads.items()},
-        tendons={name: tendon(t) for name, t in scene.tendons.items()},
-        markers={name: marker(m) for name, m in scene.markers.items()},
-        bodies={name: body(b) for name, b in scene.bodies.items()},
-        joints={name: joint(j) for name, j in scene.joints.items()},
-        springs={name: spring(s) for name, s in scene.springs.items()},
-        surfaces={name: replace(s, frame=frame(s.body, s.frame)) for name, s in scene.surfaces.items()},
-        parts={name: moved(part, pose, world) for name, part in scene.parts.items()},
+        {
+            "loads": load,
+            "tendons": tendon,
+            "markers": lambda _, m: replace(m, at=point(m.body, m.at)),
+            "bodies": lambda _, b: replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose)))),
+            "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
+            "springs": lambda _, s: replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2)),
+            "surfaces": lambda _, s: replace(s, frame=frame(s.body, s.frame)),
+        },
+        world,
     )
 
 
 def spring_length(scene: Scene, spring: Spring) -> float:
     """The distance of a spring's two points."""
     ends = [
-        at if name == GROUND else SE3.compose(scene.body(name).pose, np.concatenate(([1.0, 0.0, 0.0, 0.0], at)))[4:]
+        at if name == GROUND else SE3.compose(scene.body(name).pose, translation(at))[4:]
         for name, at in ((spring.body1, spring.at1), (spring.body2, spring.at2))
     ]
     return float(np.linalg.norm(ends[0] - ends[1]))

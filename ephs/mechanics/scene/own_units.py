@@ -30,8 +30,6 @@ from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.result.record import Record
 from ephs.solve.watching import Progress
 
-__all__ = ["SI", "Units", "in_own_units", "mobility_of", "seen_from", "units_of_states"]
-
 NEAR = 16, 20, 20
 """Powers of two that one unit of length, mass and time is from the next: within the first ones from m, kg and s, runs
 are in these. At half of it, all methods agree with runs in units of one to rounding, or to their tolerance."""

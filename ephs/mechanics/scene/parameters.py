@@ -16,18 +16,15 @@ from dataclasses import dataclass
 from typing import Any, TypeVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, listing
 from ephs.mechanics.scene.fields import FIELDS, Field, placed
 from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.system import Filling, System
 
-__all__ = ["names", "read", "varied"]
-
-Array = NDArray[np.float64]
 Model = TypeVar("Model", Scene, System)
 _INDEX = re.compile(r"((?:\[\d+\])*)$")
 

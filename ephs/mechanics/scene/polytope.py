@@ -6,8 +6,6 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["vertices_of"]
-
 MOST_BYTES = 20_000_000
 MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""

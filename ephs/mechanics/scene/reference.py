@@ -6,8 +6,6 @@ from typing import Any
 
 from ephs.mechanics.scene.schema import json_schema
 
-__all__ = ["TOP", "scene_tables"]
-
 TOP = "the file"
 """Name of the table of the keys at the top of a file."""
 

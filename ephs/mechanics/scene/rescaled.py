@@ -1,7 +1,6 @@
 """A scene in other units of length, mass and time: the same mechanism, all its numbers changed."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -9,11 +8,9 @@ from ephs.mechanics.scene.attached import Attachment
 from ephs.mechanics.scene.element import Element
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
-from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen
+from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.semantics.bundle import Array
-
-__all__ = ["element_units", "freedom_units", "rescaled"]
 
 
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:
@@ -23,14 +20,14 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
     """
     units = length, mass, time
 
-    def other(x: Element) -> Element:
+    def other(path: str, x: Element) -> Element:
         match x:
             case Joint():
                 return _joint(x, *units)
             case Attachment():
-                of = map(scene.joint, x.tied)
-                tied = tuple(float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of)
-                return x.rescaled(*units, tied or (length,))
+                of = (scene.joint(path + tied) for tied in x.tied)
+                own = tuple(float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of)
+                return x.rescaled(*units, own or (length,))
             case Tendon():
                 return replace(x.rescaled(*units), points=frozen(x.points * length))
             case Surface():
@@ -41,11 +38,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case _:
                 return x.rescaled(*units)
 
-    sections: dict[str, Any] = {
-        section: {name: other(x) for name, x in getattr(scene, section).items()} for section in ELEMENTS
-    }
-    parts = {name: rescaled(part, *units) for name, part in scene.parts.items()}
-    return replace(scene, world=scene.world.rescaled(*units), parts=parts, **sections)
+    return mapped(scene, dict.fromkeys(ELEMENTS, other), scene.world.rescaled(*units))
 
 
 def _joint(j: Joint, length: float, mass: float, time: float) -> Joint:

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.element import Element
+from ephs.mechanics.scene.element import Element, Measured
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Strain
@@ -22,12 +21,11 @@ from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.model import ELEMENTS, ENVIRONMENT, GROUND, Joint, Spring, World, frozen
 from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
-from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry, SpringEntry
+from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry
 from ephs.mechanics.scene.text import MESHES
 from ephs.mechanics.shapes.dry import Dry
+from ephs.semantics.bundle import Array
 from ephs.solve.motion_law import MotionLaw
-
-Array = NDArray[np.float64]
 
 
 @final
@@ -108,8 +106,7 @@ class Names:
 
 def resolve_world(document: Document) -> World | None:
     """The world of a file, or None where it has no [world]."""
-    w = document.world
-    return None if w is None else World(frozen(w.gravity), w.temperature, w.pressure)
+    return None if document.world is None else World(**attributes(World, document.world))
 
 
 def resolve_body(
@@ -212,7 +209,7 @@ def _dry(entry: JointEntry, d: int, key: str, faults: list[Fault]) -> Dry | None
     return Dry(found.coulomb, found.static, found.stribeck, found.slip)
 
 
-def resolve_spring(name: str, table: Checked[SpringEntry], names: Names, faults: list[Fault]) -> Spring:
+def resolve_spring(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> Spring:
     """A spring."""
     entry, key = table.entry, f"springs.{name}"
     _check_ends(table, key, names, faults)
@@ -220,7 +217,7 @@ def resolve_spring(name: str, table: Checked[SpringEntry], names: Names, faults:
     return Spring(name=name, body1=entry.bodies[0], body2=entry.bodies[1], **attributes(Spring, entry))
 
 
-def attributes(kind: type[Element], entry: Any, joints: int = 0) -> dict[str, Any]:
+def attributes(kind: type[Measured], entry: Any, joints: int = 0) -> dict[str, Any]:
     """The attributes of an element that are keys of its table, as it has them; ``joints``: to how many it is tied."""
     given: dict[str, Any] = {}
     for key in {each.name for each in fields(kind)} & set(type(entry).model_fields):  # pyright: ignore[reportArgumentType]

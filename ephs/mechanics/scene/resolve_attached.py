@@ -7,11 +7,9 @@ import numpy as np
 
 from ephs.mechanics.scene.attached import ATTACHED, Actuator, Attachment, Gear
 from ephs.mechanics.scene.entries import Checked, Document, shown
-from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.errors import Fault, fault, listing, unknown
 from ephs.mechanics.scene.model import Joint, Scene, frozen
 from ephs.mechanics.scene.resolve import Names, attributes
-
-__all__ = ["resolve_attached"]
 
 ROUNDED = 1e-12
 """Difference of initial rates that gears may leave, relative to what is added: theirs are written in decimals."""
@@ -66,8 +64,7 @@ def _check_target(key: str, entry: Any, scene: Scene, faults: list[Fault]) -> No
     if bool(entry.joints) == (entry.tendon is not None):
         faults.append(fault("actuator target", key, "both" if entry.joints else "neither"))
     elif entry.tendon is not None and entry.tendon not in known:
-        hint = did_you_mean(entry.tendon, known, f"there are: {listing(known)}")
-        faults.append(fault("unknown tendon", f"{key}.tendon", f'"{entry.tendon}"', hint=hint))
+        faults.append(unknown("tendon", f"{key}.tendon", entry.tendon, known))
 
 
 def _joints(
@@ -81,8 +78,7 @@ def _joints(
     for i, each in enumerate(tied):
         here, known = f"{key}.joints[{i}]" if several else f"{key}.joint", joints.get(each)
         if known is None:
-            hint = did_you_mean(each, joints, f"there are: {listing(joints)}")
-            faults.append(fault("unknown joint", here, f'"{each}"', hint=hint))
+            faults.append(unknown("joint", here, each, joints))
         elif known.dim != 1 or (kind is not Gear and known.motion is not None):
             faults.append(
                 fault("gear freedoms" if kind is Gear else "motor joint", here, f"{known.name}, {known.kind}")

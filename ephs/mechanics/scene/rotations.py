@@ -5,12 +5,10 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, TypeAdapter, WrapValidator
+from pydantic import TypeAdapter, WrapValidator
 from pydantic_core import PydanticCustomError
 
-from ephs.mechanics.scene.schema_numbers import Entry, Number, Quaternion, Vector
-
-__all__ = ["FORMS", "Rotation", "RotationEntry"]
+from ephs.mechanics.scene.schema_numbers import Entry, Number, Quaternion, Vector, key
 
 FORMS = "rpy, rpy_deg, or axis with angle or angle_deg"
 
@@ -21,11 +19,11 @@ _QUATERNION: TypeAdapter[list[float]] = TypeAdapter(Quaternion)
 class RotationEntry(Entry):
     """A rotation given by angles instead of a quaternion; one of rpy, rpy_deg, and axis with angle or angle_deg."""
 
-    rpy: Vector | None = Field(default=None, description="roll, pitch, yaw about the fixed axes x, y, z in turn, rad")
-    rpy_deg: Vector | None = Field(default=None, description="likewise, in degrees")
-    axis: Vector | None = Field(default=None, description="axis of rotation, of any length but 0")
-    angle: Number | None = Field(default=None, description="about axis, rad")
-    angle_deg: Number | None = Field(default=None, description="about axis, in degrees")
+    rpy: Vector | None = key("roll, pitch, yaw about the fixed axes x, y, z in turn, rad", None)
+    rpy_deg: Vector | None = key("likewise, in degrees", None)
+    axis: Vector | None = key("axis of rotation, of any length but 0", None)
+    angle: Number | None = key("about axis, rad", None)
+    angle_deg: Number | None = key("about axis, in degrees", None)
 
     def quaternion(self) -> list[float]:
         """Unit quaternion [w, x, y, z].

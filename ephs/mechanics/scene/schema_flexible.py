@@ -1,58 +1,44 @@
-"""Tables of beams, tendons and loads in scene files."""
+"""Tables of beams in scene files."""
 
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.schema_numbers import Entry, Flag, NonNegative, Number, Positive, Text, Vector
+from ephs.mechanics.scene.schema_numbers import Entry, Extents, NonNegative, Number, Positive, Sizes, Text, Vector, key
 from ephs.mechanics.scene.schema_touching import ContactLawEntry
 
 
 class SectionEntry(Entry):
     """``section``: numbers, or a shape with E, nu and rho."""
 
-    EA: Positive | None = Field(default=None, description="axial stiffness, N")
-    GA: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="shear stiffness along axes 2 and 3, N"
-    )
-    GJ: Positive | None = Field(default=None, description="torsional stiffness, N m²")
-    EI: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="bending stiffness about axes 2 and 3, N m²"
-    )
-    rhoA: Positive | None = Field(default=None, description="mass per length, kg/m")
-    rhoI: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
-        default=None, description="inertia per length about axes 1, 2, 3, kg m"
-    )
-    circle: Positive | None = Field(default=None, description="radius, m")
-    tube: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="outer and inner radius, m"
-    )
-    rectangle: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="width along axis 3 and height along axis 2, m"
-    )
-    E: Positive | None = Field(default=None, description="Young's modulus, N/m²")
-    nu: Annotated[Number, Field(gt=-1.0, le=0.5)] | None = Field(default=None, description="Poisson's ratio")
-    rho: Positive | None = Field(default=None, description="density, kg/m³")
+    EA: Positive | None = key("axial stiffness, N", None)
+    GA: Sizes | None = key("shear stiffness along axes 2 and 3, N", None)
+    GJ: Positive | None = key("torsional stiffness, N m²", None)
+    EI: Sizes | None = key("bending stiffness about axes 2 and 3, N m²", None)
+    rhoA: Positive | None = key("mass per length, kg/m", None)
+    rhoI: Extents | None = key("inertia per length about axes 1, 2, 3, kg m", None)
+    circle: Positive | None = key("radius, m", None)
+    tube: Sizes | None = key("outer and inner radius, m", None)
+    rectangle: Sizes | None = key("width along axis 3 and height along axis 2, m", None)
+    E: Positive | None = key("Young's modulus, N/m²", None)
+    nu: Annotated[Number, Field(gt=-1.0, le=0.5)] | None = key("Poisson's ratio", None)
+    rho: Positive | None = key("density, kg/m³", None)
 
 
 class RodHeatEntry(Entry):
     """``thermal`` of a beam: a store of heat for each element, and heat conduction between neighbours."""
 
-    capacity: Positive = Field(description="heat capacity per length, J/(m K)")
-    conduction: NonNegative = Field(default=0.0, description="conductivity times area, W m/K")
-    temperature: Positive = Field(description="initial temperature, K")
-    expansion: NonNegative = Field(default=0.0, description="coefficient of linear thermal expansion, 1/K")
-    reference: Positive | None = Field(
-        default=None, description="temperature without thermal stress, K; default: temperature"
-    )
+    capacity: Positive = key("heat capacity per length, J/(m K)")
+    conduction: NonNegative = key("conductivity times area, W m/K", 0.0)
+    temperature: Positive = key("initial temperature, K")
+    expansion: NonNegative = key("coefficient of linear thermal expansion, 1/K", 0.0)
+    reference: Positive | None = key("temperature without thermal stress, K; default: temperature", None)
 
 
 class RodSurfaceEntry(ContactLawEntry):
     """``surface`` of a beam: a capsule along each node's piece, which meets others and the pieces further on."""
 
-    radius: Positive | None = Field(
-        default=None, description="radius of the surface, m; default: that of a circle or tube"
-    )
+    radius: Positive | None = key("radius of the surface, m; default: that of a circle or tube", None)
 
 
 _Vector: TypeAlias = Vector | None
@@ -60,92 +46,34 @@ _Points: TypeAlias = Annotated[list[Vector], Field(min_length=2)] | None
 _Count: TypeAlias = Annotated[int, Field(strict=True, ge=1)] | None
 _Strain: TypeAlias = Annotated[list[Number], Field(min_length=6, max_length=6)] | None
 _BEAM: dict[str, Any] = {
-    "from": (_Vector, Field(default=None, description="start point, world coordinates, m")),
-    "to": (_Vector, Field(default=None, description="end point, world coordinates, m")),
-    "points": (
-        _Points,
-        Field(default=None, description="points on a curve, instead of from and to, with a node at each, m"),
-    ),
-    "up": (
-        _Vector,
-        Field(default=None, description="world direction of axis 2 of the section, made normal to the tangent"),
-    ),
-    "elements": (
-        _Count,
-        Field(
-            default=None,
-            description="number of elements, the same between any two points; 1 there unless given",
-        ),
-    ),
+    "from": (_Vector, key("start point, world coordinates, m", None)),
+    "to": (_Vector, key("end point, world coordinates, m", None)),
+    "points": (_Points, key("points on a curve, instead of from and to, with a node at each, m", None)),
+    "up": (_Vector, key("world direction of axis 2 of the section, made normal to the tangent", None)),
+    "elements": (_Count, key("number of elements, the same between any two points; 1 there unless given", None)),
     "order": (
         Literal[2, 4],
-        Field(
-            default=2,
-            description="order of convergence in the element length, for statics and for the motion of thin beams",
-        ),
+        key("order of convergence in the element length, for statics and for the motion of thin beams", 2),
     ),
     "rod": (
         Literal["reissner", "kirchhoff", "string"],
-        Field(
-            default="reissner",
-            description="kirchhoff: inextensible and without shear; string: also without bending and torsion",
-        ),
+        key("kirchhoff: inextensible and without shear; string: also without bending and torsion", "reissner"),
     ),
-    "section": (SectionEntry, Field(description="stiffness and inertia per length")),
-    "strain": (
-        _Strain,
-        Field(
-            default=None, description="initial strain: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3"
-        ),
-    ),
-    "damping": (NonNegative, Field(default=0.0, description="Kelvin–Voigt damping time, s")),
-    "heat": (Text, Field(default="environment", description="where the heat of damping goes: a thermal name")),
-    "thermal": (
-        RodHeatEntry | None,
-        Field(default=None, description="instead of heat: a thermal node NAME-i for each element"),
-    ),
+    "section": (SectionEntry, key("stiffness and inertia per length")),
+    "strain": (_Strain, key("initial strain: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3", None)),
+    "damping": (NonNegative, key("Kelvin–Voigt damping time, s", 0.0)),
+    "heat": (Text, key("where the heat of damping goes: a thermal name", "environment")),
+    "thermal": (RodHeatEntry | None, key("instead of heat: a thermal node NAME-i for each element", None)),
     "ends": (
         Annotated[list[Text], Field(max_length=2)],
-        Field(
-            default=[],
-            description='supports of the first and last node: a body to which it is welded, "ground" or "free"',
-        ),
+        key('supports of the first and last node: a body to which it is welded, "ground" or "free"', []),
     ),
     "surface": (
         RodSurfaceEntry | None,
-        Field(default=None, description="round surface for contact; each node NAME.i has a surface of that name"),
+        key("round surface for contact; each node NAME.i has a surface of that name", None),
     ),
-    "velocity": (_Vector, Field(default=None, description="velocity of the first node, world basis, m/s")),
-    "angular_velocity": (
-        _Vector,
-        Field(default=None, description="angular velocity of the whole beam, world basis, rad/s"),
-    ),
+    "velocity": (_Vector, key("velocity of the first node, world basis, m/s", None)),
+    "angular_velocity": (_Vector, key("angular velocity of the whole beam, world basis, rad/s", None)),
 }
-# a class cannot have `from` for a name
+# A class cannot have `from` as a name.
 BeamEntry: Any = create_model("BeamEntry", __base__=Entry, __doc__="``[beams.NAME]``", **_BEAM)
-
-
-class TendonEntry(Entry):
-    """``[tendons.NAME]``"""
-
-    bodies: Annotated[list[Text], Field(min_length=2)] = Field(
-        description='what carries its points, in their order; the tension is the input "actuators.NAME", in N'
-    )
-    points: Annotated[list[Vector], Field(min_length=2)] = Field(
-        description="one in each, in its centre-of-mass frame (ground: world), m"
-    )
-    stiffness: NonNegative = Field(default=0.0, description="N/m")
-    length: NonNegative | None = Field(default=None, description="without force, m; default: as at the start")
-    damping: NonNegative = Field(default=0.0, description="N s/m; 0 of one with slack")
-    slack: Flag = Field(default=False, description="no elastic force where it is shorter than its length: a cable")
-    heat: Text = Field(default="environment", description="where the heat goes: a thermal name")
-
-
-class LoadEntry(Entry):
-    """``[loads.NAME]``"""
-
-    body: Text = Field(description="body; the load acts at its centre of mass")
-    force: Vector = Field(default=[0.0, 0.0, 0.0], description="force in world axes, N")
-    moment: Vector = Field(default=[0.0, 0.0, 0.0], description="moment in world axes, N m")
-    follower: Flag = Field(default=False, description="force and moment are given in body axes and turn with the body")
-    ramp: NonNegative = Field(default=0.0, description="time over which the load grows linearly from 0, s")

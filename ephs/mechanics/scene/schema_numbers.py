@@ -34,6 +34,11 @@ Positive = Annotated[
     Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST),
     WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 0.0}),
 ]
+AboveOne = Annotated[
+    float,
+    Field(strict=True, allow_inf_nan=False, gt=1.0, le=LARGEST),
+    WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 1.0}),
+]
 Series = Annotated[list[Number], Field(min_length=1)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
@@ -41,6 +46,7 @@ Text = Annotated[str, Field(strict=True, min_length=1)]
 Flag = Annotated[bool, Field(strict=True)]
 Names = Annotated[list[Text], Field(min_length=2)]
 Pair = Annotated[list[Text], Field(min_length=2, max_length=2)]
+Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 
 
@@ -124,3 +130,8 @@ class Entry(BaseModel):
     """Base of all tables: unknown keys are faults."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def key(meaning: str, default: Any = ..., **more: Any) -> Any:
+    """A key of a table; it is required where it has no default."""
+    return Field(default=default, description=meaning, **more)

@@ -9,15 +9,12 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.schema_flexible import SectionEntry
+from ephs.semantics.bundle import Array
 
-__all__ = ["Section", "circle", "rectangle", "resolve_section", "tube"]
-
-Array = NDArray[np.float64]
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
 NEEDED = {"reissner": NUMBERS, "kirchhoff": ("GJ", "EI", "rhoA", "rhoI"), "string": ("rhoA",)}
 """Required numbers of each kind of rod; other numbers are optional."""

@@ -16,12 +16,10 @@ from ephs.mechanics.scene.element import OUTSIDE, Element
 from ephs.mechanics.scene.errors import ModelWarning, legible
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
-from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene
+from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.pairs import SIZES
 from ephs.operad import Path as Name
-
-__all__ = ["check_scene", "meshes_within"]
 
 Sizes: TypeAlias = dict[str, tuple[Any, tuple[int, ...]]]
 """Numbers with their required shapes."""
@@ -72,14 +70,10 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
         lost.append(str(file))
         return False
 
-    def kept(scene: Scene) -> Scene:
-        bodies = {
-            name: replace(body, shape=body.shape if near(body.shape) else None, shapes=tuple(filter(near, body.shapes)))
-            for name, body in scene.bodies.items()
-        }
-        return replace(scene, bodies=bodies, parts={name: kept(part) for name, part in scene.parts.items()})
+    def kept(_: str, body: Body) -> Body:
+        return replace(body, shape=body.shape if near(body.shape) else None, shapes=tuple(filter(near, body.shapes)))
 
-    found = kept(scene)
+    found = mapped(scene, {"bodies": kept})
     if lost:
         files = ", ".join(map(legible, sorted(set(lost))))
         warn(f"meshes outside of the file's folder and the working folder are not drawn: {files}", ModelWarning, 2)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
@@ -13,9 +13,10 @@ from ephs.mechanics.scene.assembly import gyration, measure
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
-from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.tree import spanning_hops
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -24,7 +25,6 @@ from ephs.solve.control import SLIVER
 MOVED = 1e-12
 """Least reported change of a body's state in m, rad, m/s, rad/s: rounding of poses of size one."""
 
-Array = NDArray[np.float64]
 
 # Largest joint displacement per closing of the loops, rad or m.
 STRIDE = 0.2
@@ -196,7 +196,16 @@ def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequen
     """The scene with its bodies in another configuration, its joints at these elements, rates to match."""
     bodies = {n: (frozen(q), frozen(u)) for n, q, u in zip(now.names, poses, twists, strict=True)}
     joints = {link.name: (frozen(x), frozen(link.slip(twists, x)[0])) for link, x in zip(now.links, xs, strict=True)}
-    return _put(scene, "", bodies, joints)
+
+    def body(path: str, b: Body) -> Body:
+        pose, twist = bodies[path + b.name]
+        return replace(b, pose=pose, twist=twist)
+
+    def joint(path: str, j: Joint) -> Joint:
+        coordinate, rate = joints[path + j.name]
+        return replace(j, coordinate=coordinate, rate=rate)
+
+    return mapped(scene, {"bodies": body, "joints": joint})
 
 
 def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
@@ -212,7 +221,8 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
         poses[i] = np.concatenate((body.quaternion[k], body.position[k]))
         twists[i] = body_twist(poses[i], body.velocity[k], body.angular_velocity[k])
     heat = {name: float(solution.thermal(name).temperature[k]) for name, _ in scene.all_thermal()}
-    return _warmed(rebuilt(scene, now, poses, twists, elements(now.links, poses)), "", heat)
+    there = rebuilt(scene, now, poses, twists, elements(now.links, poses))
+    return mapped(there, {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])})
 
 
 def _given(now: Snapshot, values: Mapping[str, ArrayLike], what: str, where: str) -> dict[str, Array]:
@@ -282,33 +292,3 @@ def _displacements(now: Snapshot, poses: Array, given: Array, twists: Array) -> 
         sizes = [float(np.linalg.norm(v)) for v in (poses[i, 4:] - now.poses[i, 4:], turn, speed, spin)]
         if max(sizes) > MOVED:
             yield Displacement(name, *sizes)
-
-
-def _put(
-    scene: Scene,
-    path: str,
-    bodies: Mapping[str, tuple[Array, Array]],
-    joints: Mapping[str, tuple[Array, Array]],
-) -> Scene:
-    def body(b: Body) -> Body:
-        pose, twist = bodies[path + b.name]
-        return replace(b, pose=pose, twist=twist)
-
-    def joint(j: Joint) -> Joint:
-        coordinate, rate = joints[path + j.name]
-        return replace(j, coordinate=coordinate, rate=rate)
-
-    return replace(
-        scene,
-        bodies={name: body(b) for name, b in scene.bodies.items()},
-        joints={name: joint(j) for name, j in scene.joints.items()},
-        parts={name: _put(part, f"{path}{name}.", bodies, joints) for name, part in scene.parts.items()},
-    )
-
-
-def _warmed(scene: Scene, path: str, heat: Mapping[str, float]) -> Scene:
-    return replace(
-        scene,
-        thermal={name: replace(node, temperature=heat[path + name]) for name, node in scene.thermal.items()},
-        parts={name: _warmed(part, f"{path}{name}.", heat) for name, part in scene.parts.items()},
-    )

@@ -2,18 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import Annotated, Any, final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ephs.mechanics.scene.element import POSE, Element, Number
+from ephs.mechanics.scene.element import POSE, Element, Named
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
+from ephs.semantics.bundle import Array
 
 __all__ = ["Contact", "Surface"]
-
-Array = NDArray[np.float64]
 
 
 @final
@@ -28,12 +24,10 @@ class Surface(Element):
     frame : (7,) pose in the body's centre-of-mass frame (ground: world)
     """
 
-    names: ClassVar[Mapping[str, str]] = {"body": "body"}
-    numbers: ClassVar[Mapping[str, Number]] = {"frame": POSE}
     name: str
-    body: str
+    body: Annotated[str, Named("body")]
     shape: Mapping[str, Any]
-    frame: Array
+    frame: Annotated[Array, POSE]
 
 
 @final
@@ -48,8 +42,7 @@ class Contact(Element):
     heat : where the heat goes, ``"environment"`` or the name of a thermal node
     """
 
-    names: ClassVar[Mapping[str, str]] = {"surfaces": "surface", "heat": "node"}
     name: str
-    surfaces: tuple[str, str]
+    surfaces: Annotated[tuple[str, str], Named("surface")]
     law: Law | Impact
-    heat: str
+    heat: Annotated[str, Named("node")]

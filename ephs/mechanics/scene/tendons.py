@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.elements.tendon import tendon
 from ephs.mechanics.scene.attached import Actuator
@@ -13,14 +13,10 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, frozen
 from ephs.mechanics.scene.resolve import Names
-from ephs.mechanics.scene.schema_flexible import TendonEntry
-from ephs.semantics.spaces import SE3
+from ephs.semantics.bundle import Array
+from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
-
-__all__ = ["resolve_tendons", "tendon_ports", "tendon_starts", "tendon_system", "with_pulls"]
-
-Array = NDArray[np.float64]
 
 
 def resolve_tendons(
@@ -36,7 +32,7 @@ def resolve_tendons(
     return found
 
 
-def _check(name: str, table: Checked[TendonEntry], names: Names, faults: list[Fault]) -> None:
+def _check(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
     entry, key = table.entry, f"tendons.{name}"
     if table.sound("heat"):
         names.check(entry.heat, f"{key}.heat", "thermal", faults)
@@ -52,7 +48,7 @@ def _check(name: str, table: Checked[TendonEntry], names: Names, faults: list[Fa
         faults.append(fault("tendon bodies", f"{key}.bodies", shown(entry.bodies)))
 
 
-def _resolved(name: str, entry: TendonEntry, poses: Mapping[str, Array], faults: list[Fault]) -> Tendon:
+def _resolved(name: str, entry: Any, poses: Mapping[str, Array], faults: list[Fault]) -> Tendon:
     places = [_place(body, np.array(at), poses) for body, at in zip(entry.bodies, entry.points, strict=True)]
     lengths = [float(np.linalg.norm(two - one)) for one, two in pairwise(places)]
     whole = sum(lengths)
@@ -68,11 +64,7 @@ def _resolved(name: str, entry: TendonEntry, poses: Mapping[str, Array], faults:
 
 
 def _place(body: str, at: Array, poses: Mapping[str, Array]) -> Array:
-    return at if body == GROUND else SE3.compose(poses[body], _frame(at))[4:]
-
-
-def _frame(at: Array) -> Array:
-    return np.concatenate([[1.0, 0.0, 0.0, 0.0], at])
+    return at if body == GROUND else SE3.compose(poses[body], translation(at))[4:]
 
 
 def with_pulls(
@@ -82,7 +74,7 @@ def with_pulls(
     pulls = dict(actuators)
     for name in tendons:
         if name not in document.sections["actuators"]:
-            pulls[name] = Actuator(name, (), frozen([-1.0]), None, tendon=name)
+            pulls[name] = Actuator(name, tendon=name, ratio=frozen([-1.0]))
         elif name in actuators and actuators[name].tendon != name:
             faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
     return pulls
@@ -110,7 +102,7 @@ def tendon_starts(of: Tendon, poses: Mapping[str, Array]) -> dict[str, Array]:
     out: dict[str, Array] = {}
     length = 0.0
     for k, ends in enumerate(of.segments, 1):
-        one, two = (SE3.compose(poses[body], _frame(at)) for body, at in ends)
+        one, two = (SE3.compose(poses[body], translation(at)) for body, at in ends)
         out[f"segment{k}.pe.q_r"] = SE3.normalise(SE3.compose(SE3.inverse(one), two))
         length += float(np.linalg.norm(two[4:] - one[4:]))
     if of.stiffness:

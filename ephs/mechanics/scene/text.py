@@ -4,8 +4,6 @@ from pathlib import Path
 
 from ephs.mechanics.scene.errors import Fault, fault
 
-__all__ = ["MESHES", "file_text"]
-
 MESHES = (".stl", ".obj", ".ply", ".glb", ".off")
 """Endings of files with a surface; of these, none unpacks an archive."""
 

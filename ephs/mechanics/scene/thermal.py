@@ -1,36 +1,28 @@
 """Stores of heat of a scene, and conduction between them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, final
+from typing import Annotated, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Element, Number
-
-__all__ = ["Conduction", "ThermalNode"]
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Element, Named, Number
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class ThermalNode(Element):
-    """A body of uniform temperature: capacity in J/K, initial temperature in K.
+    """A body of uniform temperature.
 
     One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the
     ``reference`` in K.
     """
 
-    numbers: ClassVar[Mapping[str, Number]] = {
-        "capacity": Number(energy=1, least=POSITIVE),
-        "temperature": Number(least=POSITIVE),
-        "pull": Number(energy=1, length=-1),
-        "reference": Number(),
-    }
     name: str
-    capacity: float
-    temperature: float
-    pull: float = 0.0
-    reference: float = 0.0
+    capacity: Annotated[float, Number(energy=1, least=POSITIVE), "heat capacity, J/K"]
+    temperature: Annotated[float, Number(least=POSITIVE), "initial temperature, K"]
+    pull: Annotated[float, Number(energy=1, length=-1)] = 0.0
+    reference: Annotated[float, Number()] = 0.0
 
     def temperature_of(self, states: Callable[[str], Any]) -> Any:
         """θ = θ₁ exp((s − κ e)/C) in K, of its states by name: numbers or arrays."""
@@ -41,10 +33,8 @@ class ThermalNode(Element):
 @final
 @dataclass(frozen=True, slots=True)
 class Conduction(Element):
-    """Heat conduction between two thermal nodes, or one and the environment; conductance in W/K."""
+    """Heat conduction between two thermal nodes, or one and the environment."""
 
-    names: ClassVar[Mapping[str, str]] = {"between": "node"}
-    numbers: ClassVar[Mapping[str, Number]] = {"conductance": Number(energy=1, time=-1, least=NON_NEGATIVE)}
     name: str
-    between: tuple[str, str]
-    conductance: float
+    between: Annotated[tuple[str, str], Named("node"), 'two thermal nodes, or one and "environment"']
+    conductance: Annotated[float, Number(energy=1, time=-1, least=NON_NEGATIVE), "thermal conductance, W/K"]

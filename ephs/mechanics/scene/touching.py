@@ -13,7 +13,7 @@ import numpy as np
 
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.entries import Checked, Document, shown
-from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.errors import Fault, fault, unknown
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
 from ephs.mechanics.scene.polytope import vertices_of
@@ -187,8 +187,7 @@ def resolve_contacts(
 def _known(table: Checked[ContactEntry], key: str, surfaces: Mapping[str, Surface], faults: list[Fault]) -> bool:
     for i, name in enumerate(table.entry.surfaces):
         if name not in surfaces:
-            hint = did_you_mean(name, list(surfaces), f"there are: {listing(surfaces)}")
-            faults.append(fault("unknown surface", f"{key}.surfaces[{i}]", f'"{name}"', hint=hint))
+            faults.append(unknown("surface", f"{key}.surfaces[{i}]", name, surfaces))
             return False
     return True
 

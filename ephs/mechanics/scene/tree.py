@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.mechanics.scene.kinematics import Link
+from ephs.operad.disjoint import DisjointSets
 
 
 @final
@@ -26,19 +27,10 @@ def spanning_hops(links: Sequence[Link], count: int, preferred: Container[str]) 
     Named links come into the tree before others, then those in front. A group of bodies without a way to
     the ground is reached from its first body, which no step leads to.
     """
-    leader = list(range(-1, count))
-
-    def find(body: int) -> int:
-        while leader[body + 1] != body:
-            body = leader[body + 1]
-        return body
-
+    sets = DisjointSets[int]()
     neighbours: dict[int, list[int]] = {body: [] for body in range(-1, count)}
     for number in sorted(range(len(links)), key=lambda i: links[i].name not in preferred):
-        first, second = find(links[number].body1), find(links[number].body2)
-        if first != second:
-            # The smaller number leads, so that the ground, or an island's first body, is the root.
-            leader[max(first, second) + 1] = min(first, second)
+        if sets.join(links[number].body1, links[number].body2):
             neighbours[links[number].body1].append(number)
             neighbours[links[number].body2].append(number)
 

@@ -3,12 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
-
-Array = NDArray[np.float64]
+from ephs.semantics.bundle import Array
 
 TOLERANCE = 1e-9
 QUATERNION_TOLERANCE = 1e-6

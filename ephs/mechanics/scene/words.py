@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
 
-__all__ = ["scene_html", "scene_text"]
-
 
 def scene_text(scene: "Scene") -> str:
     """Contents of a scene, a line each."""

@@ -24,8 +24,6 @@ from ephs.solve.threads import in_one_thread
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Gradient", "gradient"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -28,8 +28,6 @@ from ephs.solve.march import Status
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
 
-__all__ = ["ExplicitTangent"]
-
 WEIGHTS: Final = {
     "mass": np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
     **{f"inertia[{k}]": np.diag([float(k == i) for i in range(6)]) for k in range(3)},

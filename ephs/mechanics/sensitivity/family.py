@@ -29,8 +29,6 @@ from ephs.solve.problem import Problem
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["CENTRAL", "OUTER", "Family", "Parameter", "Stencil", "difference", "relation_of", "same_shape"]
-
 Stencil = tuple[tuple[int, float], ...]
 """Multiples of a step, and their weights in a first derivative."""
 CENTRAL: Stencil = ((-3, -1 / 60), (-2, 0.15), (-1, -0.75), (1, 0.75), (2, -0.15), (3, 1 / 60))

@@ -20,8 +20,6 @@ from ephs.solve.threads import in_one_thread
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Fit", "fit"]
-
 XTOL, FTOL, GTOL = 1e-9, 1e-12, 1e-14
 """Changes of parameters, of the sum of squares and its gradient, relative, at which a fit ends."""
 POSITIVE = ("mass", "friction", "stiffness", "damping", "length", "capacity", "temperature", "conductance")

@@ -29,8 +29,6 @@ from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
 
-__all__ = ["NaturalTangent"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,6 @@ from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.result.solution import Solution
 
-__all__ = ["Reading", "reading_of"]
-
 Reading = Callable[[Solution], Array]
 """(n,) or (n, d) of a solution with n instants."""
 

@@ -21,8 +21,6 @@ from ephs.solve.threads import in_one_thread
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["METHODS", "Sensitivity", "sensitivity"]
-
 RTOL, ATOL = 1e-9, 1e-11
 """Tolerances of runs that are differentiated: of the values and of their derivatives."""
 METHODS = ("rk54", "rk87", "natural")

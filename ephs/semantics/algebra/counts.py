@@ -9,8 +9,6 @@ from ephs.semantics.algebra.free import meaning
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.system import Filling
 
-__all__ = ["Cost", "cost", "counting"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

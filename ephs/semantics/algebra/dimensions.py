@@ -14,8 +14,6 @@ from ephs.operad.units import dimension
 from ephs.semantics.algebra.elimination import Row, eliminated, reduced
 from ephs.semantics.errors import SemanticsError
 
-__all__ = ["Unit", "Units", "units"]
-
 Unit: TypeAlias = Mapping[str, int | Fraction]
 """Exponents of base units, such as ``{"kg": 1, "m": 1, "s": -1}``."""
 Powers: TypeAlias = Mapping[Path, int] | Mapping[str, int]

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Any, final
 
-__all__ = ["Dual"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

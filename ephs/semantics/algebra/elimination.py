@@ -4,8 +4,6 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any, TypeAlias, TypeVar
 
-__all__ = ["Row", "eliminated", "reduced"]
-
 C = TypeVar("C", bound=Hashable)
 Row: TypeAlias = tuple[tuple[C, Fraction], ...]
 """A linear form that vanishes: unknown -> coefficient, no zeros, sorted."""

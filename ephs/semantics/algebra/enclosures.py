@@ -15,8 +15,6 @@ from ephs.operad.names import PathLike
 from ephs.semantics.algebra.rational import Coordinate, ExactRelation, exact_relations
 from ephs.semantics.errors import SemanticsError
 
-__all__ = ["GROUND", "Conductors", "Interval", "conduction", "intervals"]
-
 Node: TypeAlias = tuple[Path, int]
 """A port or junction, and the place in its vectors of flows and efforts."""
 Interval: TypeAlias = tuple[Fraction, Fraction]

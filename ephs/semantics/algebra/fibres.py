@@ -18,8 +18,6 @@ from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import Filling
 
-__all__ = ["Meaning", "meaning_of_systems", "relation_for", "relations"]
-
 Meaning: TypeAlias = Relation | Filling
 """A relation, or a system or primitive in place of its relation."""
 Values: TypeAlias = dict[Path, Array]

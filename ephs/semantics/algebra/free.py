@@ -7,8 +7,6 @@ from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
 from ephs.semantics.primitives import Primitive
 from ephs.semantics.system import Filling, System, as_system
 
-__all__ = ["flattening", "meaning", "systems"]
-
 T = TypeVar("T")
 
 

@@ -10,8 +10,6 @@ from ephs.operad.names import PathLike
 from ephs.semantics.algebra.fibres import Meaning, relation_for, relations
 from ephs.semantics.errors import SemanticsError
 
-__all__ = ["Corelation", "base", "corelations"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,6 @@ from typing import Any, Literal, TypeAlias, final
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Path, Pattern
 from ephs.semantics.algebra.elimination import Row, eliminated, reduced
 
-__all__ = ["Coordinate", "ExactRelation", "Number", "behaviour", "exact_relations", "midpoint"]
-
 Number: TypeAlias = int | Fraction
 Kind: TypeAlias = Literal["effort", "flow", "one", "rate", "state", "before", "after"]
 Coordinate: TypeAlias = tuple[Kind, Path, int]

@@ -15,8 +15,6 @@ from ephs.operad.links import closure
 from ephs.semantics.algebra.duals import Dual
 from ephs.semantics.errors import SemanticsError
 
-__all__ = ["Sharer", "State", "VectorField", "euler", "resource_sharers", "runge_kutta", "tangent"]
-
 State: TypeAlias = frozenset[Path]
 """A shared state, by the paths of its members."""
 Values: TypeAlias = Mapping[State, tuple[Any, ...]]

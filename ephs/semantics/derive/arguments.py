@@ -5,8 +5,6 @@ from typing import final
 
 from ephs.semantics.stage.memory import Vector
 
-__all__ = ["Arguments"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

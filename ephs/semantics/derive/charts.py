@@ -12,8 +12,6 @@ from ephs.semantics.spaces.vectors import Entries, Rows, add, apply, cross, dot,
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["moved", "over"]
-
 
 def moved(on: Evaluator, code: int, x: Entries, v: Entries) -> list[Real]:
     """x·exp(v), (size,)."""

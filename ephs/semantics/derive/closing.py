@@ -9,8 +9,6 @@ from ephs.semantics.spaces.vectors import Rows, add, apply, combine, dot, produc
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real
 
-__all__ = ["Closing"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["conducted"]
-
 
 def conducted(row: Sequence[Real], warmth: Sequence[Real], i: int) -> Real:
     """Flow of entropy at a place among others of given temperatures: Σ Mᵢⱼ (θⱼ − θᵢ)/θᵢ.

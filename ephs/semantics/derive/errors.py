@@ -2,7 +2,7 @@
 
 from typing import Final, final
 
-__all__ = ["DeriveError"]
+from ephs.operad.messages import TextError
 
 TEXTS: Final = {
     "compared": "a number over a step is compared ({order}); an energy does not branch: write abs(…), or a function of "
@@ -13,18 +13,7 @@ TEXTS: Final = {
 
 
 @final
-class DeriveError(TypeError):
-    """A function of which something cannot be derived.
+class DeriveError(TextError, TypeError):
+    """A function of which something cannot be derived."""
 
-    Parameters
-    ----------
-    fault
-        The key of the text.
-    **details
-        What the text names.
-    """
-
-    def __init__(self, fault: str, /, **details: object) -> None:
-        super().__init__(TEXTS[fault].format(**details))
-        self.fault: str = fault
-        self.details: dict[str, object] = details
+    _texts = TEXTS

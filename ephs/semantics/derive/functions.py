@@ -15,15 +15,6 @@ from ephs.semantics.stage.elementary import polynomial
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
-__all__ = [
-    "COMPOSED",
-    "FUNCTIONS",
-    "Rule",
-    "angle_ratio",
-    "squared_turn_slope",
-    "turn",
-]
-
 NEAR: Final = 0.5
 """Up to this size of the argument series serve."""
 LARGE: Final = 709.0

@@ -31,8 +31,6 @@ from ephs.semantics.spaces.vectors import (
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 
-__all__ = ["Holonomic", "Passage", "half_turn"]
-
 OK: Final = 0
 TURN: Final = 1
 HALF_TURN: Final = 9.8696

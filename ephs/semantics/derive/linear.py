@@ -16,8 +16,6 @@ from ephs.semantics.stage.memory import Integers, Vector
 from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.programs import Entry, Program
 
-__all__ = ["Linear", "linear_program"]
-
 
 def _dot(on: Evaluator, count: Integer, entry: Callable[[Integer], Real]) -> Real:
     """Σ of so many entries."""

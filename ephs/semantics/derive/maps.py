@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from ephs.semantics.spaces.vectors import Entries, Rows, combine, dot
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["Block", "Maps"]
-
 Array: TypeAlias = NDArray[np.float64]
 Sort: TypeAlias = Literal["same", "frame", "any"]
 

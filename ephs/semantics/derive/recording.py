@@ -14,8 +14,6 @@ import numpy as np
 
 from ephs.semantics.derive.tape import Recorder, Tape, quarter
 
-__all__ = ["Recorded", "Recording", "Untraceable", "record"]
-
 
 @final
 class Untraceable(TypeError):

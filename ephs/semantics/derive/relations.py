@@ -26,11 +26,6 @@ from ephs.semantics.stage.memory import Held, Vector
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
 
-__all__ = [
-    "Irreversible", "Port", "Relation", "Reversible", "Storage", "at_rest", "bare", "compiled",
-    "entry_of", "program", "sizes",
-]  # fmt: skip
-
 OK: Final = 0
 TEMPERATURE: Final = 2
 EXTENT: Final = 4

@@ -17,8 +17,6 @@ from ephs.semantics.derive.functions import FUNCTIONS, Rule, angle_ratio, square
 from ephs.semantics.stage.evaluator import Evaluator, Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 
-__all__ = ["Entries", "Slope", "Slopes", "lifted"]
-
 Entries = Mapping[int, Real]
 """Place of an increment -> the slope along it; none where there is no dependence."""
 

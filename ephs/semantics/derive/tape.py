@@ -18,8 +18,6 @@ from ephs.semantics.derive.slopes import Entries, Slope, Slopes, lifted
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["OPERATIONS", "Operation", "Tape", "evaluate", "over_step"]
-
 T = TypeVar("T")
 Operation = tuple[str, tuple[int, ...], float]
 """The name of an operation, the places of its arguments on the tape, a number: of ``"input"`` and ``"parameter"`` which

@@ -2,19 +2,6 @@
 
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 
-__all__ = [
-    "backward",
-    "cholesky",
-    "clear",
-    "copy",
-    "dot",
-    "forward",
-    "lu",
-    "lu_solve",
-    "norm",
-    "subtract",
-]
-
 
 def clear(on: Evaluator, x: Vector) -> None:
     """Put zeros into a vector."""

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Vector
 
-__all__ = ["envelope_lu", "envelope_solve", "times"]
-
 
 def envelope_lu(on: Evaluator, a: Sequence[Matrix], pivots: Integers, ends: Integers) -> None:
     """Factorise P A = L U in place with partial pivoting.

@@ -28,8 +28,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["Rows", "correct", "multipliers", "orthonormalise", "row_program", "solve"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

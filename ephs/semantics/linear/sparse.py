@@ -8,8 +8,6 @@ from functools import cache
 
 from ephs.semantics.stage import Entry, Evaluator, Integer, Integers, Program, Truth, Vector, indices, vector
 
-__all__ = ["factorise", "fill", "solve", "sparse_lu"]
-
 
 def factorise(
     on: Evaluator,

@@ -5,8 +5,6 @@ Knuth, *The Art of Computer Programming* 2, 4.2.2, theorem B. Numbers are floats
 
 from typing import Any
 
-__all__ = ["grown"]
-
 
 def grown(total: Any, carry: Any, change: Any) -> tuple[Any, Any]:
     """Return total + carry + change, rounded, and the rounding error for the next sum (Kahan)."""

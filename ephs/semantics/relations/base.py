@@ -19,8 +19,6 @@ from ephs.semantics.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.system import read_state
 
-__all__ = ["BasePoint", "StateClass", "Values", "component_classes", "glued_classes", "place", "sorted_classes"]
-
 Values = Mapping[str, object] | Mapping[Path, object] | Mapping[Path, Array]
 """Values of states by path."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)

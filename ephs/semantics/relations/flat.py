@@ -14,8 +14,6 @@ from ephs.semantics.relations.linear import LinearRelation, linear_parts, power_
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
 
-__all__ = ["Flat", "flat_classes"]
-
 
 def flat_classes(flat: System) -> tuple[StateClass, ...]:
     """The states of a flat system, read off the links of its pattern."""

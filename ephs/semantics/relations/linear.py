@@ -12,8 +12,6 @@ from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.relations.base import BasePoint
 from ephs.semantics.subspace import Subspace
 
-__all__ = ["Coordinates", "LinearRelation", "component_relation", "compose_linear", "linear_parts", "power_ports"]
-
 AFFINE = 1e-8
 """Last entry of unit vectors of a relation below which it has no affine part: the root of rounding."""
 

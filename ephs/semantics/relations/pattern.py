@@ -6,8 +6,6 @@ from ephs.operad import Path, Pattern
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.subspace import Subspace
 
-__all__ = ["pattern_relation"]
-
 
 def pattern_relation(pattern: Pattern) -> Subspace:
     """F(f): the pattern's own relation on (flows and efforts of all inner ports, then of the outer ports).

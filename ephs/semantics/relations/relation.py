@@ -25,8 +25,6 @@ from ephs.semantics.relations.flat import Flat, flat_classes
 from ephs.semantics.relations.linear import LinearRelation, component_relation, compose_linear, power_ports
 from ephs.semantics.system import Filling, as_system, fold, require_fillings
 
-__all__ = ["Relation", "Route", "relation_of"]
-
 Route: TypeAlias = Literal["flat", "nested"]
 
 

@@ -8,6 +8,7 @@ from ephs.semantics.spaces.groups import SE2 as SE2
 from ephs.semantics.spaces.groups import SE3 as SE3
 from ephs.semantics.spaces.groups import SO3 as SO3
 from ephs.semantics.spaces.groups import SO3xR3 as SO3xR3
+from ephs.semantics.spaces.groups import translation as translation
 from ephs.semantics.spaces.groups import vector_space as vector_space
 from ephs.semantics.spaces.manifold import Manifold as Manifold
 from ephs.semantics.spaces.manifold import manifold as manifold

@@ -11,8 +11,6 @@ from ephs.semantics.spaces.staged_groups import STAGED, Differential
 from ephs.semantics.spaces.vectors import scale
 from ephs.semantics.stage import Entry, Evaluator, Matrix, Program, Vector, matrix, vector
 
-__all__ = ["dexp_left", "dexp_left_inv", "differentials"]
-
 DIMENSIONS: Final = {codes.SO3: 3, codes.SE2: 3, codes.SE3: 6, codes.SO3xR3: 6}
 """Dimensions of the groups that are not abelian."""
 

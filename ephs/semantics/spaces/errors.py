@@ -2,6 +2,8 @@
 
 from typing import Final, final
 
+from ephs.operad.messages import TextError
+
 TEXTS: Final = {
     "unknown space": "space '{name}' is not known; known are {known}, and every name ending in '*'. "
     "Register others with register_manifold(name, factory).",
@@ -21,17 +23,7 @@ TEXTS: Final = {
 
 
 @final
-class SpaceError(ValueError):
+class SpaceError(TextError, ValueError):
     """A space or a pair was named, registered or used wrongly."""
 
-    def __init__(self, fault: str, /, **details: object) -> None:
-        super().__init__(TEXTS[fault].format(**details))
-        self.fault: str = fault
-        self.details: dict[str, object] = details
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_rebuild, (self.fault, self.details))
-
-
-def _rebuild(fault: str, details: dict[str, object]) -> SpaceError:
-    return SpaceError(fault, **details)
+    _texts = TEXTS

@@ -17,6 +17,7 @@ from math import cos, factorial, sin, sqrt
 from typing import final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces import rotations as so3
@@ -337,6 +338,13 @@ def vector_space(name: str, dim: int) -> VectorSpace:
 
 SO3 = Rotations("SO(3)", 3, 4, codes.SO3)
 SE2 = PlanarMotions("SE(2)", 3, 3, codes.SE2)
+
+
+def translation(at: ArrayLike) -> Array:
+    """The pose (7,) of a frame at a point (3,), without rotation."""
+    return np.concatenate([[1.0, 0.0, 0.0, 0.0], np.asarray(at, dtype=float)])
+
+
 SE3 = RigidMotions("SE(3)", 6, 7, codes.SE3)
 SO3xR3 = DirectMotions("SO(3)xR3", 6, 7, codes.SO3xR3)
 

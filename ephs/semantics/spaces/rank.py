@@ -10,32 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "ALIGNED",
-    "APART",
-    "ASSEMBLY",
-    "CLOSED",
-    "CLOSED_SINGULAR",
-    "CONSTRAINT",
-    "DIFFERENCE",
-    "DIRECTION",
-    "ELIMINATION",
-    "EXPLICIT",
-    "FOLLOWED",
-    "GAP",
-    "IMPLICIT",
-    "INERTIA",
-    "LIGHT",
-    "NEIGHBOUR",
-    "PROJECTOR",
-    "REGULAR",
-    "ROUNDED",
-    "SPANNED",
-    "SPARSE",
-    "TINY",
-    "rank_of",
-]
-
 ASSEMBLY = 1e-8
 """Tolerance of assembly, as a part of the mechanism's length: files written with nine digits round by less, and no
 mechanism is made more exactly. Angles in rad and twists of size one are held to it, too."""

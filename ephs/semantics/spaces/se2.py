@@ -4,8 +4,6 @@ from ephs.semantics.spaces.series import alpha, beta, cot, gamma
 from ephs.semantics.spaces.vectors import Entries, Rows, add, scale, sub
 from ephs.semantics.stage import Evaluator, Real
 
-__all__ = ["compose", "dexp", "dexp_inv", "exp", "increment", "inverse", "log", "retract"]
-
 
 def _times(p: Real, q: Real, v: Entries) -> list[Real]:
     """(p + q J) v in the plane, J the quarter turn."""

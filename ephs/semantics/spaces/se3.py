@@ -24,12 +24,6 @@ from ephs.semantics.spaces.vectors import (
 )
 from ephs.semantics.stage import Evaluator, Real
 
-__all__ = [
-    "adjoint", "between", "bracket", "coadjoint", "cobracket", "compose", "dexp", "dexp_inv", "exp", "increment",
-    "inverse", "log", "retract", "twist_inward",
-    "twist_outward", "wrench_outward",
-]  # fmt: skip
-
 
 def compose(on: Evaluator, a: Entries, b: Entries) -> list[Real]:
     """Product a·b of poses."""

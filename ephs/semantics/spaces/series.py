@@ -12,8 +12,6 @@ from typing import Final
 
 from ephs.semantics.stage import Evaluator, Real, Truth
 
-__all__ = ["alpha", "beta", "beta1", "cosine", "cot", "cot1", "gamma", "gamma1", "horner"]
-
 # B₂ₖ / (2k)! of the Bernoulli numbers with all signs positive, k = 1 … 12.
 _NUMERATORS: Final = (1, 1, 1, 1, 5, 691, 7, 3617, 43867, 174611, 854513, 236364091)
 _DENOMINATORS: Final = (6, 30, 42, 30, 66, 2730, 6, 510, 798, 330, 138, 2730)

@@ -7,11 +7,6 @@ from ephs.semantics.spaces.series import alpha, beta, cosine, cot, gamma
 from ephs.semantics.spaces.vectors import Columns, Entries, Rows, Vector3, add, cross, dot, hat, plus, scale
 from ephs.semantics.stage import Evaluator, Real
 
-__all__ = [
-    "block", "conjugate", "dexp", "dexp_inv", "difference", "exp", "log", "matrix", "multiply", "normalised",
-    "polynomial", "quaternion", "rotate",
-]  # fmt: skip
-
 SMALL = 1e-8
 """Square of an angle below which the series is taken: its next term is below rounding."""
 

@@ -9,8 +9,6 @@ from ephs.semantics.spaces import codes, se2, se3, so3
 from ephs.semantics.spaces.vectors import Entries, Rows, add, combine, scale, sub
 from ephs.semantics.stage import Evaluator, Real
 
-__all__ = ["STAGED", "StagedGroup", "about_z", "included"]
-
 Step: TypeAlias = Callable[[Evaluator, Entries, Entries], list[Real]]
 Differential: TypeAlias = Callable[[Evaluator, Entries], Rows]
 

@@ -9,11 +9,6 @@ from typing import TypeAlias
 
 from ephs.semantics.stage import Evaluator, Real, Truth
 
-__all__ = [
-    "Columns", "Entries", "Rows", "Vector3", "add", "apply", "apply_transposed", "combine", "cross", "dot", "hat",
-    "outer_sum", "plus", "product", "scale", "sub", "symmetric", "symmetric_inverse", "transposed", "upper", "vee",
-]  # fmt: skip
-
 Entries: TypeAlias = Sequence[Real]
 Vector3: TypeAlias = list[Real]
 Rows: TypeAlias = list[list[Real]]
@@ -99,11 +94,6 @@ def symmetric(entries: Entries) -> Rows:
 def upper(matrix: Columns) -> list[Real]:
     """The upper triangle of a square matrix, row by row."""
     return [matrix[i][j] for i in range(len(matrix)) for j in range(i, len(matrix))]
-
-
-def outer_sum(left: Columns, right: Columns, i: int, j: int) -> Real:
-    """Entry (i, j) of Σ lₖ rₖᵀ."""
-    return dot([a[i] for a in left], [b[j] for b in right])
 
 
 def symmetric_inverse(on: Evaluator, matrix: Columns) -> tuple[Rows, Truth]:

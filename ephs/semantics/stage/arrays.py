@@ -24,8 +24,6 @@ from ephs.semantics.stage.numbers import (
     Truth,
 )
 
-__all__ = ["ARRAYS", "Arrays", "Batch", "BatchCells"]
-
 _OPERATIONS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "+": operator.add,
     "-": operator.sub,

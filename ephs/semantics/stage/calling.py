@@ -13,8 +13,6 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.llvm import Library
 
-__all__ = ["Bound", "Call", "First", "address_of", "apart", "packed"]
-
 RESULTS = {"void": None, "double": ctypes.c_double, "i64": ctypes.c_int64}
 NUMBERS = ("real", "integer")
 

@@ -10,8 +10,6 @@ from typing import Final, final
 
 from ephs.semantics.stage.errors import StageError
 
-__all__ = ["c_text"]
-
 _TYPES: Final = {"double": "double", "i64": "int64_t", "i1": "int", "ptr": "char *", "void": "void", "i8": "char"}
 _REAL: Final = {"fadd": "+", "fsub": "-", "fmul": "*", "fdiv": "/"}
 _WRAPPING: Final = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^", "shl": "<<", "lshr": ">>"}

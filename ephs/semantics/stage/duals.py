@@ -10,8 +10,6 @@ from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
 
-__all__ = ["RULES", "Dual", "DualCells", "Duals"]
-
 Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
 """The value of a function, and its derivative by each argument."""
 

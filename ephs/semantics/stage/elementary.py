@@ -14,8 +14,6 @@ from typing import Final
 from ephs.semantics.stage.evaluator import Evaluator, Function, staged
 from ephs.semantics.stage.numbers import Real
 
-__all__ = ["COMPOSED", "LARGEST_ANGLE", "WHOLE_TURNS", "atan2", "cos", "exp", "log", "polynomial", "sin"]
-
 LINEAR = 1e-9
 """Angle in rad below which its sine is the angle: the cube is below rounding."""
 

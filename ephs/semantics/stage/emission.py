@@ -21,8 +21,6 @@ from ephs.semantics.stage.numbers import (
     Truth,
 )
 
-__all__ = ["LIMIT", "IntegerPointer", "RealPointer", "Symbol", "TruthSymbol", "WholeSymbol", "Writer"]
-
 LIMIT: Final = 300_000
 """Lines above which a function counts as traced without end; LLVM takes a minute for as many."""
 _REAL: Final[dict[Operation, str]] = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}

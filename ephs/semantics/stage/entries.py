@@ -16,8 +16,6 @@ from ephs.semantics.stage.records import IntegerField, RealField
 from ephs.semantics.stage.taped import Tape, Taped
 from ephs.semantics.stage.unrolled import Unrolled
 
-__all__ = ["Entry"]
-
 
 @final
 class Entry:

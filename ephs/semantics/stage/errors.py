@@ -4,8 +4,6 @@ import sys
 from pathlib import Path
 from typing import Final, final
 
-__all__ = ["StageError"]
-
 TEXTS: Final = {
     "branch": "{where}: a condition that is not known while staging decides {what}; write on.when(…) for statements, "
     "on.select(…) for values, on.both, on.either and on.negate for and, or and not.",

@@ -10,8 +10,6 @@ from ephs.semantics.stage.memory import Cells, Held, IntegerCells, RealCells, Va
 from ephs.semantics.stage.numbers import Condition, Count, Integer, Number, Real, Truth
 from ephs.semantics.stage.reaching import Argument, Part, Reached, called, parts_of
 
-__all__ = ["FUNCTIONS", "Evaluator", "Function", "Interpreted", "known", "staged"]
-
 Function: TypeAlias = Literal["sqrt", "absolute", "floor", "sin", "cos", "exp", "log", "atan2", "copysign"]
 FUNCTIONS: Final[dict[Function, int]] = {
     "sqrt": 1,

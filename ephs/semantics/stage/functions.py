@@ -7,8 +7,6 @@ from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.programs import Program
 from ephs.semantics.stage.records import real
 
-__all__ = ["ELEMENTARY"]
-
 ELEMENTARY: Final = Program(
     "ephs",
     sin=Entry(sin, x=real()),

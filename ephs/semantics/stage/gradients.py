@@ -14,8 +14,6 @@ from ephs.semantics.stage.programs import Program
 from ephs.semantics.stage.records import Record, Table
 from ephs.semantics.stage.taped import CAPACITY, COUNT, POSITION, ROWS, back
 
-__all__ = ["Gradients", "Shares", "reading_program"]
-
 FIRST = 1 << 12
 """Room of a tape at first, in entries; it doubles until a run fits."""
 

@@ -12,8 +12,6 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 
-__all__ = ["INTERVALS", "Interval", "Intervals"]
-
 NEAR = 1e-9
 """Angle in rad by which extrema are taken to lie within an interval: more than turns round by."""
 

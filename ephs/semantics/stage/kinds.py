@@ -13,23 +13,6 @@ from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField, Record, Table
 from ephs.semantics.stage.taped import Taped, TapedCells
 
-__all__ = [
-    "INTEGER",
-    "REAL",
-    "Kind",
-    "described",
-    "dual",
-    "group",
-    "indices",
-    "matrix",
-    "of_field",
-    "pointer",
-    "signature_of",
-    "table",
-    "taped",
-    "vector",
-]
-
 ANY: Final = 2**40
 """Size of memory without a known bound."""
 Shape: TypeAlias = tuple[int | None, ...]

@@ -20,8 +20,6 @@ import numpy as np
 
 from ephs.semantics.stage.store import STORE
 
-__all__ = ["Made", "known", "sources"]
-
 T = TypeVar("T")
 PACKAGE: Final = __name__.partition(".")[0]
 ROOT: Final = Path(__file__).resolve().parents[2]

@@ -17,8 +17,6 @@ from ephs.semantics.stage.plain import elementary
 from ephs.semantics.stage.reaching import Part, Reached
 from ephs.semantics.stage.records import Record
 
-__all__ = ["Machine"]
-
 _INTRINSIC: Final[dict[Function, str]] = {
     "sqrt": "sqrt",
     "absolute": "fabs",

@@ -14,21 +14,6 @@ from numpy.typing import NDArray
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.numbers import Integer, Real
 
-__all__ = [
-    "ArrayIntegers",
-    "ArrayReals",
-    "Cells",
-    "Held",
-    "IntegerCells",
-    "Integers",
-    "Matrix",
-    "RealCells",
-    "Variable",
-    "Vector",
-    "inside",
-]
-
-
 Value = TypeVar("Value")
 
 

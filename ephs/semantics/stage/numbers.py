@@ -13,8 +13,6 @@ import numpy as np
 
 from ephs.semantics.stage.errors import StageError
 
-__all__ = ["Condition", "Count", "Integer", "Number", "Operation", "Order", "Real", "Truth"]
-
 Real: TypeAlias = Union[float, "Number"]
 """A real number, known or not."""
 Integer: TypeAlias = Union[int, "Count"]

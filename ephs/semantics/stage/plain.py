@@ -10,9 +10,6 @@ from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
 
-__all__ = ["PLAIN", "Plain", "elementary"]
-
-
 _EXACT: Final[dict[Function, Callable[..., float]]] = {
     "sqrt": np.sqrt,
     "absolute": np.abs,

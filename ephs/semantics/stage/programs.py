@@ -20,8 +20,6 @@ from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
 from ephs.semantics.stage.reaching import Atom
 
-__all__ = ["Program", "located"]
-
 _COMPILING: Final = RLock()
 _PLACES: Final["dict[int, tuple[Program, str, Call]]"] = {}
 """Program, entry and call of each address of machine code; tables contain addresses only, so code lives as long as

@@ -15,8 +15,6 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Cells, Held, Integers, Matrix, Vector
 from ephs.semantics.stage.numbers import Integer, Number, Real
 
-__all__ = ["Argument", "Atom", "Part", "Reached", "Signature", "called", "parts_of"]
-
 Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
 """Parts of an argument: an array of floats or of integers, a float, an integer."""
 Argument: TypeAlias = Vector | Integers | Matrix | Real | Integer

@@ -13,22 +13,6 @@ from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, IntegerCells,
 from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.reaching import Reached, Signature
 
-__all__ = [
-    "FunctionField",
-    "IntegerField",
-    "IntegersField",
-    "MatrixField",
-    "RealField",
-    "Record",
-    "Table",
-    "VectorField",
-    "function",
-    "integer",
-    "integers",
-    "real",
-    "reals",
-]
-
 
 class _Field:
     """A named place in a record, its offset fixed when the class is made."""

@@ -11,8 +11,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, cast
 
-__all__ = ["FOLDER", "INDEX", "ship", "shipped"]
-
 FOLDER: Final = Path(__file__).resolve().parents[2] / "objects"
 """Folder of the package's object code, built with a wheel; it may be absent."""
 INDEX: Final = "index.json"

@@ -15,8 +15,6 @@ from functools import cache
 from pathlib import Path
 from typing import Final, final
 
-__all__ = ["STORE", "UNUSED", "ObjectCacheWarning"]
-
 MARK: Final = hashlib.sha256().digest_size
 UNUSED: Final = 30 * 86400.0
 """Seconds after which a file that no process has used is removed."""

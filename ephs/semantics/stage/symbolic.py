@@ -9,8 +9,6 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 
-__all__ = ["SYMBOLIC", "Expression", "Symbolic", "expression"]
-
 sp: Any = import_module("sympy")
 Expr: TypeAlias = Any
 _OPERATIONS: Final[dict[Operation, Callable[[Expr, Expr], Expr]]] = {

@@ -16,8 +16,6 @@ from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
 
-__all__ = ["CAPACITY", "COUNT", "POSITION", "ROWS", "Tape", "Taped", "TapedCells", "back"]
-
 POSITION, ROWS, CAPACITY, COUNT = range(4)
 """Counters of a tape: where the next entry goes, the number of the next row, room for entries; how many counters."""
 LONG: Final = 8

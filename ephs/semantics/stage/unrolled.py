@@ -16,8 +16,6 @@ from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Count, Integer, Real, Truth
 from ephs.semantics.stage.reaching import Part, Reached
 
-__all__ = ["Local", "Unrolled"]
-
 ROUNDS: Final = 100_000
 """Rounds of one `repeat` that are unrolled at most."""
 Place: TypeAlias = tuple["Local", int]

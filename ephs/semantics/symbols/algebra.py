@@ -3,8 +3,6 @@
 from importlib import import_module
 from typing import Any, TypeAlias
 
-__all__ = ["Expr", "python_code", "sp", "text_of"]
-
 sp: Any = import_module("sympy")
 Expr: TypeAlias = Any
 """An expression of SymPy."""

@@ -5,8 +5,6 @@ from collections.abc import Callable, Mapping
 
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["Bounds", "Interval", "at_least"]
-
 OUTWARDS = 8e-16
 """Part by which bounds are moved outwards: two of the last digits, and more than functions err by."""
 NEAR = 1e-9

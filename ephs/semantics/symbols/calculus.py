@@ -5,8 +5,6 @@ from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.spaces import codes
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["PRESSURE", "TEMPERATURE", "Base", "intensive", "potential", "tangent", "trivialised"]
-
 Symbols = tuple[Expr, ...]
 Base = tuple[tuple[int, Symbols], ...]
 """The states that a formula reads: the code of each group, and symbols for the numbers of its point."""

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["coefficient_of", "eliminate", "settled", "tidy"]
-
 
 def tidy(expression: Expr) -> Expr:
     """A shorter equal expression, if one is found; of operators the expanded one."""

@@ -18,8 +18,6 @@ from ephs.semantics.symbols.words import curved, escaped, operator
 from ephs.semantics.symbols.writer import Junction, Parts, Writer, parts_of
 from ephs.semantics.system import System
 
-__all__ = ["Equation", "Equations", "Form", "equations_of"]
-
 Form = Literal["relation", "descriptor", "reduced"]
 
 

@@ -5,8 +5,6 @@ from typing import Any
 from ephs.semantics.special import SHORT
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["Sinhc", "SinhcSlope"]
-
 _Function: Any = sp.Function
 
 

@@ -22,8 +22,6 @@ from ephs.semantics.symbols.signs import sign_shown, squares_shown, vanishes
 from ephs.semantics.symbols.tracing import Trace, Untraceable, trace
 from ephs.semantics.trials import ROTATING, extent
 
-__all__ = ["findings_of"]
-
 SYMBOLIC = "symbolically"
 Symbols = tuple[Expr, ...]
 Ports = tuple[tuple[Path, Quantity, Symbols], ...]

@@ -3,8 +3,6 @@
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.bounds import Bounds, at_least
 
-__all__ = ["sign_shown", "squares_shown", "vanishes"]
-
 LARGE = 300
 """Largest number of operations in an expression to rewrite; beyond it rewriting may take minutes."""
 FACTORED = (60, 4)

@@ -17,8 +17,6 @@ from ephs.operad.reading import Reader
 from ephs.semantics.derive.recording import Recorded, Untraceable
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["DEPTH", "NODES", "OPERATIONS", "Matrix", "Structure", "Term", "Written", "record", "term_from", "term_of"]
-
 Term: TypeAlias = "float | str | tuple[Any, ...]"
 DEPTH, NODES = 50, 10_000
 """Limits on the depth of a term and on its numbers, names and operations."""

@@ -18,8 +18,6 @@ from ephs.semantics.symbols.calculus import TEMPERATURE, intensive
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.words import Words, curved, latex_name, operator, pairing, plain
 
-__all__ = ["Said", "Voice", "formula_symbols", "formula_text", "say"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,6 @@ from typing import Any, final
 from ephs.operad import Path, Quantity
 from ephs.semantics.symbols.algebra import Expr, sp
 
-__all__ = ["OPERATORS", "Words", "curved", "escaped", "latex_name", "operator", "pairing", "plain"]
-
 OPERATORS: dict[str, tuple[str, str]] = {
     "tangent": ("TL({0})", r"\mathrm{{T}}_e L_{{{0}}}"),
     "cotangent": ("T*L({0})", r"\mathrm{{T}}^*_e L_{{{0}}}"),

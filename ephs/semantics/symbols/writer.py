@@ -13,8 +13,6 @@ from ephs.semantics.symbols.voices import Said, Voice, say
 from ephs.semantics.symbols.words import Words, plain
 from ephs.semantics.system import System
 
-__all__ = ["Junction", "Parts", "Writer", "parts_of"]
-
 
 class Junction(NamedTuple):
     """A power junction."""

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["counts_table", "draw_stability", "draw_work_precision", "write_cells"]
-
 _COLOURS = (BLUE, SKY, GREEN, ORANGE, RED, PURPLE, BLACK, "#8c6d1f")
 _PEER_COLOURS = ("#6b7280", "#9aa3af", "#4b5563", "#b8bec7")
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "h")

@@ -18,23 +18,6 @@ from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import adjusted
 from ephs.show.charts.runs import Array
 
-__all__ = [
-    "cardan_shaft",
-    "double_pendulum",
-    "four_bar_back",
-    "four_bar_off",
-    "free_body",
-    "governor",
-    "heavy_top",
-    "parallelogram",
-    "pendulum",
-    "redundant",
-    "slender_top",
-    "stretched_chain",
-    "toggle",
-    "truss",
-]
-
 Tables = Mapping[str, Mapping[str, Any]]
 G = 9.81
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

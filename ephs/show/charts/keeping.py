@@ -12,8 +12,6 @@ from ephs.show.charts.outcomes import Outcome
 from ephs.show.charts.runs import Setting
 from ephs.show.charts.stability import Cell
 
-__all__ = ["Kept"]
-
 
 @final
 class Kept:

@@ -12,8 +12,6 @@ from ephs.show.charts.peers import PEERS, PeerError, PeerRun
 from ephs.show.charts.reference import Motion, Reference, tight_reference
 from ephs.show.charts.runs import Array, Ending, Setting, attempt
 
-__all__ = ["STEPS", "TOLERANCES", "Point", "work_precision"]
-
 TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 STEPS = tuple(20 * 2**k for k in range(11))
 """Into how many steps the time is divided."""

@@ -8,20 +8,6 @@ from ephs.show.charts.reference import Motion
 from ephs.show.charts.runs import Array, Setting
 from ephs.solve.auditing.audit import MANY_TIMES, MOTION
 
-__all__ = [
-    "ACCURATE",
-    "BOUND",
-    "CONDITION",
-    "ENERGY",
-    "KEPT",
-    "RIGHT",
-    "SILENT",
-    "Outcome",
-    "horizon",
-    "judge",
-    "right",
-]
-
 ACCURATE = 1e-2
 """Error at which digits of a motion end."""
 RIGHT = MOTION

@@ -13,8 +13,6 @@ from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_
 from ephs.show.charts.peer_scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
 
-__all__ = ["integrator", "mjcf", "mujoco_model", "silent"]
-
 REACHED = 1e-6
 """Allowed missing fraction of the time at the end: sums of steps round."""
 IMPEDANCE = 'solimp="0.9999 0.9999 0.001 0.5 2"'
@@ -131,7 +129,7 @@ def mjcf(given: PeerScene, method: str, step: float) -> str:
         place = f'pos="{_text(pose[4:])}" quat="{_text(pose[:4])}"'
         text = f'<body name="{branch.outer}" {place}>{_joint(branch)}{own}{inside}</body>'
         below.setdefault(branch.inner, []).append(text)
-    loops = "".join(_closure(closure, bodies, step) for closure in given.closures)
+    loops = "".join(_closure(closure, step) for closure in given.closures)
     unused = '<flag contact="disable"/>' if loops else '<flag contact="disable" constraint="disable"/>'
     solver = 'tolerance="1e-14" iterations="100" solver="Newton"' if loops else ""
     return (
@@ -152,7 +150,7 @@ def _joint(branch: Branch) -> str:
     return f'<freejoint name="{name}"/>' if branch.kind == "free" else ""
 
 
-def _closure(closure: tuple[str, str, Array, Array], bodies: Any, step: float) -> str:
+def _closure(closure: tuple[str, str, Array, Array], step: float) -> str:
     """A point of body 1 in which the two are connected; body 2's point coincides with it at the start."""
     one, two, point, other = closure
     if one == GROUND:

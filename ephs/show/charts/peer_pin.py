@@ -8,12 +8,10 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.model import GROUND, Scene
-from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.peer_scene import Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
-
-__all__ = ["SOFT", "TIGHT", "PinModel", "integrator"]
 
 SOLVED = 1e-13
 """Accuracy to which Pinocchio solves for constraint forces."""
@@ -187,7 +185,7 @@ class PinModel:
             ends = []
             for body, point in ((body1, point1), (body2, point2)):
                 number, own = self.at[body]
-                there = np.concatenate([[1.0, 0.0, 0.0, 0.0], point])
+                there = translation(point)
                 ends += [number, self._se3(SE3.compose(SE3.inverse(own), there))]
             made = pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, self.model, *ends, pin.ReferenceFrame.LOCAL)
             gains = made.m_baumgarte_parameters

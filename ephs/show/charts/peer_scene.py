@@ -11,8 +11,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, Ending, Setting
 
-__all__ = ["Branch", "Go", "PeerError", "PeerRun", "PeerScene", "peer_scene", "start"]
-
 PARALLEL = 1e-9
 """Tolerance of the cosine of parallel axes."""
 KINDS = ("revolute", "spherical", "free", "fixed")

@@ -11,8 +11,6 @@ from ephs.show.charts.outcomes import Outcome
 from ephs.show.charts.runs import Ending
 from ephs.show.charts.stability import Cell
 
-__all__ = ["LISTED", "Key", "Reason", "letter_of", "reason_of", "reasons", "reasons_table"]
-
 Key = tuple[str, str]
 """Outcome and cause."""
 LISTED = 5

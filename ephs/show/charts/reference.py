@@ -16,8 +16,6 @@ from ephs.show.charts.runs import Array, Ending, Setting, attempt
 from ephs.show.errors import ShowError
 from ephs.solve.result.solution import Solution
 
-__all__ = ["Motion", "Reference", "condition", "resting_reference", "shipped_reference", "tight_reference"]
-
 TIGHT = ((1e-13, 1e-12), (1e-12, 1e-11), (1e-10, 1e-9))
 """Tolerance of the reference and of the run that estimates its error, best first."""
 LEAST_ORDER = 5

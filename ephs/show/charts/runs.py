@@ -8,20 +8,17 @@ from enum import StrEnum
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.methods.registry import Method
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundle import Array
 from ephs.semantics.system import System
 from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.errors import Interrupted, SimulationError
 from ephs.solve.errors import Outcome as Failure
 from ephs.solve.result.solution import Solution
 
-__all__ = ["MOST_STEPS", "Array", "Ending", "Run", "Setting", "attempt"]
-
-Array = NDArray[np.float64]
 MOST_STEPS = 500_000
 """Default limit of one run."""
 

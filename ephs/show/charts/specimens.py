@@ -17,8 +17,6 @@ from ephs.solve.control import Control
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.stepping import Attempt
 
-__all__ = ["SPECIMENS", "TrapezoidalIndex3", "VelocityMidpoint"]
-
 STAGNANT = 1e-9
 """Residual accepted where iterations stagnate."""
 SOLVED, DIFFERENCE, ITERATIONS = 1e-12, 1e-7, 20

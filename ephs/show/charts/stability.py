@@ -18,8 +18,6 @@ from ephs.show.errors import ShowError
 if TYPE_CHECKING:
     from ephs.show.charts.keeping import Kept
 
-__all__ = ["Cell", "settings_of", "stability"]
-
 INSTANTS = 41
 MOST_STEPS = 100_000
 LIMIT = 1.5

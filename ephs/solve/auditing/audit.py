@@ -26,8 +26,6 @@ from ephs.solve.model import Model
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["LAWS", "LEAP", "MANY_TIMES", "MOTION", "Bounds", "Tests", "audit"]
-
 Tests = Trials | Missed
 """Repeated steps: constant ones, or the error of chosen ones."""
 

@@ -10,8 +10,6 @@ from ephs.solve.errors import Outcome, SimulationError
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["POLICIES", "Audit", "AuditError", "AuditWarning", "CostWarning", "Finding", "judged"]
-
 POLICIES = ("fail", "warn", "off")
 """Policies for findings: an error, a warning, an entry in the summary."""
 

@@ -14,8 +14,6 @@ from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.problem import Problem
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["MANY", "Forecast"]
-
 FIRST = 32
 """Number of steps before the first forecast, which uses the later half; doubled for each further forecast."""
 MANY = 20_000

@@ -24,8 +24,6 @@ from ephs.solve.errors import Interrupted
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["Again", "GlobalError", "apart", "global_error"]
-
 LEAST = 4
 """Least number of longer steps in a run."""
 MARGIN = 3.0

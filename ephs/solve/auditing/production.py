@@ -9,8 +9,6 @@ from ephs.semantics.primitives import Irreversible, Point, Storage
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.problem import Problem
 
-__all__ = ["Production"]
-
 SHARE = 1e-12
 """Fraction of the entropies exchanged and produced in a step: smaller negative productions are rounding."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)

@@ -37,8 +37,6 @@ from ephs.solve.stepping import Stepper
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["Samples", "StepError", "Trials", "natural_trials", "trials_of"]
-
 S = TypeVar("S")
 Tried = tuple[Array, Array]
 """States and energies."""

@@ -16,8 +16,6 @@ from ephs.solve.errors import SolveError
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Stepper
 
-__all__ = ["PARTS", "Missed", "Retaken", "share_missed"]
-
 S = TypeVar("S")
 PARTS = 3
 """Number of steps in place of one: no multiple of the two in the estimate."""

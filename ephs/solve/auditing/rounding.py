@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from ephs.solve.problem import Problem
     from ephs.solve.result.solution import Solution
 
-__all__ = ["exchanged", "rounded", "trembling"]
-
 SOLVED = 100.0 * float(np.finfo(float).eps)
 """Relative rounding of solved unknowns, times the root of the number of steps: 10 κ ε with a condition κ of 10."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)

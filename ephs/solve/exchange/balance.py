@@ -17,8 +17,6 @@ from typing import Final, final
 
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Balance"]
-
 PART: Final = 0.2
 """δ as a part of the largest X: a correction is at most D/(2δ)."""
 

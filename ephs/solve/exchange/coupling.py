@@ -23,8 +23,6 @@ from ephs.solve.snapshot import Snapshot
 if TYPE_CHECKING:
     from ephs.solve.exchange.exchange import Exchange
 
-__all__ = ["Bond", "Coupling", "Traffic", "coupling_of"]
-
 Reading = Callable[[float, Any], Any]
 """f(t, state) -> number."""
 

@@ -2,7 +2,7 @@
 
 from typing import Final, final
 
-__all__ = ["ExchangeError"]
+from ephs.operad.messages import TextError
 
 TEXTS: Final = {
     "package": "a unit is loaded by FMPy, which is not installed: pip install ephs[fmi]",
@@ -36,17 +36,7 @@ TEXTS: Final = {
 
 
 @final
-class ExchangeError(ValueError):
-    """An invalid unit, or an invalid exchange between units and a system.
+class ExchangeError(TextError, ValueError):
+    """An invalid unit, or an invalid exchange between units and a system."""
 
-    Parameters
-    ----------
-    fault
-        The key of the text.
-    **details
-        What the text names.
-    """
-
-    def __init__(self, fault: str, /, **details: object) -> None:
-        super().__init__(TEXTS[fault].format(**details))
-        self.fault: str = fault
+    _texts = TEXTS

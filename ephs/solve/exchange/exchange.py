@@ -14,8 +14,6 @@ from ephs.solve.exchange.together import Together
 from ephs.solve.exchange.unit import Unit
 from ephs.solve.exchange.wires import Place, Source, place_of, sources_of, starting_order
 
-__all__ = ["Exchange", "Exchanged"]
-
 SLIVER = 1e-9
 """Tolerance for times, as a fraction of a period."""
 

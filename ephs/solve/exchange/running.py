@@ -12,8 +12,6 @@ from ephs.semantics.bundle import Array
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.unit import Unit
 
-__all__ = ["Running"]
-
 
 @final
 class Running:

@@ -13,8 +13,6 @@ from ephs.solve.snapshot import Snapshot
 if TYPE_CHECKING:
     from ephs.solve.exchange.exchange import Exchange
 
-__all__ = ["Together", "number"]
-
 
 @final
 class Together:

@@ -10,8 +10,6 @@ from typing import Any, final
 from ephs.solve.errors import nearest_of
 from ephs.solve.exchange.errors import ExchangeError
 
-__all__ = ["Measure", "PowerPort", "Unit", "Variable", "unit_of"]
-
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd")
 """Base units by their names in model descriptions; radians count as numbers."""
 

@@ -10,8 +10,6 @@ from ephs.solve.errors import nearest_of
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.unit import Unit
 
-__all__ = ["Place", "Source", "place_of", "sources_of", "starting_order"]
-
 Source = float | Callable[[float, Any], Any]
 """A constant, or a function f(t, state)."""
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from ephs.solve.result.solution import Solution
 
-__all__ = ["FORMAT", "TIME", "Content", "Variable", "content", "dataset", "sampled_inputs"]
-
 FORMAT = 3
 _LEDGERS = {
     "kinetic": ("J", "energy of what holds momenta or fluxes"),

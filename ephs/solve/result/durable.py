@@ -5,8 +5,6 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["durable", "settle"]
-
 
 @contextmanager
 def durable(path: Path) -> Generator[Path, None, None]:

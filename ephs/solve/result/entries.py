@@ -18,8 +18,6 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.result.ledger import Ledgers
 
-__all__ = ["Entry", "entry_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

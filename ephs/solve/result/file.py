@@ -18,8 +18,6 @@ from ephs.solve.result.labels import Labels, labels_of
 from ephs.solve.result.ledger import Ledgers
 from ephs.solve.result.solution import Solution
 
-__all__ = ["load", "save"]
-
 READ = (2, FORMAT)
 Inputs = Mapping[Path, Array]
 

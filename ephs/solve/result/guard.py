@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_file", "name_for_file", "name_from_file", "named_for_file"]
-
 MOST = 200
 """Largest ratio of decompressed to stored size: a larger one is an attack on memory."""
 _FILTERS = (1, 2, 3)  # of HDF5: deflate, shuffle, fletcher32; others are plug-ins, which are code

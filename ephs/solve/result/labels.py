@@ -7,8 +7,6 @@ from ephs.operad import Quantity
 from ephs.operad.units import effort_unit, flow_unit
 from ephs.semantics.spaces import PAIRS, Pair
 
-__all__ = ["OWN", "Labels", "freedoms", "labels_of", "power_labels"]
-
 OWN = "SI"
 """Default unit of quantities."""
 _POWER = {

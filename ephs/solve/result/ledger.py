@@ -13,8 +13,6 @@ from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record
 
-__all__ = ["Ledgers", "ledgers"]
-
 STILL = 1e-9
 """Least fraction of the energies that counts as exchanged, above the rounding of systems at rest."""
 

@@ -13,8 +13,6 @@ from ephs.solve.problem import Signal
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["PortMotion", "port_motion"]
-
 DELTA = 1e-5
 """Time for differencing prescribed efforts, as a fraction of the run's span."""
 

@@ -10,8 +10,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.solve.stepping import Row
 
-__all__ = ["Record", "Rows", "joined", "record_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,6 @@ from ephs.solve.result.record import Record
 from ephs.solve.result.solution import Solution
 from ephs.solve.stepping import Row
 
-__all__ = ["replay"]
-
 
 def replay(problem: Problem, t: Array, rows: Sequence[Row], remark: str) -> Solution:
     """The solution of what is kept at the times t; ``remark`` stands for the method."""

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from ephs.show import Page
     from ephs.solve.result.ports import PortMotion
 
-__all__ = ["Solution"]
-
 
 @final
 class Solution:

@@ -8,8 +8,6 @@ if TYPE_CHECKING:
     from ephs.solve.result.entries import Entry
     from ephs.solve.result.solution import Solution
 
-__all__ = ["ledger_table", "solution_table"]
-
 
 def solution_table(solution: "Solution") -> str:
     """Summary of a run in a few lines: time, steps, balances."""

@@ -125,7 +125,7 @@ def test_its_numbers_are_parameters(tmp_path):
         ("dry = { coulom = 2.0 }", r"coulomb"),
         (
             "dry = { coulomb = 2.0 }\nmotion = { rate = 1.0 }",
-            r"one degree of freedom that is free to move",
+            r"one degree of freedom and no prescribed motion",
         ),
     ],
 )

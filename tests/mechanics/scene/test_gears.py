@@ -132,7 +132,7 @@ axis = [0.0, 0.0, 1.0]
         ("ratio = 10.0", "ratio = [1.0, 2.0]", "gears.rope.ratio.*1 numbers"),
         ('type = "prismatic"', 'type = "cylindrical"', "gears.rope.joints.*one degree of freedom"),
         ('heat = "bearing"', 'heat = "baring"', "gears.rope.heat"),
-        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*the first rate, of shaft, at 0"),
+        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*a rate of shaft of 0"),
     ],
 )
 def test_what_does_not_fit_is_told_by_its_key(tmp_path, old, new, words):

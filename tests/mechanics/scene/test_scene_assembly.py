@@ -264,7 +264,7 @@ def test_what_cannot_close_is_refused():
         "[joints.c]\ntype = 'fixed'\nbodies = ['ground', 'coupler']\n"
         "frame1 = { position = [9.0, 0.0, 0.0] }\nframe2 = {}\n"
     )
-    with pytest.raises(SceneError, match="no consistent state is near"):
+    with pytest.raises(SceneError, match="no consistent state was found nearby"):
         read(text)
 
 

@@ -135,10 +135,10 @@ def test_an_argument_goes_before_the_file(tmp_path):
     with pytest.raises(ephs.SceneError) as caught:
         ephs.load(write(tmp_path, text), inertia="strict")
     assert [fault.key for fault in caught.value.faults] == ["bodies.a.inertia", "bodies.b.inertia"]
-    with pytest.warns(ephs.SceneWarning, match="took the nearest possible ones: principal moments 1.5, 1.5, 3"):
+    with pytest.warns(ephs.SceneWarning, match="replaced by the nearest possible ones: principal moments 1.5, 1.5, 3"):
         scene = ephs.load(write(tmp_path, text), inertia="nearest")
     assert np.abs(np.linalg.eigvalsh(scene.body("a").inertia) - [1.5, 1.5, 3.0]).max() < 1e-10
-    with pytest.warns(ephs.SceneWarning, match='"nearest" would take'):
+    with pytest.warns(ephs.SceneWarning, match='"nearest" takes'):
         kept = ephs.load(write(tmp_path, text))
     assert kept.body("a").inertia[2, 2] == 3.0
     with pytest.raises(ephs.SceneError, match='"strict", "warn" or "nearest"'):

@@ -256,7 +256,7 @@ def test_a_part_lives_in_the_world_of_its_user(scene):
     use = "format = 1\n" + world + "[parts.p]\nuse = 'leg.toml'\n"
     assert scene(use, leg=LEG).parts["p"].world.gravity[2] == -1.0
     assert scene(use, leg=LEG + world).parts["p"].world.gravity[2] == -1.0
-    with pytest.raises(SceneError, match="take \\[world\\] out of the part") as caught:
+    with pytest.raises(SceneError, match="remove \\[world\\] from the part") as caught:
         scene(use, leg=LEG + world.replace("-1.0", "-2.0"))
     assert caught.value.faults[0].key == "parts.p.world"
 

@@ -139,10 +139,10 @@ def test_between_two_points_it_is_a_spring(tmp_path):
     ("change", "key", "expected"),
     [
         (('"hand"]\npoints', '"hnad"]\npoints'), r"tendons.cable.bodies\[3\]", "hand"),
-        ((", [0.4, 0.2, 0.05]]", "]"), "tendons.cable.points", "4 points, one in each"),
+        ((", [0.4, 0.2, 0.05]]", "]"), "tendons.cable.points", "4 points, one for each body"),
         (('["ground", "arm", "arm", "hand"]', '["arm", "arm", "arm", "arm"]'), "tendons.cable.bodies", "different"),
         (("[0.2, 0.1, 0.1]", "[-0.5, 0.0, 0.4]"), r"tendons.cable.points\[1\]", "two different points"),
-        (("damping", "slack = true\ndamping"), "tendons.cable.damping", "0 of a tendon with slack"),
+        (("damping", "slack = true\ndamping"), "tendons.cable.damping", "0 for a tendon with slack"),
         (("[tendons.cable]", '[actuators.cable]\njoints = ["pin"]\n[tendons.cable]'), "actuators.cable", "tendon"),
         (("[tendons.cable]", '[actuators.winch]\ntendon = "cabel"\n[tendons.cable]'), "winch.tendon", '"cable"'),
         (("[tendons.cable]", "[actuators.winch]\n[tendons.cable]"), "actuators.winch", "either joints or a tendon"),

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ephs.operad.disjoint import DisjointSets
 from ephs.solve.sparse import Index
 
 __all__ = ["Closing", "closing"]
@@ -95,23 +96,17 @@ def closing(parents: Sequence[int], ends: Sequence[Sequence[int]]) -> Closing:
         if link != meet[row]:
             slots[s][1] = number[above[link], row]
     rows_at = np.zeros((m, 4), dtype=np.int64)
-    leader = list(range(m))
-
-    def find(row: int) -> int:
-        while leader[row] != row:
-            row = leader[row]
-        return row
-
+    sets = DisjointSets[int]()
     for row in range(m):
         others = sorted(later[row], key=lambda r: rank[r])
         rows_at[row, :2] = len(flat), len(others)
         for other in others:
             flat += [other, number[meet[row], other], place(row, other)]
-            leader[find(other)] = find(row)
+            sets.join(row, other)
         rows_at[row, 2] = len(flat)
         flat += [place(a, b) for i, a in enumerate(others) for b in others[i:]]
     blocks: dict[int, int] = {}
-    rows_at[:, 3] = [blocks.setdefault(find(row), len(blocks)) for row in range(m)]
+    rows_at[:, 3] = [blocks.setdefault(sets.leader(row), len(blocks)) for row in range(m)]
     places = [number[x if x >= 0 else ground, row] for row, links in enumerate(ends) for x in links]
     return Closing(
         at,

@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.links import Found
 from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY, TINY
@@ -62,19 +63,11 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
 
 def _joined(links: int, ends: Sequence[Sequence[int]]) -> list[int]:
     """For each link the least number among those that hang together with it, the ground left out."""
-    of = list(range(links))  # each link -> one that is no greater in the same group
-
-    def least(link: int) -> int:
-        while of[link] != link:
-            of[link] = of[of[link]]
-            link = of[link]
-        return link
-
+    sets = DisjointSets[int]()
     for one, two in ends:
         if one >= 0 and two >= 0:
-            low, high = sorted((least(one), least(two)))
-            of[high] = low
-    return [least(link) for link in range(links)]
+            sets.join(*sorted(sets.leaders((one, two))))  # the least one leads
+    return sets.leaders(range(links))
 
 
 def _of_gravity(reduced: "Reduced") -> Array:

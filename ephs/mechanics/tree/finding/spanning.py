@@ -9,6 +9,7 @@ import numpy as np
 
 from ephs.mechanics.constraints.subgroup import generated
 from ephs.operad import Path
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3, Pair
 from ephs.solve.motion_law import MotionLaw
@@ -113,38 +114,15 @@ def _depths(start: int, edges: Sequence[Edge]) -> dict[int, int]:
     return depth
 
 
-@final
-class _Groups:
-    """Connected groups of bodies that grow edge by edge."""
-
-    __slots__ = ("_parent",)
-
-    def __init__(self, count: int) -> None:
-        self._parent = {body: body for body in range(-1, count)}
-
-    def of(self, body: int) -> int:
-        """Representative body of the group."""
-        while self._parent[body] != body:
-            self._parent[body] = self._parent[self._parent[body]]
-            body = self._parent[body]
-        return body
-
-    def join(self, one: int, other: int) -> bool:
-        """Join the groups of two bodies; False where they are one already."""
-        first, second = self.of(one), self.of(other)
-        self._parent[second] = first
-        return first != second
-
-
 def islands(count: int, edges: Sequence[Edge]) -> list[list[int]]:
     """The bodies of each group that has no joint with the ground, in order."""
-    groups = _Groups(count)
+    groups = DisjointSets[int]()
     for edge in edges:
         groups.join(edge.body1, edge.body2)
     found: dict[int, list[int]] = {}
     for body in range(count):
-        if groups.of(body) != groups.of(-1):
-            found.setdefault(groups.of(body), []).append(body)
+        if groups.leader(body) != groups.leader(-1):
+            found.setdefault(groups.leader(body), []).append(body)
     return sorted(found.values())
 
 
@@ -158,7 +136,7 @@ def spanning_tree(
     Among equals those near the ground come first: then branches are short, and few loops are open at one body.
     """
     depth = _depths(-1, joints)
-    groups = _Groups(len(light))
+    groups = DisjointSets[int]()
 
     weighty = {id(edge) for edge in inertial}
 
