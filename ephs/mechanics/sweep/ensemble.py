@@ -165,8 +165,6 @@ class _Runs:
                 stacks[number] = np.tile(array, (most, *[1] * array.ndim))
                 tables.append((array, stacks[number]))
             self._parts.append((array, stacks[number].reshape(most, -1), within, among))
-        nodes: Any = eq.reduced.nodes
-        self._heated = any(array is nodes.arrays[1] for array, _ in tables)
         stepper = ensemble.stepper(eq)
         control, times, step = stepper.control, ensemble.times, stepper.control.step
         self._bounds = Bounds.of(control, step, lawful=False)
@@ -192,7 +190,7 @@ class _Runs:
                 ending[k] = self._carefully(int(k), rows[k], leg, marches)
             done &= ending == Ending.DONE
         with np.errstate(all="ignore"):  # of members that are not done
-            done &= self._lawful(rows, q, y)
+            done &= self._lawful(q, y)
         marches = self._marches[0]
         q, y = (
             np.concatenate([start[:, None][:, : ensemble.first], kept[:count]], axis=1)
@@ -200,41 +198,26 @@ class _Runs:
         )
         return Ran(done, ensemble.read(q, y), marches.steps[:count].copy(), marches.rejected[:count].copy())
 
-    def _lawful(self, rows: Array, q: Array, y: Array) -> Truths:
+    def _lawful(self, q: Array, y: Array) -> Truths:
         """(members,) whether a member obeys the laws of its audit, by what it kept; q and y are those at its start."""
-        eq, marches, count, at = self._made.equations, self._marches[0], len(rows), self._chosen
+        eq, marches, count, at = self._made.equations, self._marches[0], len(q), self._chosen
         n, ns, end = eq.n, eq.ns, (marches.q[:count], marches.y[:count, eq.nv :])
         q = np.concatenate([q[:, None], marches.rows_q[:count, at], end[0][:, None]], axis=1)
         y = np.concatenate([y[:, None], marches.rows_y[:count, at], end[1][:, None]], axis=1)
-        large = np.abs(np.concatenate([end[0], end[1][:, : n + ns]], axis=1)) >= LARGEST
         r, heats, totals = np.split(y, [n, n + ns], axis=2)
-        x, energies, known = self._energies.of(q, r, self._entropies(rows, heats))
-        lawful = (
-            known
-            & np.isfinite(end[1]).all(axis=1)
-            & ~large.any(axis=1)
-            & ~suspicious(
-                self._bounds, energies * eq.led.mechanical, totals[..., :2], marches.put[:count], marches.least[:count]
-            )
-        )
+        # The heats' own laws are the base's: entropies of heat are no part of the mechanical energies.
+        x, energies, known = self._energies.of(q, r, eq.heats.entropies(heats))
+        held, put, least = energies * eq.led.mechanical, marches.put[:count], marches.least[:count]
+        within = np.abs(np.hstack([end[0], end[1][:, : n + ns]])).max(axis=1, initial=0.0) < LARGEST
+        lawful = known & within & np.isfinite(end[1]).all(axis=1)
+        lawful &= ~suspicious(self._bounds, held, totals[..., :2], put, least)
         if len(self._marches) > 1:
             found, longer = x[:, -1].copy(), self._marches[1]
             q[:], y[:] = longer.q[:count, None], longer.y[:count, None, eq.nv :]
             r, heats, _ = np.split(y, [n, n + ns], axis=2)
-            other, _, known = self._energies.of(q, r, self._entropies(rows, heats))
+            other, _, known = self._energies.of(q, r, eq.heats.entropies(heats))
             lawful &= known & resolved(eq.problem, found, other[:, -1])
         return lawful
-
-    def _entropies(self, rows: Array, heats: Array) -> Array:
-        """Entropies at heats (members, instants, …), by each member's own laws."""
-        eq = self._made.equations
-        if not self._heated:
-            return eq.heats.entropies(heats)
-        out = np.zeros(heats.shape)
-        for k, row in enumerate(rows):
-            self._fill(row)
-            out[k] = eq.heats.entropies(heats[k])
-        return out
 
     def _leg(self, control: Control, times: Array, saved: int, start: ReducedState) -> Any:
         """A march from a start, by a method that knows of no other."""

@@ -155,9 +155,9 @@ class Images:
         self._shapes = [a.shape for a in self.made.arrays()]
         self._courses: dict[int, _Course] = {}
         self._own: list[Index] = []
-        self.columns = np.arange(self.base.size)
-        self._whole = False
-        self._whole = not self._followed()
+        self.columns, self._whole = np.arange(self.base.size), False
+        if not self._followed():
+            self.columns, self._whole = np.arange(self.base.size), True
         self._spare.append(self.made)
 
     def anew(self) -> Made:
