@@ -16,7 +16,7 @@ def test_circuits_fluids_and_gases_keep_both_laws(name, cell):
     row = laws.measure(CELLS[cell], laws.METHODS[name])
     assert not row["failed"]
     assert row["defect"] <= ROUNDING
-    assert row["least"] >= 0.0 or name == "ida"
+    assert row["least"] >= 0.0
 
 
 def test_what_a_method_does_not_keep_is_seen():

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs import Pattern, library
+from ephs.solve.auditing.audit import COARSE, LAWFUL, LEAST, Bounds, audit
 from examples.failing import scene, truss
+from tests.solve.test_audit import bent
 
 EPS = float(np.finfo(float).eps)
 METHODS = {
@@ -78,3 +81,47 @@ def test_what_is_at_rest_stays_there(method):
         bound = 8.0 * 10.0 * EPS * (1.0 + weight)
         assert moved <= bound and np.abs(sol.body(body).angular_velocity).max() <= bound
         assert not sol.audit.findings
+
+
+CAPACITY, CONDUCTANCE, ROOM = 10.0, 1.0, 293.15
+
+
+def conducting(above, apart, method):
+    """Two stores of heat that conduct to each other, the first warmer by ``apart`` K."""
+    pattern = Pattern.from_text("a: entropy; b: entropy; one(s=a); two(s=b); passage(s1=a, s2=b)")
+    store = library.thermal_capacity(c1=CAPACITY * ROOM, c2=CAPACITY)
+    system = pattern(one=store, two=store, passage=library.heat_transfer(h=CONDUCTANCE))
+    start = {f"{name}.s": CAPACITY * math.log1p(x / ROOM) for name, x in (("one", above + apart), ("two", above))}
+    return ephs.simulate(system, 2.0, initial=start, method=method, step=0.1, audit="off")
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@pytest.mark.parametrize("above", [0.0, 50.0])
+@pytest.mark.parametrize("apart", [1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
+def test_nearly_equal_temperatures_conduct_no_energy_away(method, above, apart):
+    """Efforts are known to the rounding of temperatures; what is passed on is taken up all the same."""
+    sol = conducting(above, apart, method)
+    assert not sol.audit.findings
+    held = np.array(list(sol.ledgers.storages.values()))
+    passed, stored = float(np.abs(np.diff(held)).sum()), float(np.abs(held).max())
+    defect = np.abs((held - held[:, :1]).sum(axis=0)).max()
+    assert defect <= 8.0 * EPS * len(sol) * passed + 8.0 * EPS * stored
+    entropy, most = sol.entropy, sum(np.abs(sol[f"{name}.s"]).max() for name in ("one", "two"))
+    assert np.diff(entropy).min() >= -8.0 * EPS * most
+    if above == 0.0:  # differences of the states are not rounding
+        ends = [ROOM * math.expm1(float(np.ravel(sol[f"{name}.s"])[-1]) / CAPACITY) for name in ("one", "two")]
+        expected = apart * math.exp(-4.0 * CONDUCTANCE / CAPACITY)
+        assert ends[0] - ends[1] == pytest.approx(expected, rel=1e-4 + 10.0 * EPS * ROOM / apart)
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+@pytest.mark.parametrize("apart", [1e-9, 1e-7, 1e-5])
+@pytest.mark.parametrize("law", ["energy", "ledger"])
+def test_little_heat_that_is_lost_is_found(method, apart, law):
+    """The control: a part of 10⁻⁶ of what was passed on, of energy or of entropy."""
+    sol = conducting(0.0, apart, method)
+    ledgers = sol.ledgers
+    part = 1e-6 * np.abs(np.diff(next(iter(ledgers.storages.values())))).sum() * np.linspace(0.0, 1.0, len(sol))
+    changed = {"thermal": ledgers.thermal + part} if law == "energy" else {"made": ledgers.made + part / ROOM}
+    found = audit(bent(sol, **changed), Bounds(LAWFUL, COARSE, LEAST, step=0.1)).findings
+    assert law in [one.law for one in found]

@@ -82,7 +82,8 @@ class _Linear:
         p, X, k, pencil = self.parts, self.X, self.k, self.pencil
         rows, by_states, by_inputs = pencil.algebraic(p)
         back = np.linalg.pinv(rows, rcond=ELIMINATION)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
-        by = back @ np.hstack([by_states @ X, by_inputs])
+        given = np.hstack([by_states @ X, by_inputs])
+        by = back @ given
         W = _kernel(rows)
         moving = np.hstack([X, np.eye(pencil.n_w)[:, self.left_out]])
         acting = np.hstack([p.flow_efforts, p.flow_multipliers])
@@ -90,7 +91,8 @@ class _Linear:
         right = np.hstack([-(p.flow_rates @ self._turning() + p.flow_states @ X), p.force]) - acting @ by
         found = _solved(matrix[p.stored], right[p.stored], k)
         rest = found[moving.shape[1] :]
-        whole, terms = by + W @ rest, np.abs(by) + np.abs(W) @ np.abs(rest)
+        whole, known = by + W @ rest, np.abs(found).max(axis=0, initial=0.0)  # κ ε of which is in all of a solution
+        terms = np.abs(back) @ np.abs(given) + np.abs(W).sum(axis=1, keepdims=True) * known
         sizes = Sizes.of(found[:, k:], terms[:, :k], terms[:, k:])
         efforts, flows = whole[: pencil.n_e], whole[pencil.n_e + pencil.n_l :]
         A, B = found[:k, :k], found[:k, k:]

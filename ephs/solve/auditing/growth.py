@@ -18,6 +18,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import TINY
+from ephs.solve.auditing.rounding import rounded
 from ephs.solve.control import SLIVER
 from ephs.solve.errors import Interrupted
 
@@ -141,7 +142,9 @@ def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, in
     ]
     for name in ("heat", "work"):
         a, b = getattr(one.ledgers, name), getattr(other.ledgers, name)
-        shifts.append((np.abs((a[mine] - a[0]) - (b[its] - b[0])) / one.ledgers.scale, None))
+        off = np.abs((a[mine] - a[0]) - (b[its] - b[0]))
+        rounding = rounded(one) if off.any() else 0.0  # which is all that there is of bodies at rest
+        shifts.append((np.where(off <= rounding, 0.0, off / one.ledgers.scale), None))
     for shift, path in shifts:
         worst = int(np.argmax(np.where(np.isnan(shift), np.inf, shift)))
         found.append((float(np.nan_to_num(shift[worst], nan=np.inf)), int(mine[worst]), path))

@@ -35,7 +35,7 @@ from ephs.solve.methods.records import (
     Scratch,
     row_of,
 )
-from ephs.solve.methods.residuals import FAULTS, account, evaluated
+from ephs.solve.methods.residuals import FAULTS, account, balance, evaluated
 from ephs.solve.methods.scales import COMMON, FAR, measure
 from ephs.solve.methods.scheme import (
     AHEAD,
@@ -208,7 +208,9 @@ def advance(
     def book(i: Integer) -> None:
         evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m)
         weight = on.select(on.same(i, 0), WEIGHTS[0], on.select(on.same(i, 1), WEIGHTS[1], WEIGHTS[2]))
-        least.value = least.value + account(on, t, z.row(i), scal[0] * weight, inputs.row(i), m, sums)
+        h = scal[0] * weight
+        balance(on, t, z.row(i), h, m, s.whole, h, s.energy)
+        least.value = least.value + account(on, t, z.row(i), h, inputs.row(i), m, sums)
 
     def keep() -> None:
         row = outcome[2]

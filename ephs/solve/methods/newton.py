@@ -42,7 +42,7 @@ from ephs.solve.methods.records import (
     State,
     row_of,
 )
-from ephs.solve.methods.residuals import FAULTS, account, evaluated
+from ephs.solve.methods.residuals import FAULTS, account, balance, evaluated
 from ephs.solve.methods.scales import COMMON, FAR, measure, reach, weigh
 
 __all__ = [
@@ -312,6 +312,7 @@ def advance(
 
     def keep() -> None:
         row = outcome[2]
+        balance(on, t, z, scal[0], m, z, 1.0, m.energy)
         settle(on, t, x, scal[0], z, m.v)
         least = account(on, t, z, scal[0], inputs, m, sums)
         copy(on, x, states.row(row))

@@ -9,7 +9,7 @@ from ephs.solve.methods.places import Part, add_to, copy, fill
 from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, WORKING, Columns, Dims, Outer, Scratch, row_of
 from ephs.solve.methods.scales import FAR, reach, still, weigh
 
-__all__ = ["FAULTS", "account", "called", "evaluated"]
+__all__ = ["FAULTS", "account", "balance", "called", "evaluated"]
 
 FAULTS: Final = 64
 """A fault is a component's number times this, and a status; 0 is none."""
@@ -78,6 +78,39 @@ def called(on: Evaluator, part: Part, x: Vector, z: Vector, scal: Vector, m: Scr
     return on.reach(
         Reached(SIGNATURE, t.address[i]), dims, scal, parameters, m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
     )
+
+
+def balance(
+    on: Evaluator, t: Columns, z: Vector, h: Real, m: Scratch, entropies: Vector, by: Real, energies: Vector
+) -> None:
+    """Add what is left of the balances of entropies, times ``by``, to the change of what stores them in h seconds.
+
+    A solution is known to the rounding of temperatures, what flows between nearly equal ones only to the difference of
+    these: what a storage takes up is then that flow itself, or energy would be lost by as much as flows at all.
+
+    Parameters
+    ----------
+    entropies, energies
+        By their rates, and energies of all components at the end: what is changed.
+    """
+
+    def component(i: Integer) -> None:
+        part = Part.of(t, i)
+
+        def port(j: Integer) -> None:
+            row = part.balance(j)
+
+            def take() -> None:
+                more = -m.residual[row]
+                add_to(entropies, part.rate(j), by * more)
+                add_to(energies, i, (z[row] + t.intensive[part.effort(j)]) * (h * more))
+                m.residual[row] = 0.0  # a second storage there gets no more
+
+            on.when(t.entropy[part.effort(j)] > 0.0, take)
+
+        on.when(on.same(t.kind[i], STORING), lambda: on.loop(part.n, port))
+
+    on.loop(t.kind.size, component)
 
 
 def _store(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:

@@ -120,10 +120,11 @@ def test_what_is_equally_warm_all_along_loses_no_entropy(method, tmp_path):
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
-def test_a_warm_rod_between_walls_is_at_rest(method, tmp_path):
+@pytest.mark.parametrize("damping", ["", "damping = 1e-4\n"], ids=["plain", "damped"])
+def test_a_warm_rod_between_walls_is_at_rest(method, damping, tmp_path):
     """The forces that hold it are large and its energies are not: what moves is rounding of the forces."""
     file = tmp_path / "steel.toml"
-    file.write_text(STEEL + "[world]\ngravity = [0.0, 0.0, 0.0]\n", encoding="utf-8")
+    file.write_text(STEEL + damping + "[world]\ngravity = [0.0, 0.0, 0.0]\n", encoding="utf-8")
     assert ephs.simulate(ephs.load(file), 1e-2, method=method, step=1e-3).audit.passed
     swinging = ephs.simulate(rod(tmp_path), 0.1, method=method, step=2e-2, audit="off")
     assert "accuracy" in [finding.law for finding in swinging.audit.findings], "the control: one end is free"
