@@ -35,16 +35,11 @@ from ephs.semantics.stage.known import known
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
 __all__ = [
-    "ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps",
+    "ARGUMENTS", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps",
 ]  # fmt: skip
 
 PLACE: Final = 24
 """Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
-FREE: Final = ("accelerations", "evaluations", "energy", "rigid")
-"""Entry functions for trees on which nothing but gravity and forces on the rates act."""
-GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy", "rigid")
-"""Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
-ENTRIES: Final = (*FREE, *GENERAL)
 
 
 @final
@@ -127,7 +122,8 @@ class Sweeps:
     width
         Numbers of memory that a link takes; the ground takes as many.
     program
-        The entry functions of `FREE` or `GENERAL`.
+        Entry functions for mechanisms with loops, wrenches on links or prescribed motions, or for trees on which
+        nothing but gravity and forces on the rates act.
     """
 
     def __init__(
