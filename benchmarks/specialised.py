@@ -1,4 +1,4 @@
-"""One evaluation of a tree's accelerations by the looped program of its class, and by the same one unrolled over its tables.
+"""One evaluation of a tree's accelerations by the looped program of its class, and by that program unrolled for it.
 
 Both are timed in turn within one process, at states that change, and the median counts. Compile times are those of the
 processor from the staged functions to machine code, nothing taken from a cache; the looped program serves all trees of

@@ -35,7 +35,7 @@ from ephs.semantics.stage.known import known
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
 __all__ = [
-    "ARGUMENTS", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps",
+    "ARGUMENTS", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "sweeps",
 ]  # fmt: skip
 
 PLACE: Final = 24
@@ -187,7 +187,7 @@ class Sweeps:
 
     def _free(self) -> dict[str, Entry]:
         def accelerate(on: Evaluator, tree: Tree, q: Vector, r: Vector, force: Vector, rate: Vector) -> Integer:
-            return accelerations(on, tree, q, r, rate, given_force(force))
+            return accelerations(on, tree, q, r, rate, _given_force(force))
 
         def evaluations(on: Evaluator, tree: Tree, q: Matrix, r: Matrix, rates: Matrix, repeats: Integer) -> None:
             def one(k: Integer) -> None:
@@ -237,7 +237,7 @@ class Sweeps:
                 closing.eliminate(on, rows, i, state)
                 closing.eliminate_load(on, rows, i, state)
                 inward(on, tree, i, fault)
-                load_inward(on, tree, q, given_force(force), i)
+                load_inward(on, tree, q, _given_force(force), i)
                 closing.carry(on, tree, rows, i)
                 closing.carry_load(on, tree, rows, i)
 
@@ -297,7 +297,7 @@ def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:
     on.loop(tree.size, show)
 
 
-def given_force(force: Vector) -> Force:
+def _given_force(force: Vector) -> Force:
     """The forces on the rates that a vector holds."""
     return lambda i, joint, link: [force[link.r_at + j] for j in range(joint.dim)]
 
