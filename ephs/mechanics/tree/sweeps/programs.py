@@ -9,6 +9,7 @@ from typing import Any, Final, final
 from ephs.mechanics.tree.sweeps import closing
 from ephs.mechanics.tree.sweeps.accelerations import Force, accelerate_outward, accelerations, no_force
 from ephs.mechanics.tree.sweeps.closing import Rows
+from ephs.mechanics.tree.sweeps.cuts import Place, show_place
 from ephs.mechanics.tree.sweeps.energy import energy
 from ephs.mechanics.tree.sweeps.inward import inward, load_inward
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
@@ -34,12 +35,7 @@ from ephs.semantics.stage import (
 from ephs.semantics.stage.known import known
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = [
-    "ARGUMENTS", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "sweeps",
-]  # fmt: skip
-
-PLACE: Final = 24
-"""Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
+__all__ = ["ARGUMENTS", "Sweeps", "common_sweeps", "sweeps"]
 
 
 @final
@@ -79,7 +75,7 @@ ROWS: Final[dict[str, Any]] = {
 """The rows of its loops: see `ephs.mechanics.tree.sweeps.closing.Rows`."""
 ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
-    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector(), "places": matrix(PLACE)},
+    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector(), "places": matrix(Place.real_width)},
     "fold": {**MECHANISM, **ROWS, "q": vector(), "force": vector(), "wrench": matrix(6)},
     "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
     "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
@@ -222,9 +218,7 @@ class Sweeps:
 
             def show(i: Integer) -> None:
                 state = tree.states[i]
-                turn = [x for row in state.turn for x in row]
-                for k, x in enumerate([*turn, *state.at, *state.twist, *state.bias]):
-                    places[i, k] = x
+                show_place(places, i, state, state.bias)
 
             on.loop(tree.size + 1, show)
 
