@@ -1,4 +1,4 @@
-"""One evaluation of a tree's accelerations by the looped program of its class, and by the one written out for it.
+"""One evaluation of a tree's accelerations by the looped program of its class, and by that program unrolled for it.
 
 Both are timed in turn within one process, at states that change, and the median counts. Compile times are those of the
 processor from the staged functions to machine code, nothing taken from a cache; the looped program serves all trees of
@@ -18,7 +18,6 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.sweeps.programs import sweeps
-from ephs.mechanics.tree.sweeps.unrolled import unrolled
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.llvm import compile_text
 
@@ -41,14 +40,18 @@ def measure(family: str, size: int) -> dict[str, Any]:
     scene = families.scene(family, size)
     equations = Equations(problem_of_scene(scene), 0.0)
     found = links_of(equations.reduced).packed(equations.gravity)
-    looped, written = sweeps(found.kind), unrolled(found)
+    looped = sweeps(found.kind)
     state, rng = equations.start(0.0), np.random.default_rng(0)
     q = np.array([state.q] * STATES)
     r = np.array([state.r + 0.1 * rng.standard_normal(equations.n) for _ in range(STATES)])
     rounds, memory = max(1, BLOCK // (STATES * size)), np.zeros((size + 1) * looped.width)
-    tables = found.size, found.integers, found.reals, memory, found.gravity
+    tables = {
+        "size": found.size, "integers": found.integers, "reals": found.reals, "memory": memory,
+        "gravity": found.gravity,
+    }  # fmt: skip
+    written = Program("unrolled", evaluations=looped.program.entries["evaluations"].given(**tables))
     calls = {
-        "looped": looped.program.compiled()["evaluations"].bind(*tables, q, r, np.zeros_like(r), rounds),
+        "looped": looped.program.compiled()["evaluations"].bind(*tables.values(), q, r, np.zeros_like(r), rounds),
         "unrolled": written.compiled()["evaluations"].bind(q, r, np.zeros_like(r), rounds),
     }
     times: dict[str, list[float]] = {name: [] for name in calls}

@@ -55,12 +55,6 @@ class Subgroup:
         free = self.translations
         return float(axis @ (twist[3:] - free @ (free.T @ twist[3:])))
 
-    def contains(self, twist: Array) -> bool:
-        """Whether a twist (6,) of size about one belongs to its algebra."""
-        return float(np.abs(twist - self.basis @ (self.basis.T @ twist)).max()) < ASSEMBLY * max(
-            1.0, float(np.abs(twist).max())
-        )
-
     @property
     def name(self) -> str:
         """The usual name of its conjugacy class."""

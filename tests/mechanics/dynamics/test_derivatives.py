@@ -231,7 +231,7 @@ def test_columns_add_up_along_any_direction(drawn):
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
     slopes = equations.dense.residual.slopes()
-    sizes = {"v": equations.nv, "r": equations.n, "s": equations.ns, "a": equations.n}
+    sizes = {"increment": equations.nv, "r": equations.n, "entropy": equations.ns, "a": equations.n}
     seeds = {name: rng.standard_normal((size, 3)) for name, size in sizes.items()}
     along = slopes.of("residual", seeds, 3)
     columns, whole = slopes.along("residual", tuple(sizes)), np.concatenate(list(seeds.values()))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from ephs.mechanics.constraints.subgroup import generated
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rank import ASSEMBLY
 
 X, Y, Z = np.eye(3)
 ZERO = np.zeros(3)
@@ -26,6 +27,12 @@ CLASSES = {
 }
 
 
+def contains(group, twist):
+    """Whether a twist of size about one belongs to the group's algebra."""
+    off = twist - group.basis @ (group.basis.T @ twist)
+    return float(np.abs(off).max()) < ASSEMBLY * max(1.0, float(np.abs(twist).max()))
+
+
 @pytest.mark.parametrize("name", CLASSES)
 @given(seed=st.integers(0, 2**20))
 def test_a_class_is_known_in_any_frame(name, seed):
@@ -38,13 +45,13 @@ def test_a_class_is_known_in_any_frame(name, seed):
     for columns in (group.turning, group.translations, group.basis):
         assert np.allclose(columns.T @ columns, np.eye(columns.shape[1]), atol=1e-12)
     for twist in twists:
-        assert group.contains(carried @ twist)
+        assert contains(group, carried @ twist)
     # what is in it is closed under brackets, and what is not is not contained
     for one in group.basis.T:
-        assert all(group.contains(SE3.ad(one) @ other) for other in group.basis.T)
+        assert all(contains(group, SE3.ad(one) @ other) for other in group.basis.T)
     if group.dim < 6:
         outside = np.linalg.svd(group.basis)[0][:, -1] if group.dim else np.eye(6)[0]
-        assert not group.contains(outside) and not group.contains(1e-6 * outside + group.basis.sum(axis=1))
+        assert not contains(group, outside) and not contains(group, 1e-6 * outside + group.basis.sum(axis=1))
 
 
 @given(seed=st.integers(0, 2**20), pitch=st.sampled_from([-0.7, 0.02, 1.3]), slides=st.booleans())

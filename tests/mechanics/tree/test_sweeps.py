@@ -13,8 +13,8 @@ from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.sweeps.programs import sweeps
-from ephs.mechanics.tree.sweeps.unrolled import unrolled
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.stage import Program
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
 
@@ -39,16 +39,21 @@ class Tree:
         )
         self.weight = sum(body.mass for body in bodies) * (10.0 + reach) * reach
 
+    @property
+    def tables(self):
+        links = self.packed.links
+        memory = np.zeros((links.size + 1) * self.sweeps.width)
+        names = "size", "integers", "reals", "memory", "gravity"
+        given = links.size, links.integers.array, links.reals.array, memory, self.packed.gravity
+        return dict(zip(names, given, strict=True))
+
     def run(self, calls):
         """(ṙ, status) of the sweeps as a program's functions."""
-        links, rate = self.packed.links, np.zeros(self.equations.n)
-        memory = np.zeros((links.size + 1) * self.sweeps.width)
-        state = self.q, self.r, self.force
-        tables = links.size, links.integers.array, links.reals.array, memory, self.packed.gravity
-        return rate, calls["accelerations"](*tables, *state, rate)
+        rate = np.zeros(self.equations.n)
+        return rate, calls["accelerations"](*self.tables.values(), self.q, self.r, self.force, rate)
 
     def unrolled(self, calls):
-        """The same of the program that is written out."""
+        """The same of the program that is unrolled over the tables."""
         rate = np.zeros(self.equations.n)
         return rate, calls["accelerations"](self.q, self.r, self.force, rate)
 
@@ -83,13 +88,14 @@ def drawn(draw, **options):
 @settings(slow, max_examples=8)
 @given(tree=drawn(loops=False, friction=False, springs=False, heat=False))
 def test_all_ways_to_run_the_sweeps_agree(tree):
-    """The looped program's float run and machine code have the same bits, and so have those of the unrolled one."""
+    """The looped program's float run and machine code have the same bits, and so has that program unrolled."""
     assume(tree.packed.kind.joints)
     found, status = tree.run(tree.sweeps.program.plain())
     machine, also = tree.run(tree.sweeps.program.compiled())
     assert np.array_equal(found, machine) and status == also == 0
     tree.alike(found, tree.dense())
-    one = unrolled(tree.packed)
+    entry = tree.sweeps.program.entries["accelerations"]
+    one = Program("unrolled", accelerations=entry.given(**tree.tables))
     (known, _), (coded, _) = tree.unrolled(one.plain()), tree.unrolled(one.compiled())
     assert np.array_equal(known, coded)
     tree.alike(found, known)

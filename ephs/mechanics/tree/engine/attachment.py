@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS, Called, Stores
+from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS, Called, Net, Stores
 from ephs.semantics.bundle import Array
 from ephs.semantics.numbering import starts
+from ephs.semantics.stage import Evaluator, Integer, Vector
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["Attachment", "attachment_of", "laws_in"]
+__all__ = ["Attachment", "attached_energy", "attachment_of", "laws_in"]
 
 
 @final
@@ -84,6 +86,14 @@ def attachment_of(reduced: "Reduced", address: Index) -> Attachment:
     whole, numbers = [integers[name] for name in INTEGERS], [reals[name] for name in REALS]
     head = np.concatenate([_places(whole, 2 * (len(INTEGERS) + len(REALS))), _places(numbers, 0)])
     return Attachment(np.concatenate([head, *whole]).astype(np.int64), np.concatenate(numbers))
+
+
+def attached_energy(on: Evaluator, tables: Tables, work: Work, out: Vector) -> Integer:
+    """Add the energy of attached storages at the states in the memory to out[1], sizes to out[2]; return a status."""
+    net = Net.of(tables.net, tables.numbers, tables.parameters, tables.scal, tables.supply)
+    status = net.energies(on, work.entropy, out)
+    work.fault[0] = on.select(on.same(status, 0), work.fault[0], net.fault[0])
+    return status
 
 
 def _places(parts: Sequence[Array | Index], first: int) -> Index:

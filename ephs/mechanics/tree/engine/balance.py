@@ -14,7 +14,8 @@ What is then still missing is left to what is attached, see `ephs.mechanics.tree
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
-from ephs.mechanics.tree.engine.forces import attached_energy, strain
+from ephs.mechanics.tree.engine.attachment import attached_energy
+from ephs.mechanics.tree.engine.forces import strain
 from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.engine.storing import store_attached
 from ephs.mechanics.tree.sweeps.acting import Body

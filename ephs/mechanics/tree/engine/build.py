@@ -16,10 +16,10 @@ from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
 from ephs.mechanics.tree.sweeps.charts import TIE, Chart, Kind
-from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
+from ephs.mechanics.tree.sweeps.cuts import Cut, Place, Relative
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.pack import STANDARD, Packed
-from ephs.mechanics.tree.sweeps.programs import PLACE, sweeps
+from ephs.mechanics.tree.sweeps.programs import sweeps
 from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
@@ -243,7 +243,7 @@ def _shapes(
     (links, islands), (entropies, totals) = groups, booked
     rows, slots = len(closing.row), len(closing.slot)
     return {
-        "work": ((links + 1) * width,), "place": (links + 1, PLACE), "change": (links + 1, 6),
+        "work": ((links + 1) * width,), "place": (links + 1, Place.real_width), "change": (links + 1, 6),
         "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,), "pulled": (joints,),
         "relative": (cuts, Relative.real_width),
         "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),

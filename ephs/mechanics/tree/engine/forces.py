@@ -13,7 +13,6 @@ from ephs.mechanics.tree.sweeps.acting import (
     Acting,
     Component,
     Conduction,
-    Port,
     Tables,
     Work,
 )
@@ -26,7 +25,7 @@ from ephs.semantics.spaces import se3, so3
 from ephs.semantics.spaces.vectors import Rows, apply_transposed, dot, product, scale, sub, transposed
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Variable, Vector, staged
 
-__all__ = ["act", "attached_energy", "strain"]
+__all__ = ["act", "strain"]
 
 
 def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
@@ -37,7 +36,7 @@ def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
 @staged
 def act(
     on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, totals: Vector,
-    about: About | None, expanded: bool,
+    kept: About | None, read: About | None,
 ) -> Integer:  # fmt: skip
     """Write forces on joints and wrenches on links, rates of entropies, entropies made and powers; return a status.
 
@@ -45,12 +44,12 @@ def act(
 
     Parameters
     ----------
-    about
+    kept
         Receives what was evaluated; None: it is not kept.
-    expanded
-        Whether it is read instead: nothing is evaluated but what was, to first order.
+    read
+        Is read instead: nothing is evaluated but what was, to first order.
     """
-    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), about, expanded)
+    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read)
     totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
@@ -66,7 +65,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
     Places of links in the memory are those at q where springs act between bodies.
     """
-    acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, False)
+    acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, None)
 
     def one(i: Integer) -> None:
         def store(edge: Acting) -> None:
@@ -77,18 +76,6 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
     on.loop(tables.acting.size, one)
     return acting.status.value
-
-
-def attached_energy(on: Evaluator, tables: Tables, work: Work, out: Vector) -> Integer:
-    """Add the energy of attached storages at the states in the memory to out[1], sizes to out[2]; return a status."""
-    net = Net.of(tables.net, tables.numbers, tables.parameters, tables.scal, tables.supply)
-    status = net.energies(on, work.entropy, out)
-
-    def blame() -> None:
-        work.fault[0] = net.fault[0]
-
-    on.when(on.negate(on.same(status, 0)), blame)
-    return status
 
 
 @final
@@ -105,8 +92,8 @@ class _Acting:
     made: Vector
     totals: Vector
     status: Variable[Integer]
-    about: About | None
-    expanded: bool
+    kept: About | None
+    read: About | None
 
     def unless_refused(self, following: Callable[[], None]) -> None:
         """Go on where no component has refused."""
@@ -119,11 +106,11 @@ class _Acting:
         """
         on, tables, w, row = self.on, self.tables, self.work, self.tables.component[number]
         dims = Integers(row.integers, row.integer_start + Component.dims.offset, 4)
-        if self.about is not None and self.expanded:
+        if self.read is not None:
             if stored:
-                self.about.store(on, number, dims, w)
+                self.read.store(on, number, dims, w)
             else:
-                self.about.relate(on, number, dims, w, on.select(on.same(dims[2], moving), moving, 0))
+                self.read.relate(on, number, dims, w, on.select(on.same(dims[2], moving), moving, 0))
             return
         parameters = tables.parameters.part(row.at, tables.parameters.size - row.at)
         found = on.reach(
@@ -135,8 +122,8 @@ class _Acting:
             w.fault[0] = number
 
         on.when(on.negate(on.same(found, 0)), refuse)
-        if self.about is not None:
-            self.about.keep(on, number, dims, w, stored)
+        if self.kept is not None:
+            self.kept.keep(on, number, dims, w, stored)
 
     def warm(self, k: Integer) -> None:
         """Write the effort of an entropy to the memory."""
@@ -145,8 +132,8 @@ class _Acting:
         self.s_rate[k] = 0.0
 
         def stored() -> None:
-            if self.about is not None and self.expanded:
-                self.about.local[0] = w.entropy[k] - self.about.expansion[number].state[0]
+            if self.read is not None:
+                self.read.local[0] = w.entropy[k] - self.read.expansion[number].state[0]
             else:
                 w.x[0] = w.entropy[k]
             self._evaluate(number, stored=True)
@@ -189,16 +176,12 @@ class _Acting:
 
     def _flows(self, net: Net) -> Vector:
         """Flows of what is attached."""
-        on, t, w, about = self.on, self.tables, self.work, self.about
-
-        def rate(k: Integer) -> Real:
-            return self._rate(t.port[k])
-
-        if about is not None and self.expanded:
-            return about.flows(on, net, rate, w)
+        on, t, w, kept = self.on, self.tables, self.work, self.kept
+        if self.read is not None:
+            return self.read.flows(on, net, self._rate, w)
 
         def meet(k: Integer) -> None:
-            net.effort[k] = rate(k)
+            net.effort[k] = self._rate(k)
 
         on.loop(t.port.size, meet)
         self.status.value = on.reach(
@@ -207,20 +190,17 @@ class _Acting:
         )  # fmt: skip
 
         def keep() -> None:
-            if about is not None:
-                self.status.value = about.attach(on, net, rate, w)
+            if kept is not None:
+                self.status.value = kept.attach(on, net, self._rate, w)
 
         self.unless_refused(keep)
-
-        def refuse() -> None:
-            w.fault[0] = net.fault[0]
-
-        on.when(on.negate(on.same(self.status.value, 0)), refuse)
+        w.fault[0] = on.select(on.same(self.status.value, 0), w.fault[0], net.fault[0])
         return net.flow
 
-    def _rate(self, port: Port) -> Real:
-        """The rate of a joint's degree of freedom."""
-        on, edge, rate = self.on, self.tables.acting[port.edge], self.on.variable(0.0)
+    def _rate(self, k: Integer) -> Real:
+        """The rate of the degree of freedom at a port."""
+        on, port, rate = self.on, self.tables.port[k], self.on.variable(0.0)
+        edge = self.tables.acting[port.edge]
 
         def in_tree() -> None:
             rate.value = self.r[port.place]
@@ -326,11 +306,10 @@ class _Acting:
             *so3.quaternion(on, product(transposed(inner), turn)),
             *apply_transposed(inner, sub(there, edge.inner_at)),
         ]
-        if self.about is not None and self.expanded:
-            at_rest = self.about.expansion[self.on.select(edge.spring < 0, edge.friction, edge.spring)].state
-            pose, into = se3.increment(on, at_rest, pose), self.about.local
-        else:
-            into = self.work.x
+        into = self.work.x
+        if self.read is not None:
+            at_rest = self.read.expansion[self.on.select(edge.spring < 0, edge.friction, edge.spring)].state
+            pose, into = se3.increment(on, at_rest, pose), self.read.local
         for k, x in enumerate(pose):
             into[k] = x
 
@@ -346,8 +325,8 @@ class _Acting:
 
     def _drive(self, edge: Acting, rate: Vector, pull: Vector) -> None:
         """Start from the given forces on a joint, whose element goes to the states of components."""
-        if self.about is not None and self.expanded:
-            copy(self.on, self.about.increment.part(edge.r_at, edge.dim), self.about.local.part(0, edge.dim))
+        if self.read is not None:
+            copy(self.on, self.read.increment.part(edge.r_at, edge.dim), self.read.local.part(0, edge.dim))
         else:
             copy(self.on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
 

@@ -145,7 +145,7 @@ class Mechanism(Motion):
             clear(on, w.force)
 
             def forced() -> None:
-                status.value = act(on, self.tables, w, q, r, s_rate, made, totals, None, False)
+                status.value = act(on, self.tables, w, q, r, s_rate, made, totals, None, None)
 
             def inward() -> None:
                 status.value = self.fold(on, q, w.force, w.pushed)

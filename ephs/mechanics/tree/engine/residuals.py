@@ -212,7 +212,7 @@ def _act(
 ) -> None:  # fmt: skip
     """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ."""
     _clear(on, work)
-    act(on, tables, work, q, r, heat, work.idle.part(2, work.idle.size - 2), work.idle.part(0, 2), about, True)
+    act(on, tables, work, q, r, heat, work.idle.part(2, work.idle.size - 2), work.idle.part(0, 2), None, about)
 
     def take(j: Integer) -> None:
         force[j] = -work.force[j]
@@ -254,7 +254,7 @@ def point_program() -> Program:
     ) -> Integer:
         _clear(on, work)
         clear(on, made)
-        return act(on, tables, work, q, r, work.idle.part(0, work.entropy.size), made, totals, about, False)
+        return act(on, tables, work, q, r, work.idle.part(0, work.entropy.size), made, totals, about, None)
 
     kinds: dict[str, Any] = {**MOVING, **ABOUT, "q": vector(), "r": vector(), "made": vector(), "totals": vector(2)}
     return Program("point", about=Entry.bundled(evaluate, kinds, *_BUNDLES))

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TWIST", "Impulses"]
 
-TWIST = slice(12, 18)
+TWIST = slice(Place.twist.offset, Place.twist.offset + 6)
 """Position of the twist in a link's row of `places`."""
 
 
@@ -30,7 +30,7 @@ class Impulses:
 
     def __init__(self, equations: "Equations", inertia: Array) -> None:
         engine, links, n = equations.engine, equations.reduced.links, equations.n
-        self._inertia, self._places = inertia, np.zeros((links + 1, PLACE))
+        self._inertia, self._places = inertia, np.zeros((links + 1, Place.real_width))
         program, _ = engine.reached["move"]
         calls = program.compiled()
         reals = engine.tables["reals"].copy()

@@ -6,8 +6,7 @@ from typing import Any, Final, final
 from ephs.mechanics.tree.sweeps import loops, programs
 from ephs.mechanics.tree.sweeps.balances import ATTACH
 from ephs.mechanics.tree.sweeps.charts import Chart
-from ephs.mechanics.tree.sweeps.cuts import Relative
-from ephs.mechanics.tree.sweeps.programs import PLACE
+from ephs.mechanics.tree.sweeps.cuts import Place, Relative
 from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
@@ -387,7 +386,7 @@ class Work:
 
 
 WORK: Final[dict[str, Any]] = {
-    "work": vector(), "place": matrix(PLACE), "change": matrix(6), "pushed": matrix(6), "force": vector(),
+    "work": vector(), "place": matrix(Place.real_width), "change": matrix(6), "pushed": matrix(6), "force": vector(),
     "zero": vector(), "attached": vector(), "pulled": vector(), "relative": matrix(Relative.real_width),
     "value": matrix(4), "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(),
     "temperature": vector(), "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),

@@ -17,12 +17,11 @@ from ephs.semantics.stage import (
     Truth,
     Vector,
     indices,
-    matrix,
     signature_of,
     vector,
 )
 
-__all__ = ["ATTACH", "network_program"]
+__all__ = ["ATTACH", "network_program", "slopes_of"]
 
 UNSOLVED: Final = 9
 """Status where efforts do not follow from the balances of flows."""
@@ -220,7 +219,5 @@ def _put(vector: Vector, k: Integer, value: Real) -> None:
 def network_program() -> Program:
     """Return the program of all networks."""
 
-    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
-        return Entry.bundled(function, {**_PLACE, **kinds}, (_PLACE, Net.of))
-
-    return Program("network", solve=entry(solve_network, **_ABOUT), slopes=entry(slopes_of, out=matrix()))
+    kinds = {**_PLACE, **_ABOUT}
+    return Program("network", solve=Entry.bundled(solve_network, kinds, (_PLACE, Net.of)))

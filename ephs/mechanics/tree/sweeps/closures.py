@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.mechanics.tree.sweeps import cuts
-from ephs.mechanics.tree.sweeps.cuts import Cut, Place, Relative
+from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces.vectors import add, dot, scale
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Table, Vector
@@ -43,10 +43,8 @@ class Closures:
         """Write the places of links, and the motions and rows of cut joints."""
 
         def show(i: Integer) -> None:
-            state, row = tree.states[i], self.places.row(i)
-            found = Place(self.cuts.integers, 0, row.cells, row.start)
-            found.turn, found.at, found.twist = state.turn, state.at, state.twist
-            found.bias = add(state.bias, state.change)
+            state = tree.states[i]
+            cuts.show_place(self.places, i, state, add(state.bias, state.change))
 
         def clear(e: Integer) -> None:
             for k in range(6):

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from ephs.mechanics.tree.sweeps.charts import TIE, Chart, Kind, of_joints, visit_kind
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
+from ephs.mechanics.tree.sweeps.records import State
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.spaces.vectors import add, apply, apply_transposed, combine, dot, product, scale, sub, transposed
@@ -43,6 +44,7 @@ __all__ = [
     "poses",
     "relative_rates",
     "rows",
+    "show_place",
     "velocities",
 ]
 
@@ -114,6 +116,12 @@ class Relative(Record):
     at = reals(3)
     twist = reals(6)
     change = reals(6)
+
+
+def show_place(places: Matrix, i: Integer, state: State, bias: list[Real]) -> None:
+    """Write where a link is and how it moves to its row."""
+    row = Place(NO_INTEGERS, 0, places.cells, places.start + i * places.columns)
+    row.turn, row.at, row.twist, row.bias = state.turn, state.at, state.twist, bias
 
 
 def place_of(on: Evaluator, places: Matrix, link: Integer) -> Place:

@@ -9,6 +9,7 @@ from typing import Any, Final, final
 from ephs.mechanics.tree.sweeps import closing
 from ephs.mechanics.tree.sweeps.accelerations import Force, accelerate_outward, accelerations, no_force
 from ephs.mechanics.tree.sweeps.closing import Rows
+from ephs.mechanics.tree.sweeps.cuts import Place, show_place
 from ephs.mechanics.tree.sweeps.energy import energy
 from ephs.mechanics.tree.sweeps.inward import inward, load_inward
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
@@ -34,17 +35,7 @@ from ephs.semantics.stage import (
 from ephs.semantics.stage.known import known
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = [
-    "ARGUMENTS", "ENTRIES", "FREE", "GENERAL", "MECHANISM", "PLACE", "Sweeps", "common_sweeps", "given_force", "sweeps",
-]  # fmt: skip
-
-PLACE: Final = 24
-"""Numbers of a link that rows and forces read: R and p in the world, twist, bias."""
-FREE: Final = ("accelerations", "evaluations", "energy", "rigid")
-"""Entry functions for trees on which nothing but gravity and forces on the rates act."""
-GENERAL: Final = ("move", "fold", "unfold", "resolve", "spread", "power", "dependent", "energy", "rigid")
-"""Entry functions for mechanisms with loops, wrenches on links or prescribed motions."""
-ENTRIES: Final = (*FREE, *GENERAL)
+__all__ = ["ARGUMENTS", "Sweeps", "common_sweeps", "sweeps"]
 
 
 @final
@@ -84,7 +75,7 @@ ROWS: Final[dict[str, Any]] = {
 """The rows of its loops: see `ephs.mechanics.tree.sweeps.closing.Rows`."""
 ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
-    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector(), "places": matrix(PLACE)},
+    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector(), "places": matrix(Place.real_width)},
     "fold": {**MECHANISM, **ROWS, "q": vector(), "force": vector(), "wrench": matrix(6)},
     "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
     "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
@@ -127,7 +118,8 @@ class Sweeps:
     width
         Numbers of memory that a link takes; the ground takes as many.
     program
-        The entry functions of `FREE` or `GENERAL`.
+        Entry functions for mechanisms with loops, wrenches on links or prescribed motions, or for trees on which
+        nothing but gravity and forces on the rates act.
     """
 
     def __init__(
@@ -191,7 +183,7 @@ class Sweeps:
 
     def _free(self) -> dict[str, Entry]:
         def accelerate(on: Evaluator, tree: Tree, q: Vector, r: Vector, force: Vector, rate: Vector) -> Integer:
-            return accelerations(on, tree, q, r, rate, given_force(force))
+            return accelerations(on, tree, q, r, rate, _given_force(force))
 
         def evaluations(on: Evaluator, tree: Tree, q: Matrix, r: Matrix, rates: Matrix, repeats: Integer) -> None:
             def one(k: Integer) -> None:
@@ -226,9 +218,7 @@ class Sweeps:
 
             def show(i: Integer) -> None:
                 state = tree.states[i]
-                turn = [x for row in state.turn for x in row]
-                for k, x in enumerate([*turn, *state.at, *state.twist, *state.bias]):
-                    places[i, k] = x
+                show_place(places, i, state, state.bias)
 
             on.loop(tree.size + 1, show)
 
@@ -241,7 +231,7 @@ class Sweeps:
                 closing.eliminate(on, rows, i, state)
                 closing.eliminate_load(on, rows, i, state)
                 inward(on, tree, i, fault)
-                load_inward(on, tree, q, given_force(force), i)
+                load_inward(on, tree, q, _given_force(force), i)
                 closing.carry(on, tree, rows, i)
                 closing.carry_load(on, tree, rows, i)
 
@@ -301,7 +291,7 @@ def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:
     on.loop(tree.size, show)
 
 
-def given_force(force: Vector) -> Force:
+def _given_force(force: Vector) -> Force:
     """The forces on the rates that a vector holds."""
     return lambda i, joint, link: [force[link.r_at + j] for j in range(joint.dim)]
 
