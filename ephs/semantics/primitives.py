@@ -4,6 +4,7 @@ A primitive *is* its structure as data (an energy, a Dirac structure, an Onsager
 checks, the discrete relation and the compiled kernel all derive from that one object.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -80,9 +81,48 @@ class Formula:
     gradient: Callable[..., Any] | None = None
 
 
+class _Structure(ABC):
+    """Common part of all primitives: an interface, and a verdict on the structure, given once."""
+
+    __slots__ = ()
+    interface: Interface
+    _verdict: StructureVerdict | None
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """Kind of primitive."""
+
+    @property
+    def verdict(self) -> StructureVerdict:
+        """Verdict on its structure: ``"proved"`` or ``"searched"``, with the conditions and their proofs.
+
+        Raises
+        ------
+        StructureError
+            The structure is refuted, which a trusted one only says here.
+        """
+        if self._verdict is None:
+            object.__setattr__(self, "_verdict", examine(self))  # pyright: ignore[reportArgumentType] - all are primitives
+        assert self._verdict is not None
+        return self._verdict
+
+    @property
+    def bundle(self) -> Bundle:
+        """The layout of the fibre."""
+        return Bundle.of(self.interface)
+
+    @property
+    def algebra(self) -> "Algebra[Filling]":
+        """Primitives fill boxes as systems do."""
+        from ephs.semantics.algebra import systems
+
+        return systems
+
+
 @final
 @dataclass(frozen=True, slots=True)
-class Storage:
+class Storage(_Structure):
     """Storage of energy: x = ξ, f = ξ̇, e = dH(ξ) with the exergy H = E − θ₀ Σs + π₀ Σv − Σ μ₀ n.
 
     Parameters
@@ -144,25 +184,9 @@ class Storage:
         _ = self.verdict
 
     @property
-    def verdict(self) -> StructureVerdict:
-        """Verdict on its structure: ``"proved"`` or ``"searched"``, with the conditions and their proofs.
-
-        Raises
-        ------
-        StructureError
-            The structure is refuted, which a trusted one only says here.
-        """
-        return self._verdict or _examined(self)
-
-    @property
     def kind(self) -> Literal["storage", "environment"]:
         """Kind of primitive."""
         return "environment" if self.environment else "storage"
-
-    @property
-    def bundle(self) -> Bundle:
-        """The layout of the fibre."""
-        return Bundle.of(self.interface)
 
     @property
     def reads(self) -> tuple[Path, ...]:
@@ -213,17 +237,10 @@ class Storage:
         """Energy of the same states at the environment's intensities, θ₀ s − π₀ v + Σ μ₀ n, in J."""
         return sum(float(reference.intensive(q) @ x[p]) for p, _, q in self.bundle.items() if q.environment)
 
-    @property
-    def algebra(self) -> "Algebra[Filling]":
-        """Primitives fill boxes as systems do."""
-        from ephs.semantics.algebra import systems
-
-        return systems
-
 
 @final
 @dataclass(frozen=True, slots=True)
-class Reversible:
+class Reversible(_Structure):
     """Reversible exchange of energy: the Dirac structure f = L(x) e + C(x)ᵀ λ, 0 = C(x) e.
 
     A gyrator has no C, a constraint no L, a transformer is the constraint C = [−g(x), 1] (its λ is f₂).
@@ -263,31 +280,14 @@ class Reversible:
             _ = self.verdict
 
     @property
-    def verdict(self) -> StructureVerdict:
-        """Verdict on its structure, as of a `Storage`."""
-        return self._verdict or _examined(self)
-
-    @property
     def kind(self) -> Literal["reversible"]:
         """Kind of primitive."""
         return "reversible"
 
-    @property
-    def bundle(self) -> Bundle:
-        """The layout of the fibre."""
-        return Bundle.of(self.interface)
-
-    @property
-    def algebra(self) -> "Algebra[Filling]":
-        """Primitives fill boxes as systems do."""
-        from ephs.semantics.algebra import systems
-
-        return systems
-
 
 @final
 @dataclass(frozen=True, slots=True)
-class Irreversible:
+class Irreversible(_Structure):
     """Irreversible process: f = M(x, e) e / θ₀ with M symmetric, non-negative and M eᴱ = 0.
 
     Parameters
@@ -324,19 +324,9 @@ class Irreversible:
             _ = self.verdict
 
     @property
-    def verdict(self) -> StructureVerdict:
-        """Verdict on its structure, as of a `Storage`."""
-        return self._verdict or _examined(self)
-
-    @property
     def kind(self) -> Literal["irreversible"]:
         """Kind of primitive."""
         return "irreversible"
-
-    @property
-    def bundle(self) -> Bundle:
-        """The layout of the fibre."""
-        return Bundle.of(self.interface)
 
     def flow(self, x: Point, e: Array, reference: Reference) -> Array:
         """f = M(x, e) e / θ₀, (n,)."""
@@ -349,22 +339,8 @@ class Irreversible:
             if quantity.kind == "entropy" and not reference.temperature + e[where][0] > 0.0:
                 raise StructureError("temperature", self.name, found=float(reference.temperature + e[where][0]))
 
-    @property
-    def algebra(self) -> "Algebra[Filling]":
-        """Primitives fill boxes as systems do."""
-        from ephs.semantics.algebra import systems
-
-        return systems
-
 
 Primitive = Storage | Reversible | Irreversible
-
-
-def _examined(primitive: Primitive) -> StructureVerdict:
-    """The verdict, which the primitive keeps."""
-    verdict = examine(primitive)
-    object.__setattr__(primitive, "_verdict", verdict)
-    return verdict
 
 
 @cache

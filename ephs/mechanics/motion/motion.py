@@ -65,12 +65,8 @@ class BodyMotion:
     ----------
     position
         (n, 3) centre of mass in the world, in m.
-    quaternion, rotation
-        (n, 4) and (n, 3, 3), body to world.
-    velocity
-        (n, 3) of the centre of mass in the world basis, in m/s.
-    angular_velocity
-        (n, 3) in the body basis, in rad/s.
+    quaternion
+        (n, 4) body to world.
     """
 
     def __init__(self, motion: Moving, name: str) -> None:
@@ -112,10 +108,8 @@ class JointMotion:
 
     Attributes
     ----------
-    coordinate, rate
-        (n, d) coordinates of C2 in C1, and the twist u_r; m, rad, seconds.
-    wrench
-        (n, 6) λ on body 2 in the joint frame C2 (moment, force), NaN where statically indeterminate.
+    coordinate
+        (n, d) coordinates of C2 in C1; m, rad.
     """
 
     def __init__(self, motion: Moving, name: str, coordinate: Array) -> None:
@@ -127,7 +121,7 @@ class JointMotion:
 
     @property
     def rate(self) -> Array:
-        """(n, d) the twist u_r, in the axes of C2."""
+        """(n, d) the twist u_r, in the axes of C2; m/s, rad/s."""
         return self._motion.rates[self._name]
 
     @cached_property

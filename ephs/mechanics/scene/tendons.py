@@ -34,14 +34,11 @@ def resolve_tendons(
 
 def _check(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
     entry, key = table.entry, f"tendons.{name}"
-    if table.sound("heat"):
-        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+    names.check_all(Tendon, table, key, faults)
     if table.sound("slack", "damping") and entry.slack and entry.damping:
         faults.append(fault("slack damping", f"{key}.damping", entry.damping))
     if not table.sound("bodies", "points"):
         return
-    for i, body in enumerate(entry.bodies):
-        names.check(body, f"{key}.bodies[{i}]", "body", faults)
     if len(entry.points) != len(entry.bodies):
         faults.append(fault("tendon points", f"{key}.points", len(entry.points), count=len(entry.bodies)))
     if all(one == two for one, two in pairwise(entry.bodies)):
@@ -86,9 +83,8 @@ def with_pulls(
 def tendon_system(of: Tendon) -> System:
     """A tendon's system."""
     points = [(one[1], two[1]) for one, two in of.segments]
-    return tendon(
-        points, of.stiffness, of.length - of.inside, of.damping, slack=of.slack, heat=of.heat != ENVIRONMENT
-    )  # fmt: skip
+    heat = of.heat != ENVIRONMENT
+    return tendon(points, of.stiffness, of.length - of.inside, of.damping, slack=of.slack, heat=heat)
 
 
 def tendon_ports(of: Tendon) -> dict[str, str]:
