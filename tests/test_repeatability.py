@@ -4,8 +4,9 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -97,8 +98,43 @@ def test_linear_algebra_takes_one_thread_until_the_last_call_is_done():
         seen.append(threads())
         raise ValueError
 
+    in_one_thread(threads)()  # loads the libraries
     with threadpool_limits(2, "blas"):
         with pytest.raises(ValueError):
             outer()
         assert threads() == {2}
     assert seen == [{1}, {1}]
+
+
+def test_any_thread_takes_one_thread_of_linear_algebra_and_restores_it():
+    """The thread that was first to limit libraries is not the only one that can."""
+    begun, ended, seen = Event(), Event(), []
+
+    @in_one_thread
+    def inner():
+        begun.set()
+        ended.wait()
+        seen.append(threads())
+
+    in_one_thread(threads)()  # loads the libraries
+    with threadpool_limits(2, "blas"):
+        other = Thread(target=inner)
+        other.start()
+        begun.wait()
+        in_one_thread(ended.set)()  # the other thread is last to end
+        other.join()
+        assert seen == [{1}]
+        assert threads() == {2}
+
+
+@pytest.mark.parametrize(("file", "method"), [("motor-four-bar", "rk87"), ("motor-four-bar", "radau")])
+def test_runs_in_several_threads_at_once_are_those_of_one(file, method):
+    """Engines of one mechanism share tables; memory is each one's own, that of attached circuits, too."""
+    scene = ephs.load(ROOT / f"scenes/{file}.toml")
+
+    def run():
+        return digest(contents(ephs.simulate(scene, 2.0, method=method, rtol=1e-8)))
+
+    with ThreadPoolExecutor(4) as pool:
+        found = {each.result() for each in [pool.submit(run) for _ in range(12)]}
+    assert found == {run()}

@@ -35,6 +35,7 @@ class _Limit:
                 controller = import_module("threadpoolctl").ThreadpoolController
                 if len(sys.modules) != self._modules:
                     self._found, self._modules = controller(), len(sys.modules)
+                _released()
                 self._before = self._found.limit(limits=1, user_api="blas")
             self._calls += 1
 
@@ -42,7 +43,16 @@ class _Limit:
         with self._lock:
             self._calls -= 1
             if self._calls == 0:
+                _released()
                 self._before.restore_original_limits()
+                _released()
+
+
+def _released() -> None:
+    """Let any thread set the number: threadpoolctl 3.8 ignores all but the first that did."""
+    release = getattr(import_module("threadpoolctl").OpenBLASController, "clear_controlling_thread", None)
+    if release is not None:
+        release(force=True)
 
 
 _LIMIT = _Limit()

@@ -74,6 +74,7 @@ def engine_of(
     key = "engine", gravity.tobytes(), acted, rows, apart, momenta
     plan = once(reduced, key, lambda: _plan(reduced, gravity, drive.size, acted, kept, apart=apart, momenta=momenta))
     tables = {**plan.tables, "drive": drive, "wrench": wrench, "scal": scal, "supply": supply, "lead": lead}
+    tables |= {name: plan.tables[name].copy() for name in ("net", "numbers")}  # they hold the network's memory, too
     work: dict[str, Any] = {name: np.zeros(shape) for name, shape in plan.shapes.items()}
     work["fault"] = np.zeros(1, dtype=np.int64)
     return Engine(tables, work, plan.closing, plan.sizes, plan.reached, looped=plan.looped)
