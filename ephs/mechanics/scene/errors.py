@@ -141,7 +141,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown surface": ("a surface", "{hint}"),
     "convex mesh": ("an STL file of a convex body", "take its convex hull, or several convex pieces"),
     "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}, mesh", "a surface has exactly one shape"),
-    "surface pair": ("a pair of shapes that can touch: {pairs}", "list the contacts that are meant, or take others"),
+    "surface pair": ("one plane at most", "list the contacts that are meant, or take other shapes"),
     "two exponents": ("one exponent", "give both surfaces the same, or the contact its own"),
     "no stiffness": (
         "the stiffness of one surface or of the contact, or the restitution of hard ones",

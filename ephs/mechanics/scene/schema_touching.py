@@ -22,7 +22,7 @@ class SurfaceShapeEntry(Entry):
     plane: Annotated[dict[str, Number], Field(max_length=0)] | None = Field(
         default=None, description="the plane z = 0, solid below"
     )
-    mesh: Text | None = Field(default=None, description="STL file of a convex body, which meets planes; m")
+    mesh: Text | None = Field(default=None, description="STL file of a convex body; m")
 
 
 class ContactLawEntry(Entry):
