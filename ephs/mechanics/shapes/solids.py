@@ -26,6 +26,7 @@ from ephs.mechanics.shapes.gap import (
     times,
 )
 from ephs.mechanics.shapes.hull import Hull, around
+from ephs.mechanics.shapes.selecting import chosen, least, most, moved
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import choose
@@ -119,7 +120,7 @@ def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
         found: Any = None
         for at, longer in feature.spots(*seen(pose), body):
             one = body.distance(at) + longer
-            found = one if found is None else _least(found, one)
+            found = one if found is None else least(found, one)
         return found - radii
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
@@ -129,7 +130,7 @@ def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
         for other, more in others:
             away = body.distance(other)
             nearer = far + longer - away - more
-            at = _chosen(nearer, other, at)
+            at = chosen(nearer, other, at)
             far, longer = choose(nearer, away, far), choose(nearer, more, longer)
         normal = body.normal(at)
         if first:
@@ -170,12 +171,12 @@ def segment(half: float, radius: float) -> Feature:
         upright = clamped(centre[2] + side * axis[2], body.axial) - centre[2]
         along = clamped(upright * axis[2] / (axis[2] * axis[2] + PARALLEL), half)
         for step in range(STEPS):
-            at = _along(centre, along, axis)
+            at = moved(centre, along, axis)
             slope = body.distance(at) * dot(body.normal(at), axis) + stay * along
             along = clamped(along - (slope / (body.bend(at, axis) + stay) if step else slope), half)
         found: list[Spot] = []
         for place in (side, along):
-            at = _along(centre, place, axis)
+            at = moved(centre, place, axis)
             far = body.distance(at)
             found.append((at, np.sqrt(far * far + stay * place * place + TINY) - far))
         return found
@@ -191,7 +192,7 @@ def rim(size: float, radius: float) -> Feature:
 
     def across(way: Vector, axis: Vector) -> Vector:
         """What a vector has in the circle's plane."""
-        return _along(way, -dot(way, axis), axis)
+        return moved(way, -dot(way, axis), axis)
 
     def softly(way: Vector) -> tuple[Vector, Any]:
         """A direction, or less of a short vector, and the vector's length."""
@@ -201,10 +202,10 @@ def rim(size: float, radius: float) -> Feature:
     def spots(centre: Vector, axis: Vector, body: Body) -> list[Spot]:
         way: Vector = (0.0, 0.0, 0.0)
         for step in range(TURNS if body.curved else 0):
-            at = _along(centre, size, way)
+            at = moved(centre, size, way)
             far, normal = body.distance(at), body.normal(at)
             if step < PROJECTIONS:
-                nearest = _along(at, -far, normal)
+                nearest = moved(at, -far, normal)
                 off = nearest[0] - centre[0], nearest[1] - centre[1], nearest[2] - centre[2]
                 way, _ = softly(times(1.0 / size, across(off, axis)))
             else:
@@ -212,9 +213,9 @@ def rim(size: float, radius: float) -> Feature:
                 bend = size * body.bend(at, side) - far * dot(normal, way)
                 bend = np.sqrt(bend * bend + (PARALLEL * size) ** 2)
                 turn = clamped(-far * dot(normal, side) / bend, WIDEST)
-                way = times(1.0 / np.sqrt(1.0 + turn * turn), _along(way, turn, side))
-        way, length = softly(times(-1.0, across(body.normal(_along(centre, size, way)), axis)))
-        return [(_along(centre, size, way), -size * UPRIGHT**2 / length)]
+                way = times(1.0 / np.sqrt(1.0 + turn * turn), moved(way, turn, side))
+        way, length = softly(times(-1.0, across(body.normal(moved(centre, size, way)), axis)))
+        return [(moved(centre, size, way), -size * UPRIGHT**2 / length)]
 
     return Feature("rim", spots, radius, (size, size, UPRIGHT * size), (("size", size), ("radius", radius)))
 
@@ -230,10 +231,10 @@ def side(size: float, half: float, radius: float) -> Feature:
         level = axis[0] * axis[0] + axis[1] * axis[1]
         along = -(centre[0] * axis[0] + centre[1] * axis[1]) / (level + PARALLEL)
         beyond = ramp(abs(along) - half)
-        inside = _along(centre, clamped(along, half), axis)
+        inside = moved(centre, clamped(along, half), axis)
         up = axis[0] * inside[0] + axis[1] * inside[1]
         way = up * axis[0] - inside[0], up * axis[1] - inside[1], up * axis[2]
-        at = _along(inside, size / np.sqrt(dot(way, way) + TINY), way)
+        at = moved(inside, size / np.sqrt(dot(way, way) + TINY), way)
         parallel = ramp(1.0 - level / CROSSING)
         return [(at, beyond * beyond / radius + (half + body.axial) * (parallel * parallel))]
 
@@ -301,32 +302,32 @@ def polyhedron(hull: Hull, centre: np.ndarray, radius: float) -> Body:
         heights = [dot(normal, at) - offset for normal, offset in planes]
         found: list[tuple[Any, Vector]] = []
         for height, (normal, _), (lines, sharp) in zip(heights, planes, sides, strict=True):
-            aside = ramp(_most([dot(way, at) - offset for way, offset in lines]))
+            aside = ramp(most([dot(way, at) - offset for way, offset in lines]))
             found.append((height * height + sharp * aside * aside, normal))
         for middle, way, half in edges:
             off = at[0] - middle[0], at[1] - middle[1], at[2] - middle[2]
-            away = _along(off, -clamped(dot(way, off), half), way)
+            away = moved(off, -clamped(dot(way, off), half), way)
             found.append((dot(away, away), away))
         return heights, found
 
     def distance(at: Vector) -> Any:
         heights, found = squares(at)
-        height = _most(heights)
+        height = most(heights)
         near = found[0][0]
         for square, _ in found[1:]:
-            near = _least(near, square)
-        return _least(np.sqrt(near + TINY), steep * ramp(height)) - ramp(-height)
+            near = least(near, square)
+        return least(np.sqrt(near + TINY), steep * ramp(height)) - ramp(-height)
 
     def normal(at: Vector) -> Vector:
         heights, found = squares(at)
         (square, way), *others = found
         for other, new in others:
-            square, way = choose(square - other, other, square), _chosen(square - other, new, way)
+            square, way = choose(square - other, other, square), chosen(square - other, new, way)
         length = np.sqrt(dot(way, way) + TINY)
         height, inner = heights[0], planes[0][0]
         for other, (new, _) in zip(heights[1:], planes[1:], strict=True):
-            height, inner = choose(other - height, other, height), _chosen(other - height, new, inner)
-        return _chosen(height, times(1.0 / length, way), inner)
+            height, inner = choose(other - height, other, height), chosen(other - height, new, inner)
+        return chosen(height, times(1.0 / length, way), inner)
 
     numbers = _numbers(corners, radius)
     halves = _halves(corners)
@@ -346,8 +347,8 @@ def faces(hull: Hull, centre: np.ndarray, radius: float) -> list[Body]:
 
         def distance(at: Vector, k: int = k, lines: Any = lines, steep: float = float(np.sqrt(sharp))) -> Any:
             heights = [dot(normal, at) - offset for normal, offset in planes]
-            aside = ramp(_most([dot(way, at) - offset for way, offset in lines]))
-            return 2.0 * _most(heights) - heights[k] + steep * aside
+            aside = ramp(most([dot(way, at) - offset for way, offset in lines]))
+            return 2.0 * most(heights) - heights[k] + steep * aside
 
         def upwards(_: Vector, normal: Vector = normal) -> Vector:
             return normal
@@ -396,22 +397,3 @@ def _halves(corners: np.ndarray) -> tuple[float, float, float]:
 def _vector(numbers: np.ndarray) -> Vector:
     x, y, z = numbers.tolist()
     return x, y, z
-
-
-def _along(start: Vector, far: Any, way: Vector) -> Vector:
-    return start[0] + far * way[0], start[1] + far * way[1], start[2] + far * way[2]
-
-
-def _least(one: Any, other: Any) -> Any:
-    return 0.5 * (one + other - abs(one - other))
-
-
-def _most(values: Sequence[Any]) -> Any:
-    found, *others = values
-    for other in others:
-        found = 0.5 * (found + other + abs(found - other))
-    return found
-
-
-def _chosen(number: Any, one: Vector, other: Vector) -> Vector:
-    return choose(number, one[0], other[0]), choose(number, one[1], other[1]), choose(number, one[2], other[2])
