@@ -41,6 +41,8 @@ def choose(number: Any, one: Any, other: Any) -> Any:
     """One of two values: the first where the number is positive. Both have been evaluated."""
     if isinstance(number, Recorded):
         return number.choose(one, other)
+    if np.ndim(number):
+        return np.where(number > 0.0, one, other)  # pyright: ignore[reportUnknownVariableType]
     return one if number > 0.0 else other
 
 

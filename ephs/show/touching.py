@@ -40,25 +40,28 @@ def contact_table(sol: Any) -> str:
     names = _names(sol)
     if not names or not len(sol.t):
         return ""
-    rows, apart = list[str](), 0
+    rows, apart, shared = list[str](), 0, list[str]()
     for name in names:
         motion, book = sol.contact(name), sol.ledger(component_path("contacts", name))
         force = np.linalg.norm(motion.force, axis=1)
         if not (book.destroyed[-1] or force.any()):
             apart += 1
             continue
+        shared += [name] if motion.mask.any() else []
         numbers = (
             motion.gap.min(), force.max(), motion.slip.max(), book.exergy.max(), book.exergy[-1], book.destroyed[-1],
         )  # fmt: skip
         cells = "".join(f"<td>{value:.4g}</td>" for value in numbers)
         rows.append(f"<tr><th>{html.escape(name)}</th>{cells}</tr>")
     head = "".join(f"<th>{words}</th>" for words in _HEAD)
+    loose = html.escape(", ".join(shared))
+    share = f" Contacts that share a load have indeterminate forces, of which those of least norm are listed: {loose}."
     others = f" {apart} other pairs never touched." if rows and apart else ""
     if not rows:
         return f"<h2>Contacts</h2><p>None of {apart} pairs touched.</p>"
     return (
         "<h2>Contacts</h2><p>Gaps, forces and slips are the largest at kept instants. Destroyed exergy is the heat that"
-        f" the environment took; each step is in it.{others}</p>"
+        f" the environment took; each step is in it.{others}{share if shared else ''}</p>"
         f'<div class="wide"><table><thead><tr><th>contact</th>{head}</tr></thead>'
         f"<tbody>{''.join(rows)}</tbody></table></div>"
     )

@@ -1,19 +1,22 @@
 """Forces of hard contacts at an instant, complementary to the velocities after it.
 
 Between impacts a state says its forces: contacts whose gaps are closed and do not part press where the accelerations
-without them would close them, stick where they can, and slip where they do.
+without them would close them, stick where they can, and slip where they do. Of redundant contacts only sums of forces
+are determinate; forces that balance each other say which of them are not.
 """
 
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.solve.sparse import Index
 
 __all__ = ["Pressing", "forces_at", "pressing_at"]
@@ -22,6 +25,8 @@ CLOSED = 1e-7
 """Gap in the mechanism's length, and speed in its own, below which a contact is closed."""
 INSTANT = 1e-6
 """Time, in the mechanism's own, over which forces act."""
+PRESSING = 1e-6
+"""Least force of a contact that presses, relative to the largest."""
 
 
 @final
@@ -39,21 +44,30 @@ class Pressing:
         (k, 3) along these.
     rates
         (n,) what they add to the accelerations of the tree's rates.
+    balanced
+        (k, 3, m) forces along the rows that accelerate nothing, orthonormal: m ways in which forces are indeterminate.
     """
 
     which: Index
     axes: Index
     forces: Array
     rates: Array
+    balanced: Array
 
 
-def forces_at(equations: Equations, touching: Touching, state: ReducedState, accelerations: Array) -> Array:
-    """(points, 3) forces in N on second bodies in world axes; see `pressing_at`."""
-    out = np.zeros((len(touching), 3))
+def forces_at(
+    equations: Equations, touching: Touching, state: ReducedState, accelerations: Array
+) -> tuple[Array, Array]:
+    """(points, 3) forces in N on second bodies in world axes, and (points, 3, m) those that balance each other.
+
+    See `pressing_at`.
+    """
     found = pressing_at(equations, touching, state, accelerations)
-    for i, axis, force in zip(found.which.tolist(), found.axes.tolist(), found.forces, strict=True):
-        out[i] = force @ touching.ways(i, axis)
-    return out
+    out, balanced = np.zeros((len(touching), 3)), np.zeros((len(touching), 3, found.balanced.shape[2]))
+    for k, (i, axis) in enumerate(zip(found.which.tolist(), found.axes.tolist(), strict=True)):
+        ways = touching.ways(i, axis)
+        out[i], balanced[i] = found.forces[k] @ ways, ways.T @ found.balanced[k]
+    return out, balanced
 
 
 def pressing_at(equations: Equations, touching: Touching, state: ReducedState, accelerations: Array) -> Pressing:
@@ -70,7 +84,7 @@ def pressing_at(equations: Equations, touching: Touching, state: ReducedState, a
     speed = max(float(np.sqrt(np.linalg.norm(eq.gravity) * length)), float(np.abs(rates).max(initial=0.0)))
     held = np.flatnonzero((np.abs(gaps) <= CLOSED * length) & (np.abs(rates) <= CLOSED * speed))
     if not held.size:
-        return Pressing(none, none, np.zeros((0, 3)), np.zeros(eq.n))
+        return Pressing(none, none, np.zeros((0, 3)), np.zeros(eq.n), np.zeros((0, 3, 0)))
     h = INSTANT * length / speed
     rows, axes = touching.rows(state.q, state.r, held)
     now = rows @ state.r
@@ -84,4 +98,30 @@ def pressing_at(equations: Equations, touching: Touching, state: ReducedState, a
     found = impulses(mobility, change + 2.0 * before, [touching.laws[i].friction for i in held])
     forces = np.full(3 * held.size, np.nan) if found is None else found / h
     touching.gaps(state.q, state.r)  # the links are placed here again
-    return Pressing(held, axes, forces.reshape(-1, 3), by @ forces)
+    friction = np.array([touching.laws[i].friction for i in held])
+    slipping = np.hypot(now[1::3], now[2::3]) > CLOSED * speed
+    return Pressing(held, axes, forces.reshape(-1, 3), by @ forces, _balanced(by, forces, friction, slipping))
+
+
+def _balanced(by: Array, forces: Array, friction: Array, slipping: NDArray[np.bool_]) -> Array:
+    """(k, 3, m) forces that accelerate nothing: normal ones and, of contacts that stick, tangential ones.
+
+    Parameters
+    ----------
+    by
+        (n, 3k) accelerations by unit forces.
+    """
+    pressing = forces[::3] > PRESSING * float(forces[::3].max(initial=0.0))
+    columns: list[Array] = []
+    for i in np.flatnonzero(pressing):
+        own = np.eye(forces.size)[:, 3 * i : 3 * i + 3]
+        if slipping[i]:  # friction follows from the normal force
+            along = np.where(np.arange(forces.size) // 3 == i, forces, 0.0)
+            columns.append(along / np.linalg.norm(along))
+        else:
+            columns += list(own.T if friction[i] > 0.0 else own.T[:1])
+    if not columns:
+        return np.zeros((forces.size // 3, 3, 0))
+    unknown = np.array(columns).T
+    _, sigma, right = np.linalg.svd(by @ unknown)
+    return (unknown @ right[rank_of(sigma, CONSTRAINT) :].T).reshape(forces.size // 3, 3, -1)

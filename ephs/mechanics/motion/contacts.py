@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ephs.mechanics.elements.contact import lever, losses
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, inverse, turned
@@ -17,6 +18,7 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import SPANNED
 
 
 @final
@@ -36,6 +38,13 @@ class ContactMotion:
         (n,) largest velocity of a touching point along the surfaces in m/s; 0 where none touches.
     heat
         (n,) power in W that it turns into heat.
+    points
+        (n, points, 3) force of each point on the second body, in N and world axes.
+    mask
+        (n, 3) where components of the force are indeterminate, since hard contacts share a load: those of ``force``
+        are the ones of least norm, and the motion is the same with others.
+    points_mask
+        (n, points, 3) likewise of ``points``.
     """
 
     gap: Array
@@ -43,13 +52,17 @@ class ContactMotion:
     place: Array
     slip: Array
     heat: Array
+    points: Array
+    mask: NDArray[np.bool_]
+    points_mask: NDArray[np.bool_]
 
 
 class Pressed(Moving, Protocol):
     """Source of the motion of bodies with hard contacts."""
 
-    def pressed(self, contact: str, point: int) -> Array:
-        """(n, 3) force of a point of a hard contact on the second body, in world axes."""
+    def pressed(self, contact: str, point: int) -> tuple[Array, list[Array]]:
+        """(n, 3) force of a point of a hard contact on the second body, in world axes; and at each instant (3, m) its
+        share of forces that balance each other."""
         ...
 
 
@@ -80,7 +93,21 @@ def contact_motion(scene: Scene, of: Contact, read: Pressed) -> ContactMotion:
         (weights[:, :, None] * places).sum(axis=0) / weights.sum(axis=0)[:, None],
         np.max([point.slip for point in points], axis=0),
         np.sum([point.heat for point in points], axis=0),
+        forces.transpose(1, 0, 2),
+        *_masks(of, read, len(points), len(touching)),
     )
+
+
+def _masks(of: Contact, read: Pressed, points: int, instants: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(n, 3) and (n, points, 3) where the force of a contact, and of its points, is indeterminate."""
+    whole, each = np.zeros((instants, 3), dtype=bool), np.zeros((instants, points, 3), dtype=bool)
+    if isinstance(of.law, Impact):
+        balanced = [read.pressed(of.name, i)[1] for i in range(points)]
+        for k in range(instants):
+            shares = np.array([point[k] for point in balanced])
+            each[k] = np.linalg.norm(shares, axis=2) > SPANNED
+            whole[k] = np.linalg.norm(shares.sum(axis=0), axis=1) > SPANNED
+    return whole, each
 
 
 def _points(scene: Scene, of: Contact, read: Pressed) -> Iterator[tuple[tuple[str, str], _Point]]:
@@ -102,7 +129,7 @@ def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, nu
     distance = np.asarray(gap.distance(relative.T))
     velocity = twist[:, 3:] + np.cross(twist[:, :3], _rows(point, len(relative)))
     if isinstance(of.law, Impact):
-        pressed = _turned_back(ends[1], read.pressed(of.name, number))
+        pressed = _turned_back(ends[1], read.pressed(of.name, number)[0])
         wrench = np.column_stack([np.cross(_rows(point, len(relative)), pressed), pressed])
         heat = np.maximum(-np.einsum("ni,ni->n", wrench, twist), 0.0)
         touching = np.any(pressed, axis=1)

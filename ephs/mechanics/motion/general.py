@@ -38,9 +38,9 @@ class GeneralMotion:
         """(n, d) of the joint with this box, in the axes of C2."""
         return self._projected[1][list(self._joints).index(joint)]
 
-    def pressed(self, point: Path) -> Array:
+    def pressed(self, point: Path) -> tuple[Array, list[Array]]:
         """(n, 3) NaN: without joint coordinates forces of hard contacts are not known."""
-        return np.full((len(self._solution), 3), np.nan)
+        return np.full((len(self._solution), 3), np.nan), [np.zeros((3, 0))] * len(self._solution)
 
     def wrench(self, joint: Path) -> Array:
         """(n, 6) of the joint with this box: λ on body 2 in C2, NaN in components that are indeterminate."""

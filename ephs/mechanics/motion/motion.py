@@ -173,8 +173,9 @@ class SceneMotion:
         at = component_path("thermal", name)
         return ThermalMotion(node.temperature_of(lambda state: self._solution[at / state]), self._solution[at / "s"])
 
-    def pressed(self, contact: str, point: int) -> Array:
-        """(n, 3) force of a point of a hard contact on the second body in N and world axes."""
+    def pressed(self, contact: str, point: int) -> tuple[Array, list[Array]]:
+        """(n, 3) force of a point of a hard contact on the second body in N and world axes; and at each instant (3, m)
+        its share of forces that balance each other."""
         return self._found.pressed(component_path("contacts", contact) / f"point{point}")
 
     def contact(self, name: str) -> ContactMotion:

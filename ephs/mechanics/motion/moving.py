@@ -46,8 +46,9 @@ class ByPath(Protocol):
         """(n, 6) of a joint: λ on body 2 in C2, NaN in components that are indeterminate."""
         ...
 
-    def pressed(self, point: Path) -> Array:
-        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes."""
+    def pressed(self, point: Path) -> tuple[Array, list[Array]]:
+        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes; and at each
+        instant (3, m) its share of those that balance each other."""
         ...
 
 
@@ -77,6 +78,6 @@ class Part:
         """(n, 6) of a joint: λ on body 2 in C2, NaN in components that are indeterminate."""
         return self.whole.wrench(self.box / joint)
 
-    def pressed(self, point: Path) -> Array:
-        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes."""
+    def pressed(self, point: Path) -> tuple[Array, list[Array]]:
+        """Force of the point of a hard contact with this box on the second body, and what of it is indeterminate."""
         return self.whole.pressed(self.box / point)

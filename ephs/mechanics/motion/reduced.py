@@ -84,17 +84,21 @@ class ReducedMotion:
             return self._general.wrench(joint)
         return self._wrenches[:, i]
 
-    def pressed(self, point: Path) -> Array:
-        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes."""
+    def pressed(self, point: Path) -> tuple[Array, list[Array]]:
+        """(n, 3) force of the point of a hard contact with this box on the second body, in world axes; and at each
+        instant (3, m) its share of those that balance each other."""
         return self._pressed[point]
 
     @cached_property
     @in_one_thread
-    def _pressed(self) -> dict[Path, Array]:
-        """Box of a point of hard contact -> (n, 3)."""
+    def _pressed(self) -> dict[Path, tuple[Array, list[Array]]]:
+        """Box of a point of hard contact -> its forces."""
         touching = Touching(self._eq)
-        found = np.array([forces_at(self._eq, touching, s, self._rates(k)) for k, s in enumerate(self._states)])
-        return {Path.of(tuple(path)[:-1]): found[:, i] for i, path in enumerate(touching.paths)}
+        found = [forces_at(self._eq, touching, s, self._rates(k)) for k, s in enumerate(self._states)]
+        return {
+            Path.of(tuple(path)[:-1]): (np.array([forces[i] for forces, _ in found]), [free[i] for _, free in found])
+            for i, path in enumerate(touching.paths)
+        }
 
     @cached_property
     def _general(self) -> GeneralMotion:

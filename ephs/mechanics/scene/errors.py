@@ -138,7 +138,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unknown surface": ("a surface", "{hint}"),
     "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),
     "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}, mesh", "a surface has exactly one shape"),
-    "surface pair": ("a pair of shapes that can touch: {pairs}", "list the pairs in contacts, or use other shapes"),
+    "surface pair": ("one plane at most", "list the pairs in contacts, or use other shapes"),
     "two exponents": ("one exponent", "give both surfaces the same exponent, or one to the contact"),
     "no stiffness": (
         "a stiffness of a surface or of the contact, or a restitution of both surfaces or the contact",

@@ -27,7 +27,7 @@ class SurfaceShapeEntry(Entry):
     cylinder: Sizes | None = key("radius and length along z, m", None)
     box: Extents | None = key("edge lengths, m", None)
     plane: Annotated[dict[str, Number], Field(max_length=0)] | None = key("the plane z = 0, solid below", None)
-    mesh: Text | None = key("STL file of a convex body, which meets planes; m", None)
+    mesh: Text | None = key("STL file of a convex body; m", None)
 
 
 class ContactLawEntry(Entry):

@@ -206,8 +206,7 @@ def _add(
     if one.body == other.body:
         faults.append(fault("same body", key, f'two surfaces of "{one.body}"'))
     elif kinds not in PAIRS and kinds[::-1] not in PAIRS:
-        pairs = ", ".join(" and ".join(pair) for pair in PAIRS)
-        faults.append(fault("surface pair", key, f"a {kinds[0]} and a {kinds[1]}", pairs=pairs))
+        faults.append(fault("surface pair", key, f"a {kinds[0]} and a {kinds[1]}"))
     elif (law := _law(laws, key, faults)) is not None:
         sinks = [each.heat for each in laws if each.heat is not None]
         found[name] = Contact(name, (one.name, other.name), law, sinks[0] if sinks else ENVIRONMENT)

@@ -18,19 +18,26 @@ from ephs.semantics.support import Support
 
 __all__ = [
     "CENTRE",
+    "CROSSING",
     "HEIGHT",
+    "PARALLEL",
     "PLACE",
+    "UPRIGHT",
     "Gap",
     "Vector",
+    "apart",
+    "clamped",
     "cross",
     "dot",
     "edges",
+    "into",
     "plane_rim",
     "plane_sphere",
     "ramp",
     "rounded_box_sphere",
     "segments",
     "sphere_rounded_box",
+    "times",
 ]
 
 UPRIGHT: Final = 1e-3
@@ -83,7 +90,7 @@ class Gap:
     thickness: float = np.inf
 
 
-def _apart(half1: Vector, half2: Vector, margin: float) -> Support:
+def apart(half1: Vector, half2: Vector, margin: float) -> Support:
     """Support of gaps between boxes of these half lengths that are rounded by a margin in all."""
     wide = margin * (1.0 + ROUNDING)
     return Support(PLACE, math.hypot(*half1) + math.hypot(*half2) + wide, (*half1, *half2), wide)
@@ -104,7 +111,8 @@ def cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _times(factor: Any, a: Vector) -> Vector:
+def times(factor: Any, a: Vector) -> Vector:
+    """λ a."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
@@ -119,7 +127,7 @@ def plane_sphere(radius: float) -> Gap:
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         normal = _upwards(pose)
-        return normal, _times(-radius, normal)
+        return normal, times(-radius, normal)
 
     numbers = (("radius", radius),)
     return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, numbers, Support(HEIGHT, radius))
@@ -146,12 +154,12 @@ def plane_rim(radius: float) -> Gap:
     return Gap("plane_rim", distance, contact, radius, (("radius", radius),), Support(HEIGHT, radius * (1.0 + UPRIGHT)))
 
 
-def _clamped(x: Any, most: float) -> Any:
+def clamped(x: Any, most: float) -> Any:
     """x between −most and most."""
     return 0.5 * (abs(x + most) - abs(x - most))
 
 
-def _into(pose: Any, vector: Vector) -> Vector:
+def into(pose: Any, vector: Vector) -> Vector:
     """A vector of the axes of C1 in those of C2."""
     axes = quaternion_to_matrix(pose[:4])
     x, y, z = (dot((axes[0][i], axes[1][i], axes[2][i]), vector) for i in range(3))
@@ -168,15 +176,15 @@ def segments(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
         axes = quaternion_to_matrix(pose[:4])
         x, y, z = axes[0][2], axes[1][2], axes[2][2]
         along = dot((pose[4], pose[5], pose[6]), (x, y, z))
-        one = _clamped((pose[6] - z * along) / (x * x + y * y + PARALLEL), half1)
-        two = _clamped(one * z - along, half2)
-        one = _clamped(pose[6] + two * z, half1)
+        one = clamped((pose[6] - z * along) / (x * x + y * y + PARALLEL), half1)
+        two = clamped(one * z - along, half2)
+        one = clamped(pose[6] + two * z, half1)
         away = pose[4] + two * x, pose[5] + two * y, pose[6] + two * z - one
         return away, np.sqrt(dot(away, away) + TINY), two
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         away, length, at = beyond(pose)
-        x, y, z = _times(1.0 / length, _into(pose, away))
+        x, y, z = times(1.0 / length, into(pose, away))
         return (x, y, z), (-radius2 * x, -radius2 * y, at - radius2 * z)
 
     return Gap(
@@ -185,7 +193,7 @@ def segments(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
         contact,
         radius2,
         (("half1", half1), ("radius1", radius1), ("half2", half2), ("radius2", radius2)),
-        _apart((0.0, 0.0, half1), (0.0, 0.0, half2), radius1 + radius2),
+        apart((0.0, 0.0, half1), (0.0, 0.0, half2), radius1 + radius2),
         2.0 * (radius1 + radius2),
     )
 
@@ -212,15 +220,15 @@ def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
     """Gap between a sphere about the origin of C1 and a rounded box about that of C2: `rounded_box_sphere` turned."""
 
     def beyond(pose: Any) -> tuple[Vector, Vector, Any]:
-        at = _times(-1.0, _into(pose, (pose[4], pose[5], pose[6])))
-        near = tuple(_clamped(x, h) if h else 0.0 for x, h in zip(at, half, strict=True))
+        at = times(-1.0, into(pose, (pose[4], pose[5], pose[6])))
+        near = tuple(clamped(x, h) if h else 0.0 for x, h in zip(at, half, strict=True))
         away = at[0] - near[0], at[1] - near[1], at[2] - near[2]
         return away, (near[0], near[1], near[2]), np.sqrt(dot(away, away) + TINY)
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         away, near, length = beyond(pose)
-        out = _times(rounding / length, away)
-        return _times(-1.0 / length, away), (near[0] + out[0], near[1] + out[1], near[2] + out[2])
+        out = times(rounding / length, away)
+        return times(-1.0 / length, away), (near[0] + out[0], near[1] + out[1], near[2] + out[2])
 
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
     return Gap(
@@ -229,7 +237,7 @@ def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
         contact,
         rounding,
         (("radius", radius), *sizes, ("rounding", rounding)),
-        _apart(CENTRE, half, rounding + radius),
+        apart(CENTRE, half, rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )
 
@@ -242,12 +250,12 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
     """
 
     def beyond(pose: Any) -> tuple[Vector, Any]:
-        x, y, z = (at - _clamped(at, h) if h else at for at, h in zip(pose[4:], half, strict=True))
+        x, y, z = (at - clamped(at, h) if h else at for at, h in zip(pose[4:], half, strict=True))
         return (x, y, z), np.sqrt(x * x + y * y + z * z + TINY)
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         away, length = beyond(pose)
-        x, y, z = _times(1.0 / length, _into(pose, away))
+        x, y, z = times(1.0 / length, into(pose, away))
         return (x, y, z), (-radius * x, -radius * y, -radius * z)
 
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
@@ -257,6 +265,6 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
         contact,
         radius,
         (*sizes, ("rounding", rounding), ("radius", radius)),
-        _apart(half, CENTRE, rounding + radius),
+        apart(half, CENTRE, rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )

@@ -1,15 +1,16 @@
 """Contact pairs of shapes: their gap functions and frames.
 
-Planes meet spheres, capsules, cylinders, boxes and meshes; spheres, capsules and boxes meet each other. A capsule meets
-a plane at its two ends, a box at its corners, a convex mesh at its vertices, a cylinder at its two rims. Boxes meet
-capsules and boxes as if their edges were rounded: each corner is a sphere that meets the other box, each edge a capsule
-that meets the other's edges.
+All shapes meet each other, but no plane meets a plane. A capsule meets a plane at its two ends, a box at its corners, a
+convex mesh at its vertices, a cylinder at its two rims. Boxes, meshes and cylinders meet each other and capsules as if
+their edges were rounded: each corner is a sphere that meets the other body, each edge a capsule that meets the other's
+edges or, as a rim does, a cylinder; each rim meets each face.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
-from typing import Any, Final
+from typing import Any, Final, final
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from ephs.mechanics.shapes.gap import (
     segments,
     sphere_rounded_box,
 )
+from ephs.mechanics.shapes.hull import Hull, hull_of, inside_of
+from ephs.mechanics.shapes.solids import Body, cylinder, faces, meeting, point, polyhedron, rim, segment, side
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import SE3
@@ -85,6 +88,8 @@ ROOT: Final = math.sqrt(0.5)
 ROUNDED: Final = 0.05
 """Radius of a box's edges by its least length, where it meets boxes and capsules."""
 
+FLIPPED: Final = 1e-12
+"""1 + cos of the angle from z at which the least rotation is not unique."""
 SHORTER: Final = 0.5
 """Length at both ends of an edge, by its radius, where only corners meet other boxes: no edge meets a corner upon a
 corner."""
@@ -96,6 +101,10 @@ def _ends(length: float) -> tuple[tuple[float, float, float], ...]:
 
 def _corners(half: Sequence[float]) -> list[tuple[float, ...]]:
     return list(product(*((-x, x) for x in half)))
+
+
+def _hull_of_box(sizes: Sequence[float]) -> list[tuple[float, ...]]:
+    return _corners([0.5 * size for size in sizes])
 
 
 def _core(sizes: Sequence[float]) -> tuple[Vector, float]:
@@ -127,6 +136,104 @@ def _boxes(one: Sequence[float], other: Sequence[float]) -> Points:
         yield here, there, edges(long1 - SHORTER * radius1, radius1, long2 - SHORTER * radius2, radius2)
 
 
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rounded:
+    """A polyhedron with rounded edges.
+
+    Parameters
+    ----------
+    core, radius
+        Without the rounding, and its radius, m.
+    """
+
+    core: Hull
+    radius: float
+
+    @staticmethod
+    def of(vertices: Any) -> "_Rounded":
+        """Rounded as a box is, by the largest sphere inside."""
+        return _Rounded(*inside_of(vertices, 2.0 * ROUNDED))
+
+    @property
+    def frame(self) -> Array:
+        """(3,) the middle of the core, the origin of its body."""
+        return 0.5 * (self.core.corners.min(axis=0) + self.core.corners.max(axis=0))
+
+    @property
+    def body(self) -> Body:
+        """What points meet."""
+        return polyhedron(self.core, self.frame, self.radius)
+
+    def edges(self) -> Iterator[tuple[Array, float]]:
+        """Poses (7,) along z, and half lengths."""
+        for i, j in self.core.edges:
+            one, other = self.core.corners[i], self.core.corners[j]
+            way = other - one
+            yield np.array([*_turned(way), *(0.5 * (one + other))]), 0.5 * float(np.linalg.norm(way))
+
+
+def _turned(way: Array) -> Array:
+    """The quaternion (4,) of the least rotation from z to a direction, or of half a turn about x."""
+    x, y, z = way / np.linalg.norm(way)
+    if z < -1.0 + FLIPPED:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    turn = np.array([1.0 + z, -y, x, 0.0])
+    return turn / np.linalg.norm(turn)
+
+
+def _polyhedra(one: _Rounded, other: _Rounded) -> Points:
+    yield from ((one.frame, at, meeting(point(other.radius), one.body, first=False)) for at in other.core.corners)
+    yield from ((at, other.frame, meeting(point(one.radius), other.body, first=True)) for at in one.core.corners)
+    for (here, long1), (there, long2) in product(one.edges(), other.edges()):
+        half1, half2 = long1 - SHORTER * one.radius, long2 - SHORTER * other.radius
+        if min(half1, half2) > 0.0:
+            yield here, there, edges(half1, one.radius, half2, other.radius)
+
+
+def _sphere_mesh(radius: float, vertices: Any) -> Points:
+    solid = _Rounded(hull_of(vertices), 0.0)
+    yield CENTRE, solid.frame, meeting(point(radius), solid.body, first=True)
+
+
+def _capsule_mesh(capsule: Sequence[float], vertices: Any) -> Points:
+    radius, length = capsule
+    solid = _Rounded.of(vertices)
+    yield from ((at, solid.frame, meeting(point(radius), solid.body, first=True)) for at in _ends(length))
+    yield from ((CENTRE, there, segments(0.5 * length, radius, long, solid.radius)) for there, long in solid.edges())
+
+
+def _cylinder(sizes: Sequence[float]) -> tuple[Body, tuple[Array, ...]]:
+    """A cylinder with rounded rims, and the centres of their cores."""
+    size, length = sizes
+    radius = ROUNDED * min(2.0 * size, length)
+    half = 0.5 * length - radius
+    return cylinder(size - radius, half, radius), tuple(np.array([0.0, 0.0, z]) for z in (-half, half))
+
+
+def _capsule_cylinder(capsule: Sequence[float], sizes: Sequence[float]) -> Points:
+    radius, length = capsule
+    body, _ = _cylinder(sizes)
+    yield from ((at, CENTRE, meeting(point(radius), body, first=True)) for at in _ends(length))
+    yield CENTRE, CENTRE, meeting(segment(0.5 * length, radius), body, first=True)
+
+
+def _polyhedron_cylinder(solid: _Rounded, sizes: Sequence[float]) -> Points:
+    body, rims = _cylinder(sizes)
+    circle = rim(body.halves[0], body.radius)
+    yield from ((at, CENTRE, meeting(point(solid.radius), body, first=True)) for at in solid.core.corners)
+    yield from ((at, CENTRE, meeting(segment(long, solid.radius), body, first=True)) for at, long in solid.edges())
+    for face, at in product(faces(solid.core, solid.frame, solid.radius), rims):
+        yield solid.frame, at, meeting(circle, face, first=False)
+
+
+def _cylinders(one: Sequence[float], other: Sequence[float]) -> Points:
+    (body1, rims1), (body2, rims2) = _cylinder(one), _cylinder(other)
+    yield from ((CENTRE, at, meeting(rim(body2.halves[0], body2.radius), body1, first=False)) for at in rims2)
+    yield from ((at, CENTRE, meeting(rim(body1.halves[0], body1.radius), body2, first=True)) for at in rims1)
+    yield CENTRE, CENTRE, meeting(side(body1.halves[0], body1.axial, body1.radius), body2, first=True)
+
+
 def _box_capsule(sizes: Sequence[float], capsule: Sequence[float]) -> Points:
     half, rounding = _core(sizes)
     radius, length = capsule
@@ -146,5 +253,16 @@ PAIRS: Final[Mapping[tuple[str, str], Callable[[Any, Any], Points]]] = {
     ("capsule", "capsule"): lambda one, other: [(CENTRE, CENTRE, segments(one[1] / 2, one[0], other[1] / 2, other[0]))],
     ("box", "capsule"): _box_capsule,
     ("box", "box"): _boxes,
+    ("sphere", "mesh"): _sphere_mesh,
+    ("capsule", "mesh"): _capsule_mesh,
+    ("box", "mesh"): lambda b, mesh: _polyhedra(_Rounded.of(_hull_of_box(b)), _Rounded.of(mesh)),
+    ("mesh", "mesh"): lambda one, other: _polyhedra(_Rounded.of(one), _Rounded.of(other)),
+    ("sphere", "cylinder"): lambda r, c: [
+        (CENTRE, CENTRE, meeting(point(r), cylinder(c[0], 0.5 * c[1], 0.0), first=True))
+    ],
+    ("capsule", "cylinder"): _capsule_cylinder,
+    ("box", "cylinder"): lambda b, c: _polyhedron_cylinder(_Rounded.of(_hull_of_box(b)), c),
+    ("mesh", "cylinder"): lambda mesh, c: _polyhedron_cylinder(_Rounded.of(mesh), c),
+    ("cylinder", "cylinder"): _cylinders,
 }
 """Kinds of both shapes -> the gaps, by where they are on both."""

@@ -277,8 +277,7 @@ def test_contacts_survive_files(tmp_path):
         ('body = "ball"', 'body = "bal"', "unknown|bal"),
         ("sphere = 0.1", "sphere = -0.1", "a number above 0"),
         ("sphere = 0.1", "sphere = 0.1, box = [1.0, 1.0, 1.0]", "sphere and box"),
-        ("shape = { plane = {} }", "shape = { box = [1.0, 1.0, 1.0] }\n[surfaces.more]\nbody = \"ground\"\n"
-         "shape = { cylinder = [0.1, 0.2] }", "a sphere and a cylinder"),
+        ("sphere = 0.1", "plane = {}", "a plane and a plane, expected one plane at most"),
         ("stiffness = 100000.0", "stiffness = -1.0", "a number above 0"),
         ("stiffness = 100000.0", "", "two surfaces without stiffness"),
         ("exponent = 1.0", "exponent = 0.5", "not below 1"),

@@ -25,6 +25,10 @@ MJCF = """
         </body>
       </body>
     </body>
+    <body name="nest" pos="0 2 1">
+      <freejoint/>
+      <geom name="egg" type="ellipsoid" size="0.1 0.1 0.2" mass="0.1"/>
+    </body>
     <body name="ghost" pos="1 0 1">
       <freejoint/>
       <geom type="sphere" size="0.1" contype="0" conaffinity="0"/>
@@ -62,8 +66,8 @@ def model(tmp_path):
 def test_limits_and_contacts_are_those_of_the_model(model):
     scene, said = loaded(model, contact=True)
     contacts = {c.surfaces: c.law for _, c in scene.all_contacts()}
-    assert set(contacts) == {("floor", "barrel"), ("floor", "rod"), ("floor", "knob")}
-    assert "contacts between: barrel and knob" in said and "limits of" not in said
+    assert set(contacts) == {("floor", "barrel"), ("floor", "rod"), ("floor", "knob"), ("barrel", "knob")}
+    assert "contacts between: floor and egg, barrel and egg" in said and "limits of" not in said
     barrel, knob = contacts["floor", "barrel"], contacts["floor", "knob"]
     assert barrel.stiffness == pytest.approx(scene_mass(scene) / 0.03**2)
     assert (barrel.friction, barrel.spinning, barrel.rolling) == (0.8, 0.0, 0.0)
@@ -80,7 +84,7 @@ def test_by_default_they_are_named_and_left(model):
     scene, said = loaded(model)
     assert not scene.contacts and all(joint.limits is None for joint in scene.joints.values())
     assert "limits of: swing, slide" in said
-    assert "contacts of: the world, drum, arm, tip" in said
+    assert "contacts of: the world, drum, arm, tip, nest" in said
 
 
 def test_a_converted_model_touches_too(model, tmp_path):

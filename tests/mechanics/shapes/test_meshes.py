@@ -109,7 +109,7 @@ def test_what_bounds_no_convex_body_is_refused(data, fault, tmp_path):
         ('body = "block"', 'body = "blocks"', r'surfaces\.block\.body: found "blocks"'),
         ("stiffness = 1e5", "stiffness = -1e5", "stiffness"),
         ("friction = 0.5", "friction = -0.5", "friction"),
-        ("shape = { plane = {} }", "shape = { sphere = 0.1 }", "a mesh and a sphere|a sphere and a mesh"),
+        ('mesh = "cube.stl"', "plane = {}", "a plane and a plane"),
     ],
 )
 def test_what_is_wrong_of_a_surface_is_named(old, new, fault, tmp_path):
