@@ -118,7 +118,7 @@ class _Run(Generic[S]):
         self.grid = None if policy else Grid(0.0, abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
         self.save_at = save_at
-        self.setup = 0.0
+        self.setup, self.ended = 0.0, False
         self.steps = self.rejected = self.saved = 0
         self.looked = begin
         self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
@@ -129,7 +129,6 @@ class _Run(Generic[S]):
         self.watch = Watch((), t0, {})
         self.forecast = Forecast(problem, stepper.name, bounds.order if bounds else 1, until)
         self.leg: Leg[S] | None = None
-        self.ended = False
         self.first: Row | None = None
         self.cause: SolveError | None = None  # reason of rejecting the longer step
 
@@ -192,7 +191,8 @@ class _Run(Generic[S]):
                 self.state = leg.state
             each = (time.perf_counter() - begin) / max(1, self.steps - before)
             most = int(np.clip(RESPONSE / each, 1, BURST))
-            self._look()
+            if not leg.left:  # else a journal would lead from one method into the other
+                self._look()
 
     def _advance_stepwise(self) -> None:
         control, grid = self.control, self.grid

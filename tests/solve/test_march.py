@@ -13,7 +13,7 @@ from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
 from ephs.solve.control import Proportional
 from ephs.solve.march import STEPS, Control, Ending, Field, Motion
-from ephs.solve.march.control import PATIENCE, held_back, length
+from ephs.solve.march.control import HELD, held_back, length
 from tests.solve.marching import field, program, start
 
 
@@ -291,10 +291,10 @@ def test_stability_has_to_hold_steps_back_many_times_and_is_forgiven_after_six()
     control = Control.table(1)
     c = control[0]
     c.limit, c.stiff = 3.0, 3.5
-    assert [bool(CONTROL["held"](control)) for _ in range(PATIENCE)] == [False] * (PATIENCE - 1) + [True]
+    assert [bool(CONTROL["held"](control)) for _ in range(HELD)] == [False] * (HELD - 1) + [True]
     c.stiff = 3.0
     for _ in range(6):
-        assert c.held == PATIENCE
+        assert c.held == HELD
         assert not CONTROL["held"](control)
     assert c.held == 0
     c.stiff = 3.5

@@ -2,18 +2,19 @@
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
-Contacts of trees are stiff from the start: their steps are radau's.
+Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less.
 """
 
 from typing import TYPE_CHECKING, Any, final
 
 from ephs.mechanics.methods.explicit import Explicit, tableau
+from ephs.mechanics.methods.marching import Rival
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.loop import FINAL
-from ephs.solve.march.control import PATIENCE
+from ephs.solve.march.control import HELD, PATIENCE
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
@@ -29,6 +30,10 @@ SLOW = 0.5
 """Contraction of a Gauss method's sweeps above which it limits steps, instead of accuracy."""
 FREEDOMS = 64
 """Degrees of freedom up to which factorising their matrix costs less than an explicit method's shorter steps."""
+TRIAL = 400
+"""Explicit steps between surfaces that may touch, after which radau is tried: a stop at slip 0 hides its stiffness."""
+LOOSE = 1e-2
+"""Tolerances above this are for radau where surfaces may touch: explicit steps may gain more than is mended."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 
@@ -52,12 +57,17 @@ class Auto(ReducedMethod):
         name, self._limit = first.name, SLOW * gauss.limit if gauss else LIMITS[name]
         self._explicit = first
         self._implicit: Implicit | None = None
+        self._begun: Implicit | None = None
         self._held = self._free = self._failures = 0
+        self._trial: int | None = None
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
         if name == "rk54" and _touches(equations):
-            self._go_implicit()
-            self.name = self.counts["chosen"] = "radau"
+            if control.rtol.value > LOOSE:
+                self._go_implicit()
+                self.name = self.counts["chosen"] = "radau"
+            else:
+                self._trial = TRIAL
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
@@ -74,7 +84,7 @@ class Auto(ReducedMethod):
             self._failures = 0
             if self._explicit.stiffness > self._limit:
                 self._held, self._free = self._held + 1, 0
-                if self._held == PATIENCE:
+                if self._held == HELD:
                     self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
             else:
                 self._free += 1
@@ -83,19 +93,34 @@ class Auto(ReducedMethod):
         return found
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
-        """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones."""
+        """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
         if self._implicit is not None:
-            return self._implicit.many(span)
+            if self._trial is None or not isinstance(self._explicit, Explicit):
+                return self._implicit.many(span)
+            return self._implicit.many(span, Rival(self._limit, self._explicit.method.c.size, self._return))
+        if isinstance(self._explicit, Explicit):
+            return self._explicit.many(span, self._limit, self._switch, self._trial)
         return self._explicit.many(span, self._limit, self._switch)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
         self._go_implicit()
         self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
 
+    def _return(self, t: float, h: float, reason: str, vain: bool) -> None:
+        self._implicit = None
+        self._trial = 2 * (self._trial or TRIAL) if vain else TRIAL
+        self.exponent, self.share = self._explicit.exponent, self._explicit.share
+        name = self._explicit.name
+        self.counts["switches"].append({"t": float(t), "to": name, "step": float(h), "reason": reason})
+
     def _go_implicit(self) -> "Implicit":
         from ephs.mechanics.methods.radau import Implicit  # with derivatives, which explicit runs do not need
 
-        self._implicit = Implicit(self.equations, self.control, self.counts)
+        if self._begun is None:
+            known = dict(self.counts)
+            self._begun = Implicit(self.equations, self.control, self.counts)
+            self.counts |= known  # of the part of a run that is resumed
+        self._implicit = self._begun
         self.exponent, self.share = self._implicit.exponent, self._implicit.share
         self.name = f"{self._explicit.name}, radau"
         return self._implicit
@@ -105,7 +130,8 @@ class Auto(ReducedMethod):
         return {
             "explicit": self._explicit.taken(state),
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
-            "nearness": [self._held, self._free, self._failures],
+            "nearness": [self._held, self._free, self._failures, self._trial],
+            "name": self.name,
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
@@ -113,7 +139,8 @@ class Auto(ReducedMethod):
         self._explicit.take(own["explicit"], state)
         if own["implicit"] is not None:
             self._go_implicit().restore(own["implicit"], state)
-        self._held, self._free, self._failures = own["nearness"]
+        self._held, self._free, self._failures, self._trial = own["nearness"]
+        self.name = own["name"]
 
 
 def _touches(equations: Equations) -> bool:

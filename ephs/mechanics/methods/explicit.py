@@ -166,10 +166,15 @@ class Explicit(ReducedMethod):
         self.rough = (state.q,) if own["rough"] else ()
 
     def many(
-        self, span: Span[ReducedState], limit: float = 0.0, left: Callable[[float, float, str], None] | None = None
+        self,
+        span: Span[ReducedState],
+        limit: float = 0.0,
+        left: Callable[[float, float, str], None] | None = None,
+        most: int | None = None,
     ) -> Leg[ReducedState] | None:
         """Many steps in one compiled call, if no step needs Python.
 
-        Where stability, whose limit is h·|λ| = ``limit``, holds its steps back, it calls left(t, h, reason) and ends.
+        Where stability, whose limit is h·|λ| = ``limit``, holds its steps back, or after ``most``
+        steps, it calls left(t, h, reason) and ends.
         """
-        return March(self, self.method.arrays, span, limit, left) if self.equations.constant else None
+        return March(self, self.method.arrays, span, limit, left, most=most) if self.equations.constant else None

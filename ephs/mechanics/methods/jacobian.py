@@ -23,6 +23,9 @@ __all__ = ["Jacobian"]
 RELATIVE = 2e-8
 """Relative length of the differences by which inputs that are Python functions of the state are differentiated."""
 
+TANGENT = 8
+"""Evaluations that cost as much as one along several directions."""
+
 
 @final
 class Jacobian:
@@ -37,11 +40,16 @@ class Jacobian:
         self._counts = {} if counts is None else counts
         self._counts["jacobians"] = 0
         tree = equations.constant and not equations.engine.looped
-        self._compiled = tree and _recorded(equations)
+        self._compiled = tree and once(equations.reduced, "recorded", lambda: _recorded(equations))
         self._linear: Linearised | None = None
         self._slopes: RateSlopes | None = None
         self._at: ReducedState | None = None
         self._value = np.zeros((self.size, self.size))
+
+    @property
+    def cost(self) -> int:
+        """Cost of all matrices of compiled rates so far, in evaluations."""
+        return 0 if self._slopes is None else TANGENT * self._slopes.calls * self._counts["jacobians"]
 
     def fresh(self, state: ReducedState) -> bool:
         """Whether the matrix was made at this state."""

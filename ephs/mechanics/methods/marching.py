@@ -1,6 +1,7 @@
 """Many steps of a mechanism in one compiled call, if no step needs Python."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol, final
 
 import numpy as np
@@ -10,6 +11,7 @@ from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.control import Proportional
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.march import STEPS, Account, Ending, Status
@@ -18,12 +20,35 @@ from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Counts, Span
 
-__all__ = ["March"]
+__all__ = ["March", "Rival"]
 
 ROWS = 1024
 """Capacity of the buffer of rows."""
+WINDOW, LATEST = 10, 30
+"""Steps of implicit legs, rejected ones included, that are weighed against those of a rival: at a new matrix, and
+after so many without one."""
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """An explicit method that may take over from an implicit one.
+
+    Parameters
+    ----------
+    limit
+        h·|λ| at its limit of stability.
+    stages
+        Evaluations of its steps.
+    left
+        Called where the steps end for it; with whether they had not paid before.
+    """
+
+    limit: float
+    stages: int
+    left: Callable[[float, float, str, bool], None]
 
 
 class Marching(Protocol):
@@ -71,6 +96,10 @@ class March:
         Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look.
     kept
         The matrix of implicit steps, and memory for these; None: steps are explicit or iterated.
+    rival
+        Of implicit steps.
+    most
+        Explicit steps after which ``left`` is called, too.
 
     Attributes
     ----------
@@ -88,12 +117,17 @@ class March:
         limit: float = 0.0,
         left: Leave | None = None,
         kept: Kept | None = None,
+        rival: Rival | None = None,
+        most: int | None = None,
     ) -> None:
         eq, start = method.equations, method.equations.accounts.opened(span.state)
         self.own, eq.accounts.kept = eq.accounts.own, True
         summed = start.account.size - self.own
         self.method, self.span, self.left, self._leave = method, span, False, left
-        self._handed, self._kept = 0, kept
+        self._handed, self._kept, self._rival = 0, kept, rival
+        # Tries when last weighed, cost then in evaluations; time of the matrix, its |λ|, ∫|λ| dt; 1 where steps paid;
+        # the number of steps to end at.
+        self._weighed = np.array([0.0] * 6 + [np.inf if most is None else span.counts.steps + most])
         size, q, times = eq.size, span.state.q, span.save_at
         rows = ROWS if times is None else max(times.size, 1)
         self.times = np.zeros(0) if times is None else np.abs(times - span.t0)
@@ -124,6 +158,7 @@ class March:
         c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
         c.saved = -1 if times is None else span.saved
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
+        self._weighed[:3] = *self._spent(), c.time
 
     @property
     def explicit(self) -> bool:
@@ -150,10 +185,15 @@ class March:
         """
         eq, c = self.method.equations, self.control
         before, sound = c.evaluations, float(c.time)
+        steps = int(min(steps, self._weighed[-1] - c.steps))
+        if self._rival is not None:
+            steps = min(steps, self._unweighed)
         found = int(self.march(steps))
-        while found == Ending.STALE and self._kept is not None:
+        while found == Ending.STALE and self._kept is not None and not self.left:
             self._kept.renew(self.state)
-            found = int(self.march(steps))
+            self._weigh(self._kept.fastest() if self._rival is not None else 0.0)
+            if not self.left:
+                found = int(self.march(steps))
         eq.evaluations += c.evaluations - before
         if self._kept is not None:
             self._kept.count()
@@ -165,6 +205,11 @@ class March:
             failing = found != Ending.STIFF or c.refusals > PATIENCE
             reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
             self._leave(self.time, float(c.step), reason)
+            self.left = True
+        elif found == Ending.PAUSED and self._rival is not None and not self._unweighed:
+            self._weigh(float(self._weighed[3]))
+        elif found == Ending.PAUSED and self._leave is not None and c.steps >= self._weighed[-1]:
+            self._leave(self.time, float(c.step), "its steps are many")
             self.left = True
         elif found == Ending.SHORT:
             raise SolveError(Outcome.TINY, "", f"{c.step:.3g} s")
@@ -192,6 +237,35 @@ class March:
         c.rows, c.time = rows, times[rows - 1, 0] if rows else sound
         within(eq.reduced, beyond.q, beyond.r, beyond.heats)
         raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
+
+    def _spent(self) -> tuple[int, int]:
+        """Tries of implicit steps so far, and their cost in evaluations."""
+        c, cost = self.control, 0 if self._kept is None else self._kept.cost
+        return int(c.steps + c.rejected), int(c.evaluations) + cost
+
+    @property
+    def _unweighed(self) -> int:
+        """Tries until steps are weighed at the latest."""
+        return max(0, int(self._weighed[0]) + LATEST - self._spent()[0])
+
+    def _weigh(self, fastest: float) -> None:
+        """End the steps where those of a rival, as long as its stability allows, would have cost less.
+
+        ``fastest`` is the largest |λ| at the state.
+        """
+        rival = self._rival
+        if rival is None:
+            return
+        (tries, cost), before, c, w = self._spent(), self._weighed[0], self.control, self._weighed
+        w[2:5] = c.time, fastest, w[4] + (float(c.time) - w[2]) * max(fastest, w[3])
+        if tries - before < WINDOW:
+            return
+        if cost - w[1] > rival.stages * w[4] / rival.limit:
+            c.step = min(float(c.step), rival.limit / max(fastest, TINY))
+            reason = f"steps that |λ| = {fastest:.2g} 1/s limits cost less"
+            rival.left(self.time, float(c.step), reason, not w[5])
+            self.left = True
+        w[0], w[1], w[4], w[5] = tries, cost, 0.0, 1.0
 
     def _refused(self, status: int) -> None:
         eq = self.method.equations
@@ -290,13 +364,15 @@ class March:
         (counts, control), s = self.steering.arrays, self.memory
         parts = control, counts, s["q"], s["y"], s["k"][0], s["carry"], self.account.arrays[1], self.momenta
         names = "control", "counts", "q", "y", "rates", "carry", "account", "momenta"
-        own = [] if self._kept is None else self._kept.parts()
+        own = [("weighed", self._weighed), *([] if self._kept is None else self._kept.parts())]
         return [*zip(names, parts, strict=True), *own]
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         for name, array in self._taken():
             array[:] = snapshot[name]
+        if self._kept is not None:
+            self._kept.resume()
 
     @property
     def counts(self) -> Counts:

@@ -34,6 +34,10 @@ NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 PIVOTING = ("swap", "swaps", "end", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
+FACTORS = 2
+"""Evaluations that cost as much as factors do; a solution is one."""
+POWERS = 12
+"""Powers of a matrix after which its largest eigenvalue shows, and over which it is averaged."""
 FAST = 2e-3
 """Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
 
@@ -251,6 +255,25 @@ class Kept:
         n.stale, n.young, n.factored = 0, 1, 0.0
         n.split = int(np.abs(by_heats).max(initial=0.0) <= NOTHING * np.abs(found).max(initial=0.0))
 
+    @property
+    def cost(self) -> int:
+        """Cost of matrices, factors and solutions so far, in evaluations, roughly."""
+        n: Any = self.newton[0]
+        return self._stages.jacobian.cost + int(n.iterations) + FACTORS * int(n.factorisations)
+
+    def fastest(self) -> float:
+        """The largest |λ| of the matrix in 1/s, roughly: by its powers."""
+        matrix, size = self.memory["matrix"], 1.0
+        x = np.ones(len(matrix))
+        for k in range(2 * POWERS):
+            x = matrix @ x
+            found = float(np.linalg.norm(x))
+            if not found > 0.0:
+                return 0.0
+            x /= found
+            size *= found if k >= POWERS else 1.0
+        return size ** (1.0 / POWERS)
+
     def count(self) -> None:
         """Add the steps' costs since the last call to the method's counts."""
         n: Any = self.newton[0]
@@ -258,6 +281,11 @@ class Kept:
         for name, now, before in zip(("iterations", "factorisations"), found, self._counted, strict=True):
             self._stages.counts[name] += now - before
         self._counted = found
+
+    def resume(self) -> None:
+        """Take the steps' costs so far as counted: the memory is that of a run that goes on."""
+        n: Any = self.newton[0]
+        self._counted = [int(n.iterations), int(n.factorisations)]
 
     def parts(self) -> list[tuple[str, Any]]:
         """All that the next step depends on, by name."""

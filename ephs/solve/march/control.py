@@ -7,10 +7,12 @@ from ephs.semantics.stage import Evaluator, Integer, Real, Truth
 from ephs.solve.control import SLIVER, UNFELT
 from ephs.solve.march.records import Control
 
-__all__ = ["PATIENCE", "held_back", "judge", "length"]
+__all__ = ["HELD", "PATIENCE", "held_back", "judge", "length"]
 
 PATIENCE = 15
-"""Steps at the limit of stability, or without solution one after the other, before a stiff method is called for."""
+"""Steps without solution, one after the other, before a stiff method is called for."""
+HELD = 40
+"""Steps at the limit of stability before that: they cost a fraction of the set-up of implicit steps."""
 
 
 def _power(on: Evaluator, x: Real, exponent: Real) -> Real:
@@ -65,4 +67,4 @@ def held_back(on: Evaluator, control: Control) -> Truth:
     free = on.select(over, 0, control.free + 1)
     control.held = on.select(on.both(on.negate(over), free >= 6), 0, held)
     control.free = free
-    return on.both(over, held >= PATIENCE)
+    return on.both(over, held >= HELD)

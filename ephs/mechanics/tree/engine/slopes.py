@@ -67,6 +67,11 @@ class RateSlopes:
             (self._out, self._slope),
         )  # fmt: skip
 
+    @property
+    def calls(self) -> int:
+        """Number of calls for one matrix."""
+        return len(self._calls)
+
     def at(self, q: Array, y: Array) -> tuple[int, Array]:
         """A status, and ∂ẏ/∂y (size, size) where joints' elements are q·exp(v)."""
         self._q[:], self._y[:] = q, y
