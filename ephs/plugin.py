@@ -3,8 +3,6 @@
 It stands apart from `ephs.testing`: that imports Hypothesis, which then calls this before `ephs.testing` is whole.
 """
 
-__all__ = ["register"]
-
 
 def register() -> None:
     """Tell Hypothesis how to make paths, quantities, patterns, systems and scenes, each when it is asked for."""

@@ -9,8 +9,6 @@ from ephs.semantics.stage import Program
 from ephs.semantics.stage.objects import FITTING, emitted
 from ephs.semantics.stage.shipping import ship
 
-__all__ = ["SHIPPED", "programs", "write_objects"]
-
 SHIPPED: Final = (
     "ephs.semantics.stage.functions:ELEMENTARY",
     "ephs.semantics.stage.gradients:reading_program",

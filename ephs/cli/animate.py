@@ -7,8 +7,6 @@ from cyclopts import Parameter
 
 from ephs.cli.input import TEXTS, BadInput, addressed, solution_of
 
-__all__ = ["animate"]
-
 Flag = Annotated[bool, Parameter(negative=())]
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from ephs import Scene
     from ephs.show.charts import Cell, Family, Point, Reference
 
-__all__ = ["charts"]
-
 _TEXTS = {
     "method": "--method {found}: expected some of {expected}",
     "none": "ephs chart work-precision: found no scene, expected a scene file (.toml) or FILE.py:NAME",

@@ -37,8 +37,6 @@ from ephs.cli.run import run
 from ephs.cli.sweep import sweeps
 from ephs.cli.view import view
 
-__all__ = ["main"]
-
 _PICTURES = (".svg", ".tex", ".png")
 
 

@@ -8,8 +8,6 @@ from cyclopts import App
 
 from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
 
-__all__ = ["resting"]
-
 _TEXTS = {"system": "{found}: expected a scene; ephs.equilibrium takes systems in Python"}
 
 resting = App(name="equilibrium", help="Find the shape of a scene at rest under its loads.")

@@ -8,8 +8,6 @@ from cyclopts import App, Parameter
 
 from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
 
-__all__ = ["exports", "units"]
-
 exports = App(name="export", help="Write a mechanism as a program without Python: C, object code, WebAssembly.")
 units = App(name="fmu", help="Write a mechanism as a unit of FMI 3.0 for co-simulation.")
 

@@ -8,8 +8,6 @@ from ephs.cli.input import AS_GIVEN, Loading, addressed, load_model, say
 if TYPE_CHECKING:
     from ephs import Scene, System
 
-__all__ = ["info"]
-
 MOST = 12
 """Rows of a table; a line counts the others."""
 

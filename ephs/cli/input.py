@@ -17,27 +17,6 @@ from ephs.cli.nearest import MODELS, beside, did_you_mean
 if TYPE_CHECKING:
     from ephs import Scene, Solution, System
 
-__all__ = [
-    "AS_CHOSEN",
-    "AS_GIVEN",
-    "EXTRAS",
-    "TEXTS",
-    "BadInput",
-    "Loading",
-    "Positive",
-    "Stepping",
-    "addressed",
-    "complain",
-    "heard",
-    "initial_values",
-    "load_model",
-    "naming",
-    "noted",
-    "positive",
-    "say",
-    "solution_of",
-]
-
 TEXTS = {
     "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
     "jumps": "--jumps {found}: expected TIME,TIME,... in seconds, as in 0.1,0.25",

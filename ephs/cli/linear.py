@@ -10,8 +10,6 @@ from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, n
 if TYPE_CHECKING:
     from ephs import Scene, System
 
-__all__ = ["linearizing"]
-
 _TEXTS = {
     "at": "--at {found}: expected a number of seconds above 0, or the word equilibrium",
     "input": "--input {found}: expected names as joints.pin for a scene, PORT=effort:NUMBER or PORT=flow:NUMBER for a "

@@ -3,8 +3,6 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = ["MODELS", "beside", "did_you_mean", "nearest"]
-
 MODELS = (".toml", ".py", ".urdf", ".xml", ".sdf")
 """Suffixes of model files."""
 

@@ -9,8 +9,6 @@ from cyclopts import App, Parameter
 
 from ephs.cli.input import BadInput, addressed, say
 
-__all__ = ["TEMPLATES", "news"]
-
 TEMPLATES = {
     "pendulum": ("pendulum.toml", "a rod on a pin with friction, which warms the bearing; every line explained"),
     "double-pendulum": ("double-pendulum.toml", "two rods on two pins: chaotic motion"),

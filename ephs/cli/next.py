@@ -7,8 +7,6 @@ from typing import Any
 from ephs.cli.input import BadInput
 from ephs.cli.nearest import nearest
 
-__all__ = ["EXAMPLES", "after", "known_command", "welcome", "with_examples"]
-
 EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "new": ("ephs new my-pendulum", "ephs new engine --like slider-crank"),
     "run": (

@@ -8,8 +8,6 @@ from cyclopts import Parameter
 
 from ephs.cli.input import TEXTS, BadInput, addressed, say, solution_of
 
-__all__ = ["plot"]
-
 _FIGURES = (".svg", ".png", ".pdf")
 
 

@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-__all__ = ["progress_bar", "said_of"]
-
 
 @contextmanager
 def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:

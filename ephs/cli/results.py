@@ -9,8 +9,6 @@ from ephs.cli.input import EXTRAS, TEXTS, complain, say
 if TYPE_CHECKING:
     from ephs import Solution
 
-__all__ = ["write_results"]
-
 _FIGURES = {
     "steps": ("steps", "d"),
     "rejected": ("rejected steps", "d"),

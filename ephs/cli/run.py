@@ -31,8 +31,6 @@ from ephs.cli.results import write_results
 if TYPE_CHECKING:
     from ephs import Scene, Solution, System
 
-__all__ = ["run"]
-
 JOURNAL = "run.journal"
 RUN = "run.json"
 """Request of a run, stored beside the results of a complete run."""

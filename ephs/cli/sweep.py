@@ -13,8 +13,6 @@ from ephs.cli.input import AS_CHOSEN, AS_GIVEN, BadInput, Loading, Stepping, add
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["sweeps"]
-
 _TEXTS = {
     "vary": "--vary {found}: expected PATH=FROM:TO:COUNT or PATH=VALUE,VALUE,..., as in bodies.crank.mass=0.1:0.5:9",
     "none": "ephs sweep {file}: found nothing to vary, expected --vary PATH=FROM:TO:COUNT, bodies.crank.mass=0.1:0.5:9",

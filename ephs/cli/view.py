@@ -6,8 +6,6 @@ from cyclopts import Parameter
 
 from ephs.cli.input import AS_GIVEN, TEXTS, BadInput, Loading, addressed, load_model, say
 
-__all__ = ["view"]
-
 
 def view(
     scene: str,

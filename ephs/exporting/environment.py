@@ -17,8 +17,6 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
 from ephs.solve.control import RTOL
 
-__all__ = ["Environment", "Environments", "Task"]
-
 CHUNK: Final = 8
 """Least number of instances per thread: with fewer, scheduling costs more than computing."""
 

@@ -4,8 +4,6 @@ from typing import Final, final
 
 from ephs.operad.messages import TextError
 
-__all__ = ["ExportError"]
-
 TEXTS: Final = {
     "method": "method {found!r} cannot be exported, expected {expected}",
     "input": "input {found!r}: expected a joint with a free coordinate, one of {expected}",

@@ -21,8 +21,6 @@ from ephs.semantics.system import System
 from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
 
-__all__ = ["PLATFORMS", "export_fmu"]
-
 PLATFORMS: Final[Mapping[str, tuple[str, str, str]]] = {
     "x86_64-linux": ("linux-x86-64-v2", "x86_64-linux-gnu", ".so"),
     "aarch64-linux": ("linux-arm64", "aarch64-linux-gnu", ".so"),

@@ -24,8 +24,6 @@ from ephs.solve.march import Control as Steering
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Span
 
-__all__ = ["METHODS", "Image", "Variable", "image_of"]
-
 METHODS = ("rk54", "rk87")
 MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")
 """Arrays that evaluations or callers write."""

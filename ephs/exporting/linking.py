@@ -11,8 +11,6 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.module import Exported
 from ephs.semantics.stage.objects import emitted
 
-__all__ = ["CALLS", "tool", "webassembly"]
-
 CALLS: Final = ("start", "parameters", "inputs", "advance", "time", "outputs", "accelerations")
 """Functions of an exported mechanism."""
 

@@ -17,8 +17,6 @@ from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.programs import located
 from ephs.solve.march import Control, Ending
 
-__all__ = ["Exported", "exported"]
-
 _DEFINED: Final = re.compile(r"^define (?:internal )?(?:fastcc )?\S+ @([\w.]+)\(", re.MULTILINE)
 _DECLARED: Final = re.compile(r"^declare .*$\n?", re.MULTILINE)
 _ADDRESSES: Final = 2**32

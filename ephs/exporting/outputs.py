@@ -23,8 +23,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["outputs_program"]
-
 
 def _row(x: Vector) -> Matrix:
     return Matrix(x.cells, x.start, 1, x.size)

@@ -22,8 +22,6 @@ from ephs.show.palette import CYCLE
 from ephs.show.player import player
 from ephs.show.stage import stage_of
 
-__all__ = ["live_page"]
-
 KEYS: Final = ("mass", "friction", "stiffness", "damping", "gravity[2]")
 """Default numbers for sliders, in this order."""
 MOST: Final = 6

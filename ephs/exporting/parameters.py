@@ -10,8 +10,6 @@ import numpy as np
 from ephs.exporting.errors import ExportError
 from ephs.semantics.bundle import Array
 
-__all__ = ["Dependence", "dependence"]
-
 NEAR = 0.25
 """Relative displacement of a parameter, of 1 where it is 0: above rounding and within ranges."""
 EXACT = 1e-12

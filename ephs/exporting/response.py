@@ -17,8 +17,6 @@ from ephs.semantics.system import System
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Response", "jax_function", "response", "torch_function"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

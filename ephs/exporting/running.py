@@ -9,8 +9,6 @@ from ephs.exporting.module import Exported
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage.objects import compiled
 
-__all__ = ["Instances"]
-
 _POINTER: Final = ctypes.c_void_p
 _CALLS: Final[dict[str, tuple[Any, ...]]] = {
     "start": (None, _POINTER),

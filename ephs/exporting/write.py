@@ -16,8 +16,6 @@ from ephs.semantics.system import System
 from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
 
-__all__ = ["export"]
-
 
 def export(
     model: Scene | System,

@@ -4,8 +4,6 @@ from typing import Final, final
 
 from ephs.operad.messages import TextError
 
-__all__ = ["ModelicaError"]
-
 TEXTS: Final = {
     "package": "Modelica is read by Pymoca, which is not installed: pip install ephs[modelica]",
     "file": "{where}: no file or folder of Modelica",

@@ -7,8 +7,6 @@ from typing import Any, Final, TypeAlias, final
 
 from ephs.modelica.errors import ModelicaError
 
-__all__ = ["Expr", "Matrix", "Reader", "Symbol", "derivative", "said", "sp"]
-
 sp: Any = import_module("sympy")
 """SymPy, whose own types are narrower than its functions."""
 Expr: TypeAlias = Any

@@ -11,8 +11,6 @@ from ephs.modelica.expressions import Expr, Reader, Symbol, said, sp
 from ephs.operad import Quantity, quantity
 from ephs.solve.errors import nearest_of
 
-__all__ = ["DOMAINS", "Domain", "Equation", "Flat", "Port", "flattened", "tree_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

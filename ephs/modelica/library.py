@@ -8,8 +8,6 @@ from ephs.modelica.errors import ModelicaError
 from ephs.modelica.flat import flattened, tree_of
 from ephs.modelica.parts import ModelicaComponent, component_of
 
-__all__ = ["ModelicaLibrary"]
-
 
 @final
 class ModelicaLibrary:

@@ -21,8 +21,6 @@ from ephs.semantics.primitives import Primitive, Reversible, power_ports
 from ephs.semantics.structures import constant_structure, quadratic
 from ephs.semantics.system import System
 
-__all__ = ["ModelicaComponent", "component_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,6 @@ from ephs.modelica.expressions import Expr, Matrix, Symbol, derivative, sp
 from ephs.modelica.flat import Equation, Flat, Port
 from ephs.operad import Quantity, quantity
 
-__all__ = ["STATES", "Relation", "State", "needed", "relation_of"]
-
 LENGTHS = ("rad", "m")
 """Units of positions."""
 STATES: dict[str, tuple[Quantity, bool]] = {

@@ -16,8 +16,6 @@ from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, sp
 from ephs.modelica.relation import Relation
 
-__all__ = ["Structure", "power_of", "stored_energy", "structure_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,6 @@ from ephs.semantics.constructors import irreversible
 from ephs.semantics.primitives import Primitive, power_ports
 from ephs.semantics.structures import constant_structure
 
-__all__ = ["heated", "require_heat", "warm_of"]
-
 
 def warm_of(flat: Flat) -> dict[Symbol, Expr]:
     """The start temperatures of heat ports, where signs are looked at."""

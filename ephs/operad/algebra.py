@@ -17,8 +17,6 @@ from ephs.operad.nesting import Nesting
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Interface
 
-__all__ = ["Algebra", "AlgebraMap", "Element", "Lax", "apply", "call", "fold"]
-
 S = TypeVar("S")
 T = TypeVar("T")
 

@@ -16,8 +16,6 @@ from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Interface
 
-__all__ = ["ALGEBRA_LAWS", "MAP_LAWS"]
-
 Elements: TypeAlias = Mapping[Path, Any]
 Names: TypeAlias = Mapping[Path, Path]
 

@@ -8,8 +8,6 @@ from ephs.operad.normal import NormalForm, StateClass
 from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 
-__all__ = ["canonical", "from_normal", "rank"]
-
 
 def canonical(pattern: Pattern) -> Pattern:
     """Canonical representative of the patterns equal to the given one; it depends on the normal form only.

@@ -15,8 +15,6 @@ from ephs.operad.reading import Reader
 from ephs.operad.text import quantity_text
 from ephs.operad.translation import Translation, Wiring, box_name, lost_of
 
-__all__ = ["from_catlab", "to_catlab"]
-
 _READ = Reader("wiring diagram")
 _COLUMNS = {
     "Box": {"name"},

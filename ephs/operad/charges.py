@@ -8,20 +8,6 @@ from typing import TypeAlias, cast, final
 
 from ephs.operad.errors import PatternError
 
-__all__ = [
-    "ENTROPY",
-    "KINDS",
-    "PLAIN",
-    "POSITIVE",
-    "VOLUME",
-    "WHOLE",
-    "Charges",
-    "Domain",
-    "Kind",
-    "charges_of",
-    "require_domain",
-]
-
 Domain: TypeAlias = tuple[float, float]
 """An open interval, in which each number of a state lies."""
 Charges: TypeAlias = tuple[tuple[str, tuple[float, ...]], ...]

@@ -6,8 +6,6 @@ from typing import TypeAlias, TypeVar, cast, final
 from ephs.operad.errors import PatternError
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
 
-__all__ = ["Directory", "Entries", "first_clash"]
-
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 S = TypeVar("S")

@@ -3,8 +3,6 @@
 from collections.abc import Hashable, Iterable, Iterator
 from typing import Generic, TypeVar, final
 
-__all__ = ["DisjointSets"]
-
 Element = TypeVar("Element", bound=Hashable)
 
 

@@ -18,23 +18,6 @@ from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, Space, known_quantity, quantity_word
 from ephs.operad.reading import Reader
 
-__all__ = [
-    "SCHEMA_FILE",
-    "contents_from",
-    "contents_record",
-    "domain_from",
-    "domain_record",
-    "from_dict",
-    "from_json",
-    "pattern_within",
-    "port_from",
-    "port_record",
-    "quantity_from",
-    "quantity_record",
-    "to_dict",
-    "to_json",
-]
-
 FORMAT = 1
 SCHEMA_FILE = FilePath(__file__).with_name("pattern.schema.json")
 _READ = Reader("pattern")

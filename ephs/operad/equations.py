@@ -7,8 +7,6 @@ from typing import Any, cast, final
 
 from ephs.operad.names import Path
 
-__all__ = ["Equation", "Law"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

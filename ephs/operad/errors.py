@@ -4,8 +4,6 @@ from typing import final
 
 from ephs.operad.messages import legible
 
-__all__ = ["PatternError"]
-
 _TEXTS = {
     "name": "invalid name {found!r} in a path: {expected}; choose another name",
     "path": "invalid path {found!r}: expected {expected}",

@@ -12,8 +12,6 @@ from ephs.operad.quantities import Quantity
 from ephs.operad.text import quantity_text
 from ephs.operad.translation import Translation, Wiring, box_name, lost_of, numbered
 
-__all__ = ["from_discopy", "to_discopy"]
-
 
 def to_discopy(pattern: Pattern) -> Translation[Any]:
     """The pattern as a `discopy.frobenius.Hypergraph`: junctions are spiders, all ports outputs.

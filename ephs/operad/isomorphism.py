@@ -20,8 +20,6 @@ from ephs.operad.quantities import Quantity
 if TYPE_CHECKING:
     import networkx as nx
 
-__all__ = ["Renaming", "automorphisms", "canonical_hash", "isomorphism", "to_networkx"]
-
 Node = tuple[str, Any]
 """Kind and name of each vertex, to read the isomorphism from."""
 

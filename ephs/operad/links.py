@@ -5,8 +5,6 @@ from collections.abc import Iterable, Mapping
 from ephs.operad.disjoint import DisjointSets
 from ephs.operad.names import Path
 
-__all__ = ["closure"]
-
 
 def closure(groups: Iterable[Iterable[Path]]) -> Mapping[Path, frozenset[Path]]:
     """The least equivalence that joins the members of each group: the classes of two members or more, by member."""

@@ -8,8 +8,6 @@ from ephs.operad.names import Path, paths_text
 from ephs.operad.normal import powered
 from ephs.operad.pattern import Pattern
 
-__all__ = ["Diagnostic", "diagnose"]
-
 _TEXTS: MappingProxyType[str, str] = MappingProxyType(
     {
         "open-circuit": "outer port {paths} bears power, but only state ports meet it inside: no flow can"

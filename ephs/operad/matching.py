@@ -4,8 +4,6 @@ from ephs.operad.errors import PatternError
 from ephs.operad.names import Path
 from ephs.operad.quantities import Interface, interface_text
 
-__all__ = ["interfaces_match", "require_interface"]
-
 
 def interfaces_match(wanted: Interface, given: Interface) -> bool:
     """Whether ports have the same names and kinds, and quantities that match."""

@@ -4,8 +4,6 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any, ClassVar
 
-__all__ = ["TextError", "legible", "nearest_name"]
-
 _NEAR_LETTERS, _NEAR_NAMES = 80, 500
 
 

@@ -5,8 +5,6 @@ from typing import TypeAlias, final
 
 from ephs.operad.errors import PatternError
 
-__all__ = ["ROOT", "Path", "PathLike", "paths_text"]
-
 LONGEST_NAME = 200
 MOST_NAMES = 500
 

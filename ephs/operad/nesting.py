@@ -13,8 +13,6 @@ from ephs.operad.pattern import Pattern
 if TYPE_CHECKING:
     from ephs.operad.algebra import Algebra
 
-__all__ = ["Nesting"]
-
 T = TypeVar("T")
 
 

@@ -21,8 +21,6 @@ from ephs.operad.quantities import Quantity
 if TYPE_CHECKING:
     from ephs.operad.pattern import Pattern
 
-__all__ = ["NormalForm", "PowerJunction", "StateClass", "normal_form", "powered"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

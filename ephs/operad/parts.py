@@ -7,8 +7,6 @@ from ephs.operad.directory import Directory
 from ephs.operad.names import Path
 from ephs.operad.quantities import Interface, Quantity
 
-__all__ = ["Box", "Junction", "Port", "junction"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

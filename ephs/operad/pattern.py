@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from ephs.operad.isomorphism import Renaming
     from ephs.operad.lint import Diagnostic
 
-__all__ = ["Boxes", "Pattern"]
 T = TypeVar("T")
 Boxes: TypeAlias = Entries[Entries[str | Port] | Box]
 """Box name -> port name -> junction name, ``"~name"`` for a state port; or box name -> `Box`."""

@@ -7,8 +7,6 @@ from ephs.operad.names import Path
 from ephs.operad.parts import Port
 from ephs.operad.pattern import Pattern
 
-__all__ = ["expression", "summary", "tree"]
-
 
 def tree(pattern: Pattern) -> str:
     """The pattern as an indented tree of junctions, boxes and links."""

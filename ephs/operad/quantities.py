@@ -10,19 +10,6 @@ from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
 from ephs.operad.units import dimension
 
-__all__ = [
-    "Interface",
-    "PortType",
-    "Quantities",
-    "Quantity",
-    "Space",
-    "interface_text",
-    "known_quantity",
-    "name_pair",
-    "quantity",
-    "quantity_word",
-]
-
 # Kind of pair: dimension of its subgroup of SE(3), numbers stored for an element, names of its parameters.
 _PAIRS: dict[str, tuple[int, int, tuple[str, ...]]] = {
     "revolute": (1, 1, ()),

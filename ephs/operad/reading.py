@@ -8,8 +8,6 @@ from typing import NoReturn, cast, final
 
 from ephs.operad.errors import PatternError
 
-__all__ = ["Reader"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

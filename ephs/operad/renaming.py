@@ -9,8 +9,6 @@ from ephs.operad.names import ROOT, Path, paths_text
 from ephs.operad.parts import Port
 from ephs.operad.pattern import Pattern
 
-__all__ = ["rename"]
-
 
 def rename(
     pattern: Pattern,

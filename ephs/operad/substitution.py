@@ -16,8 +16,6 @@ from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Interface
 from ephs.operad.wellformed import box_of, require_one_quantity
 
-__all__ = ["flatten", "substitute"]
-
 
 def substitute(pattern: Pattern, fillings: Mapping[Path, object]) -> Pattern:
     """Put patterns into boxes; see `Pattern.substitute`."""

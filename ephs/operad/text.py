@@ -27,8 +27,6 @@ from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import PortType, Quantity, known_quantity, quantity_word
 
-__all__ = ["from_text", "quantity_from_text", "quantity_text", "statements", "to_text"]
-
 _BARE = re.compile(r"[\w+\-*/'^]+")
 _TOKEN = re.compile(r"[ \t\r\f\v]*(?:#[^\n]*)?(\n|[;:,()~@=.]|\"(?:[^\"\\\n]|\\.)*\"|\{|[\w+\-*/'^]+|\S|$)")
 

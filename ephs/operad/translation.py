@@ -12,8 +12,6 @@ from ephs.operad.quantities import Quantity
 from ephs.operad.reading import Reader
 from ephs.operad.text import quantity_from_text
 
-__all__ = ["Translation", "Wiring", "box_name", "lost_of", "numbered"]
-
 T = TypeVar("T")
 
 

@@ -10,8 +10,6 @@ from types import MappingProxyType
 
 from ephs.operad.errors import PatternError
 
-__all__ = ["Dimension", "dimension", "effort_unit", "flow_unit"]
-
 Dimension = tuple[tuple[str, int], ...]
 """Base units with their powers, none of them zero, sorted by name."""
 

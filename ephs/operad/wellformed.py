@@ -11,16 +11,6 @@ from ephs.operad.parts import Box, Junction, Port
 from ephs.operad.pattern import Boxes
 from ephs.operad.quantities import PortType
 
-__all__ = [
-    "read_boxes",
-    "read_fillings",
-    "read_junctions",
-    "read_links",
-    "require_named_boxes",
-    "require_one_quantity",
-    "require_pattern",
-]
-
 _PORTS = 'port name -> junction name, "~name" for a state port'
 
 

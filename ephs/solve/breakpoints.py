@@ -18,8 +18,6 @@ from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.sampled import Sampling
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["MOST_FOUND", "NEAR", "Breakpoints"]
-
 NEAR = 16.0
 """Tolerance for equal times, in roundings of the time."""
 MOST_FOUND = 1000

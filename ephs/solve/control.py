@@ -12,19 +12,6 @@ from ephs.semantics.descriptor import Descriptor
 from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
 from ephs.solve.snapshot import Snapshot
 
-__all__ = [
-    "ATOL",
-    "RTOL",
-    "Control",
-    "Grid",
-    "Policy",
-    "Proportional",
-    "Symmetric",
-    "Tolerance",
-    "first_step",
-    "told_apart",
-]
-
 SLIVER = 1e-9
 """Fraction of a step, or of a time, that is rounding of sums of steps."""
 UNFELT, EXACT = 1e-10, 1e-12

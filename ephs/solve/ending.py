@@ -20,8 +20,6 @@ from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import Record, joined
 from ephs.solve.result.solution import Solution
 
-__all__ = ["audited", "failures_of", "repeatable", "solution_of"]
-
 
 class Run(Protocol):
     """A run in progress: its state and its results so far."""

@@ -12,8 +12,6 @@ from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.problem import States
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Crossing", "Event", "Watch", "events_of"]
-
 S = TypeVar("S")
 
 

@@ -24,8 +24,6 @@ from ephs.semantics.numbering import Index
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.solve.errors import Outcome, SolveError
 
-__all__ = ["LITTLE", "PLAIN", "Heats", "exponential_law"]
-
 EXPONENTIAL = 1e-12
 """Relative tolerance for recognising an exponential energy law: rounding of the functions."""
 LITTLE = 0.1

@@ -17,8 +17,6 @@ from ephs.semantics.extents import room
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
-__all__ = ["Instant", "Mobility", "instant", "mobility"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,6 @@ from ephs.solve.result.durable import settle
 from ephs.solve.result.record import Record, joined
 from ephs.solve.snapshot import Snapshot, parts
 
-__all__ = ["FORMAT", "MAGIC", "Contents", "Journal", "Written", "read_journal"]
-
 FORMAT = 1
 MAGIC = b"ephs run"
 EVERY = 0.5

@@ -18,8 +18,6 @@ from ephs.semantics.numbering import Index, spans, starts
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKING, Tables
 
-__all__ = ["Entry", "entry_of", "laid_out"]
-
 LINEAR = frozenset({"constant_structure", "quadratic"})
 """Kernels whose Jacobian's entries are their parameters, so that zeros depend on the parameters."""
 

@@ -26,8 +26,6 @@ from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Counts, Leg, Row, Span, Stepper, too_fast
 from ephs.solve.watching import Balance, Progress
 
-__all__ = ["integrate"]
-
 S = TypeVar("S")
 RESPONSE = 0.1
 BURST = 1000

@@ -21,8 +21,6 @@ from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.instant import Mobility, is_velocity
 from ephs.solve.sparse import Index
 
-__all__ = ["mobility"]
-
 SOUND = 1e-3
 """Least singular value of an invertible block, as a fraction of its row norms."""
 

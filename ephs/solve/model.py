@@ -21,8 +21,6 @@ from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, Tables
 from ephs.solve.methods.residuals import FAULTS
 from ephs.solve.sparse import Index
 
-__all__ = ["Evaluation", "Model", "compile_model", "evaluate_at"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

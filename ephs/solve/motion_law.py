@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from ephs.solve.problem import State
 
-__all__ = ["HarmonicMotion", "MotionLaw", "PolynomialMotion", "TabulatedMotion"]
-
 SAMPLES = 257
 """Number of samples for the largest rate of a motion law."""
 

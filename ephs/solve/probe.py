@@ -13,8 +13,6 @@ import numpy as np
 from ephs.solve.problem import State
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["WIDTH", "Asked", "Change", "Probe"]
-
 WIDTH = 1.0 / 2000.0
 """Spacing of samples of a function as a fraction of the run."""
 FIRST, GROWTH = 1.0 / 64.0, 4.0

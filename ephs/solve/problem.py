@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ephs.solve.result.record import Record
     from ephs.solve.result.solution import Solution
 
-__all__ = ["NO_STATE", "Motion", "Problem", "Signal", "State", "States"]
-
 State = Mapping[Path, Array]
 NO_STATE: Final[State] = MappingProxyType({})
 """States for inputs that do not read them."""

@@ -17,8 +17,6 @@ from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
 from ephs.solve.problem import Problem, State
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Held", "Sampled", "Sampling", "holding"]
-
 FINEST = 1e3
 """Least period, in roundings of the time."""
 MOST = 10_000_000

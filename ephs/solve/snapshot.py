@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
-__all__ = ["Snapshot", "like", "parts"]
-
 Snapshot = Mapping[str, Any]
 """Numbers, texts, None, arrays, and lists and mappings of such."""
 V = TypeVar("V")

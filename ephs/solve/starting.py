@@ -10,8 +10,6 @@ from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model
 from ephs.solve.problem import Problem
 
-__all__ = ["check_start"]
-
 INSTANT = 1e-7
 """Step without motion, as a fraction of a step."""
 JUMP = 1e-6

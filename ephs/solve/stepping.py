@@ -14,8 +14,6 @@ from ephs.solve.snapshot import Snapshot
 if TYPE_CHECKING:
     from ephs.solve.result.record import Record
 
-__all__ = ["Attempt", "Counts", "Leg", "Row", "Span", "Stepper", "too_fast"]
-
 S = TypeVar("S")
 S_co = TypeVar("S_co", covariant=True)
 

@@ -7,8 +7,6 @@ from importlib import import_module
 from threading import Lock
 from typing import Any, ParamSpec, TypeVar, final
 
-__all__ = ["in_one_thread"]
-
 Given = ParamSpec("Given")
 Made = TypeVar("Made")
 

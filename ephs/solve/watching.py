@@ -11,8 +11,6 @@ from ephs.solve.problem import Problem
 from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import Record
 
-__all__ = ["Balance", "Progress", "guarded"]
-
 Progress = Callable[[float, float, Mapping[str, Any]], None]
 """Called with the time, the end, and statistics so far."""
 

@@ -22,8 +22,6 @@ from ephs.operad import (
 from ephs.testing.laws import renamings
 from ephs.testing.patterns import fresh_paths, nestings, patterns
 
-__all__ = ["algebra_inputs", "check_algebra", "check_algebra_map"]
-
 Elements: TypeAlias = Callable[[Interface], st.SearchStrategy[Any]]
 """Interface -> elements of it."""
 

@@ -14,8 +14,6 @@ from ephs.operad import ALGEBRA_LAWS, Algebra, AlgebraMap, Law, Path, Pattern
 from ephs.testing.algebras import algebra_inputs
 from ephs.testing.elements import ELEMENTS, FEW, Elements
 
-__all__ = ["LawCell", "law_cell", "law_table", "refuted", "spoiled"]
-
 Filled: TypeAlias = tuple[Pattern, Mapping[Path, Any]]
 
 

@@ -26,8 +26,6 @@ from ephs.semantics.algebra import (
 from ephs.semantics.system import Filling
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
-__all__ = ["ELEMENTS", "FEW", "Elements"]
-
 Elements: TypeAlias = Callable[[Interface], st.SearchStrategy[Any]]
 """Interface -> elements of it."""
 LEVEL = Quantity("level", Space("real", 1, 1), 1)

@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from ephs.operad import LAWS, Law, Path, Pattern
 from ephs.testing.patterns import fresh_paths, nestings, patterns
 
-__all__ = ["check_operad_laws", "law_inputs", "renamings"]
-
 
 @st.composite
 def law_inputs(draw: st.DrawFn, law: Law) -> tuple[object, ...]:

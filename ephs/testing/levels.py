@@ -11,8 +11,6 @@ from ephs.semantics import System
 from ephs.semantics.system import Filling
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
-__all__ = ["Outer", "levels"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.testing.primitives import generators
 
-__all__ = ["mechanisms"]
-
 KINDS = ("revolute", "prismatic", "screw", "cylindrical", "spherical", "planar", "fixed", "free", "universal")
 LOOPS = (
     ("revolute", "revolute", "revolute", "revolute"),

@@ -19,8 +19,6 @@ from ephs.operad import (
     quantity,
 )
 
-__all__ = ["fresh_names", "fresh_paths", "interfaces", "nestings", "paths", "patterns", "quantities"]
-
 _KNOWN = (
     quantity.momentum,
     quantity.displacement,

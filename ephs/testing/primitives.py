@@ -14,8 +14,6 @@ from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Point
 from ephs.semantics.spaces import Pair
 
-__all__ = ["generators", "irreversibles", "reversibles", "storages"]
-
 CLEARED = 1e-12
 """Rounding error of entries of order one."""
 

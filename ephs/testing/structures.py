@@ -14,8 +14,6 @@ from ephs.semantics.search import UNDEFINED, failure, search, shrunk
 from ephs.semantics.trials import chosen, trial_of
 from ephs.semantics.verdict import StructureVerdict
 
-__all__ = ["check_entropy_production", "check_primitive"]
-
 Numbers = tuple[list[float], Reference]
 
 

@@ -13,14 +13,6 @@ from ephs.semantics.system import Filling
 from ephs.testing.levels import levels
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
-__all__ = [
-    "check_functoriality",
-    "check_natural",
-    "check_power_balance",
-    "fillings",
-    "systems",
-]
-
 SCALARS = (
     (quantity.displacement, quantity.momentum, quantity.entropy),
     (quantity.charge, quantity.flux_linkage, quantity.entropy),

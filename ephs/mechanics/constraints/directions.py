@@ -14,8 +14,6 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["Axes", "Direction", "Place", "describe", "enumerated", "name_directions"]
-
 ALIGNED = 1e-6
 """Largest relative distance of a direction from a named axis."""
 

@@ -18,8 +18,6 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-__all__ = ["Hold", "Mechanism", "annihilator", "redundant"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,8 +22,6 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
 
-__all__ = ["Dependence", "dependences", "explain", "in_words", "indeterminate", "wrenches_in_words"]
-
 AWAY, TRIALS, NEAR = 0.02, 3, 0.2
 """Distance and number of neighbouring configurations compared, and the turn of a direction allowed up to there."""
 SHOWN = 3

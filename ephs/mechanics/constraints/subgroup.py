@@ -13,8 +13,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 
-__all__ = ["Subgroup", "generated"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,8 +12,6 @@ from ephs.semantics.bundle import Reference
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
 
-__all__ = ["dynamics"]
-
 
 def dynamics(
     scene: Scene | System,

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.dynamics.model import Dynamics
     from ephs.mechanics.dynamics.state import State
 
-__all__ = ["Task", "computed_torque", "task_of", "tree_only"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,6 @@ from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.semantics.bundle import Array
 
-__all__ = ["constraints_of", "derivatives_of", "forward_slopes", "velocity_derivatives_of"]
-
 Slopes = tuple[Array, Array, Array]
 """(n,) accelerations, their derivatives as `Linearised.columns` has them, and those by forces (n, n)."""
 

@@ -12,8 +12,6 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import OptionError
 from ephs.solve.problem import State as States
 
-__all__ = ["Links"]
-
 
 @final
 class Links:

@@ -12,8 +12,6 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
 
-__all__ = ["Loading"]
-
 
 @final
 class Loading:

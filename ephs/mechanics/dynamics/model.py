@@ -31,8 +31,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.methods.registry import Method
 
-__all__ = ["Dynamics"]
-
 
 @final
 class Dynamics:

@@ -13,8 +13,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import OptionError
 
-__all__ = ["ByJoint", "Placing"]
-
 ByJoint: TypeAlias = Mapping[str, ArrayLike] | ArrayLike
 """Numbers of joints by name, or (n,) of all of the tree in the order of its freedoms."""
 

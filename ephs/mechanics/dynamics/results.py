@@ -8,8 +8,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Storage
 from ephs.solve.model import Model
 
-__all__ = ["Constraints", "Derivatives", "Energies", "VelocityDerivatives"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

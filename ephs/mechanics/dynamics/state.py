@@ -10,8 +10,6 @@ import numpy as np
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundle import Array
 
-__all__ = ["State"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,8 +24,6 @@ from ephs.solve.problem import Problem, Signal
 if TYPE_CHECKING:
     from ephs.mechanics.methods.registry import Method
 
-__all__ = ["Steps"]
-
 RTOL, ATOL = 1e-10, 1e-12
 """Tolerances of the equations of one implicit step: near rounding; its error depends on its length."""
 EXPLICIT = ("rk54", "rk87")

@@ -15,8 +15,6 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT
 
-__all__ = ["impulses"]
-
 SWEEPS = 200
 """Sweeps by Gauss and Seidel between two trials of Newton's method."""
 TRIALS = 20

@@ -17,8 +17,6 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.semantics.bundle import Array
 from ephs.solve.sparse import Index
 
-__all__ = ["Blow", "Unlawful", "islands_of", "shared", "struck"]
-
 TIED = 1e-12
 """Least coupling of two contacts, relative to the largest mobility."""
 GAINED = 1e-11

@@ -7,8 +7,6 @@ from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT
 
-__all__ = ["answer"]
-
 
 def answer(equations: Equations, state: ReducedState, rows: Array) -> Array:
     """(n, k) changes of the tree's rates by unit impulses along rows (k, n)."""

@@ -19,8 +19,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.solve.sparse import Index
 
-__all__ = ["Pressing", "forces_at", "pressing_at"]
-
 CLOSED = 1e-7
 """Gap in the mechanism's length, and speed in its own, below which a contact is closed."""
 INSTANT = 1e-6

@@ -27,8 +27,6 @@ from ephs.solve.snapshot import Snapshot
 from ephs.solve.sparse import Index
 from ephs.solve.stepping import Attempt, Leg, Span
 
-__all__ = ["Impacts"]
-
 CLOSED = 1e-9
 """Gap, in the mechanism's length, below which a contact is closed."""
 LOCATED = 1e-3

@@ -19,8 +19,6 @@ from ephs.semantics.spaces import SE3, se3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.sparse import Index
 
-__all__ = ["Touching"]
-
 POSES: Final[Any] = se3
 """Formulas of poses, for arrays of many."""
 

@@ -16,8 +16,6 @@ from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.scene import freedoms_of
 from ephs.semantics.bundle import Array
 
-__all__ = ["StaticPath", "follow"]
-
 REAL = 1e-9
 """Largest imaginary part of a real eigenvalue, relative to its size."""
 SAME = 1e-12

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.dynamics import Dynamics, State
 
-__all__ = ["Equilibrium", "equilibrium"]
-
 STALLED = 1e-9
 """Allowed unbalanced fraction of the forces where iterations stagnate."""
 UNFELT = 1e-9

@@ -12,8 +12,6 @@ from ephs.solve.errors import OptionError
 if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace
 
-__all__ = ["save"]
-
 _AXES = {
     "A": ("state", "state_rate"), "B": ("state", "input"), "C": ("output", "state"), "D": ("output", "input"),
     "J": ("state", "state_rate"), "R": ("state", "state_rate"), "Q": ("state", "state_rate"),

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace
     from ephs.solve.result.solution import Solution
 
-__all__ = ["film"]
-
 
 def film(
     system: "StateSpace", mode: Mode | int, amplitude: float, periods: float, frames: int, decay: bool

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.dynamics import State
     from ephs.mechanics.linear.equilibrium import Equilibrium
 
-__all__ = ["linearize"]
-
 
 @in_one_thread
 def linearize(

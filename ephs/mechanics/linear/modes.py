@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["Complex", "Mode", "modes_of"]
-
 SHOWN = 1e-6
 """Least displayed component of a mode, relative to the largest."""
 

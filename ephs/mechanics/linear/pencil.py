@@ -25,8 +25,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["Parts", "Pencil", "system_problem"]
-
 SETTLED, LEAST = 1e-12, 1e-6
 """Relative step at which Newton's method ends, with this least scale of unknowns."""
 ROUNDING = 1e-13

@@ -31,8 +31,6 @@ from ephs.solve.result.solution import Solution
 from ephs.solve.sparse import Index
 from ephs.solve.stepping import Row
 
-__all__ = ["Freedoms", "freedoms_of", "linear_scene", "unbalanced"]
-
 BALANCED = 1e-7
 """Largest unbalanced fraction of the applied forces at an equilibrium."""
 ROUNDED = 1e-9

@@ -14,8 +14,6 @@ from ephs.semantics.bundle import Array
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
-__all__ = ["StateSpace"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

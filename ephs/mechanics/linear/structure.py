@@ -7,8 +7,6 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["Law", "PortHamiltonian", "Sizes", "laws_of"]
-
 ROUNDING = 1e-12
 """Relative tolerance of a power balance: rounding of products of matrices."""
 

@@ -32,8 +32,6 @@ from ephs.solve.stepping import Row
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["linear_system"]
-
 RESTS = 1e-12
 """Rates of states, in their units, that count as rounding."""
 NEGATIVE = 1e-9

@@ -23,8 +23,6 @@ from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt
 
-__all__ = ["Alpha"]
-
 CONSTANT = 1e-6
 """Tolerance of the equations of a constant step, relative to its change: well below the error of order 2."""
 ITERATIONS = 20

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ephs.mechanics.methods.gauss import Gauss
     from ephs.mechanics.methods.radau import Implicit
 
-__all__ = ["Auto"]
-
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
 SLOW = 0.5

@@ -21,8 +21,6 @@ from ephs.solve.march import STEPS
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
-__all__ = ["Explicit", "Tableau", "tableau"]
-
 Solve = Callable[..., Array]
 """Solver of the stages of a step, with the arguments of `Equations.stages`."""
 

@@ -22,8 +22,6 @@ from ephs.solve.methods.collocation import moments
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
-__all__ = ["ORDERS", "Gauss", "gauss"]
-
 ORDERS = {"gauss4": 4, "gauss6": 6, "gauss8": 8}
 ROUNDING = 1e-14
 """Tolerances to which stages are solved at constant steps."""

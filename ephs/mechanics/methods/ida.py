@@ -20,8 +20,6 @@ from ephs.solve.control import Control
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.stepping import Attempt
 
-__all__ = ["Ida"]
-
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-15
 """Least tolerances for IDA, which fails with smaller ones because of rounding."""
 LOG = "SUNLOGGER_ERROR_FILENAME"

@@ -18,8 +18,6 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.stage import Program
 from ephs.solve.snapshot import Snapshot, like, parts
 
-__all__ = ["Jacobian"]
-
 RELATIVE = 2e-8
 """Relative length of the differences by which inputs that are Python functions of the state are differentiated."""
 

@@ -20,8 +20,6 @@ from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Counts, Span
 
-__all__ = ["March", "Rival"]
-
 ROWS = 1024
 """Capacity of the buffer of rows."""
 WINDOW, LATEST = 10, 30

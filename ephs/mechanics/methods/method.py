@@ -12,8 +12,6 @@ from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Row, Span
 
-__all__ = ["ReducedMethod"]
-
 HALVINGS = 4
 """Number of halvings of a failing part of a step whose whole succeeded."""
 

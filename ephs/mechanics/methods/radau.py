@@ -21,8 +21,6 @@ from ephs.solve.methods.radau import COEFFICIENTS, NODES
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
-__all__ = ["Implicit"]
-
 _S6 = 6.0**0.5
 _EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
 ARRAYS: Final[Mapping[str, Any]] = {

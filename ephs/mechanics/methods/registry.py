@@ -16,8 +16,6 @@ from ephs.solve.model import Model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Stepper
 
-__all__ = ["METHODS", "Method", "Setting", "on_joints", "register_method"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,8 +20,6 @@ from ephs.solve.march.newton import ITERATIONS
 from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Kept", "Stages"]
-
 SOLVED = 1e-13
 """Attainable relative accuracy of a step's equations: rounding, times a condition of some hundreds."""
 REAL = 1e-12

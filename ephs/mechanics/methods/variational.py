@@ -27,8 +27,6 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt
 
-__all__ = ["Variational"]
-
 EXACT = 4e-16
 """Smallest attainable residual, relative to its terms: two roundings."""
 ITERATIONS = 40

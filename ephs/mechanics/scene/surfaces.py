@@ -9,8 +9,6 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.semantics.bundle import Array
 
-__all__ = ["Contact", "Surface"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,8 +27,6 @@ from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.semantics.spaces import SE3
 
-__all__ = ["Laws", "overlaps", "resolve_contacts", "resolve_surfaces", "with_stops"]
-
 Laws = Mapping[str, ContactLawEntry]
 STIFF = 1e4
 """Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a

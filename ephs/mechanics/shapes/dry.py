@@ -7,8 +7,6 @@ import numpy as np
 
 from ephs.semantics.errors import StructureError
 
-__all__ = ["Dry"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -16,30 +16,6 @@ from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.support import Support
 
-__all__ = [
-    "CENTRE",
-    "CROSSING",
-    "HEIGHT",
-    "PARALLEL",
-    "PLACE",
-    "UPRIGHT",
-    "Gap",
-    "Vector",
-    "apart",
-    "clamped",
-    "cross",
-    "dot",
-    "edges",
-    "into",
-    "plane_rim",
-    "plane_sphere",
-    "ramp",
-    "rounded_box_sphere",
-    "segments",
-    "sphere_rounded_box",
-    "times",
-]
-
 UPRIGHT: Final = 1e-3
 """Inclination in rad below which a circle counts as flat: its gap is smaller by this part of the radius at the most."""
 PARALLEL: Final = 1e-6

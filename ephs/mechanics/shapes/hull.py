@@ -9,8 +9,6 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["Face", "Hull", "around", "hull_of", "inside_of"]
-
 FLAT: Final = 1e-5
 """Relative tolerance within which triangles are one face: that of files in single precision."""
 MEETING: Final = 1e-7

@@ -8,9 +8,6 @@ import numpy as np
 from ephs.mechanics.shapes.gap import Gap
 from ephs.semantics.errors import StructureError
 
-__all__ = ["Halt", "Impact", "Meeting"]
-
-
 STUCK = 1e-9
 """Slip velocity in m/s of contacts that stick, to rounding."""
 

@@ -10,8 +10,6 @@ from ephs.mechanics.shapes.gap import ramp
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.errors import StructureError
 
-__all__ = ["Law"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import SE3
 
-__all__ = ["PAIRS", "SIZES", "Touch", "touches"]
-
 Touch = tuple[Array, Array, Gap]
 """Frames (7,) on the first and on the second surface's body, and the gap between them."""
 Shape = Mapping[str, Any]

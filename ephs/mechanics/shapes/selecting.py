@@ -6,8 +6,6 @@ from typing import Any
 from ephs.mechanics.shapes.gap import Vector
 from ephs.semantics.special import choose
 
-__all__ = ["chosen", "least", "most", "moved"]
-
 
 def moved(start: Vector, far: Any, way: Vector) -> Vector:
     """A point moved so far along a direction."""

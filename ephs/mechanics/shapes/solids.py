@@ -31,8 +31,6 @@ from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import choose
 
-__all__ = ["Body", "Feature", "cylinder", "faces", "meeting", "point", "polyhedron", "rim", "segment", "side"]
-
 STEPS: Final = 4
 """Steps along a segment to the point nearest to a rim: a projection, then Newton's."""
 TURNS: Final = 6

@@ -13,8 +13,6 @@ from ephs.solve.errors import OptionError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-__all__ = ["MEMBER", "Axes"]
-
 MEMBER = "member"
 """The single dimension of individually listed members."""
 

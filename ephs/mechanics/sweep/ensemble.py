@@ -33,7 +33,6 @@ from ephs.solve.march import Ending
 from ephs.solve.sparse import Index
 from ephs.solve.stepping import Span
 
-__all__ = ["Ensemble"]
 BURST = 100_000
 """Largest number of compiled steps of a member; longer ones are run individually, with progress."""
 TOGETHER, MEMORY = 256, 2**22

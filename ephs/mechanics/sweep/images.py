@@ -28,8 +28,6 @@ from ephs.semantics.errors import SemanticsError
 from ephs.solve.errors import SolveError
 from ephs.solve.sparse import Index
 
-__all__ = ["FAULTS", "STARTS", "Images", "Made", "Truths", "Unlike"]
-
 Truths = NDArray[np.bool_]
 
 AGREE = 1e-12

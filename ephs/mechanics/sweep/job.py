@@ -24,8 +24,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.semantics.system import System
 
-__all__ = ["DONE", "Batch", "Job"]
-
 DONE = "done"
 """The status of a member that ran to the end."""
 ALIKE = 3

@@ -17,8 +17,6 @@ from ephs.semantics.stage.repeating import Repeated
 from ephs.solve.march import Account, Control, Ending
 from ephs.solve.sparse import Index
 
-__all__ = ["Energies", "Marches", "Stack"]
-
 Stack = tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]
 """An array of bound calls, and one of its shape for every member, in rows."""
 OWN = ("q", "y", "carry", "rows_t", "rows_q", "rows_y")

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from ephs.semantics.system import System
     from ephs.solve.result.solution import Solution
 
-__all__ = ["JOINT", "TOTALS", "Output", "known_outputs", "outputs_of", "unknown_output"]
-
 TOTALS = {
     "heat": "J", "work": "J", "kinetic": "J", "potential": "J", "energy": "J", "exergy": "J", "entropy": "J/K",
     "entropy_production": "J/K", "energy_error": "1", "constraint_error": "m, rad",

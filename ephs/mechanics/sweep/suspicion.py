@@ -12,8 +12,6 @@ from ephs.solve.auditing.audit import MOTION, Bounds
 from ephs.solve.auditing.growth import apart
 from ephs.solve.problem import Problem
 
-__all__ = ["INSTANTS", "LONGER", "resolved", "suspicious"]
-
 LONGER = 4
 """Length of comparison steps in constant steps."""
 INSTANTS = 5

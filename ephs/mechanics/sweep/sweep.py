@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from ephs.semantics.system import System
 
-__all__ = ["NOT_RUN", "SweepInterrupted", "sweep"]
-
 NOT_RUN = "not run"
 """Status of members not run because of an interruption."""
 INSTANTS = 100

@@ -17,8 +17,6 @@ from ephs.operad.rewriting.elements import Elements, Place, State
 from ephs.operad.rewriting.gluing import require_gluing, require_morphism
 from ephs.operad.rewriting.rules import Rule, rule_from
 
-__all__ = ["SCHEMA_FILE", "Derivation", "apply"]
-
 FORMAT = 1
 SCHEMA_FILE = FilePath(__file__).with_name("derivation.schema.json")
 _READ = Reader("derivation")

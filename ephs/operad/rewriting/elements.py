@@ -14,8 +14,6 @@ from ephs.operad.normal import NormalForm, PowerJunction, StateClass, powered
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Quantity
 
-__all__ = ["Elements", "State"]
-
 Place = tuple[Path, Path]
 """A box and the name of one of its ports."""
 

@@ -8,8 +8,6 @@ from ephs.operad.names import Path
 from ephs.operad.rewriting.elements import Elements
 from ephs.operad.rewriting.rules import Rule
 
-__all__ = ["require_gluing", "require_morphism"]
-
 
 def require_morphism(rule: Rule, match: Renaming, host: Elements) -> None:
     """Raise an error unless the map embeds the left side in the pattern.

@@ -14,8 +14,6 @@ from ephs.operad.rewriting.elements import Elements
 from ephs.operad.rewriting.gluing import require_gluing
 from ephs.operad.rewriting.rules import Rule
 
-__all__ = ["matches"]
-
 
 def matches(rule: Rule, pattern: Pattern, *, injective: bool = True) -> Iterator[Renaming]:
     """All places at which a rule can be applied; see `Rule.matches`."""

@@ -15,8 +15,6 @@ from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Quantity
 from ephs.operad.rewriting.rules import Fragment, Rule
 
-__all__ = ["replay"]
-
 Item = tuple[str, Any, Any]
 """Owner of a state: a junction, an outer state port, a state port of a box."""
 

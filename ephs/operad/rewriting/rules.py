@@ -19,8 +19,6 @@ from ephs.operad.wellformed import read_boxes, read_junctions, read_links, requi
 if TYPE_CHECKING:
     from ephs.operad.rewriting.derivation import Derivation
 
-__all__ = ["Fragment", "Rule", "rule_from"]
-
 
 @final
 @dataclass(frozen=True, slots=True, init=False)

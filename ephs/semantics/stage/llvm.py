@@ -7,8 +7,6 @@ from typing import Any, Final, final
 
 from ephs.semantics.stage.errors import StageError
 
-__all__ = ["LEVEL", "Library", "Target", "compile_text", "host", "load", "version"]
-
 LEVEL: Final = 2
 
 

@@ -10,8 +10,6 @@ from ephs.semantics.stage.llvm import LEVEL, Library, Target, compile_text, host
 from ephs.semantics.stage.shipping import shipped
 from ephs.semantics.stage.store import STORE
 
-__all__ = ["FITTING", "TARGETS", "compiled", "emitted", "fitting", "name_of", "telling"]
-
 TARGETS: Final = {
     "linux-x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", ""),
     "linux-x86-64-v3": Target("x86_64-unknown-linux-gnu", "x86-64-v3", ""),

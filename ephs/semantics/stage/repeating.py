@@ -15,8 +15,6 @@ from ephs.semantics.stage.programs import Program
 from ephs.semantics.stage.reaching import Signature
 from ephs.semantics.stage.records import Record, Table, function, integer
 
-__all__ = ["Repeated"]
-
 
 class _Asking(Record):
     """A function on a block of arguments that returns an integer."""

@@ -9,8 +9,6 @@ Integration*, IV.4). The defect says how accurate the motion is, which a correct
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Real, Record, integer, real
 
-__all__ = ["BEYOND", "MOST", "ROUNDING", "WORTH", "Account", "rounding", "stretch", "worth"]
-
 ROUNDING = 16.0 * 2.220446049250313e-16
 """Fraction of the terms of energy, work and heat below which their defect is rounding and not corrected."""
 BEYOND = 1e300

@@ -8,8 +8,6 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 
-__all__ = ["combine", "evaluate", "iterate", "place"]
-
 ENOUGH = 1e-2
 """Change of a sweep, relative to the allowed error of a step, at which stages have converged."""
 ROUGH = 0.1

@@ -7,8 +7,6 @@ from ephs.semantics.stage import Evaluator, Integer, Real, Truth
 from ephs.solve.control import SLIVER, UNFELT
 from ephs.solve.march.records import Control
 
-__all__ = ["HELD", "PATIENCE", "held_back", "judge", "length"]
-
 PATIENCE = 15
 """Steps without solution, one after the other, before a stiff method is called for."""
 HELD = 40

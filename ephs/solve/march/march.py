@@ -14,8 +14,6 @@ from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
 from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
 from ephs.solve.march.stiff import Stiff
 
-__all__ = ["march"]
-
 GOING = -1
 """No ending yet."""
 ROUNDING = 16.0 * 2.220446049250313e-16

@@ -5,8 +5,6 @@ from typing import Any, Final, final
 
 from ephs.semantics.stage import Matrix, Vector, matrix, vector
 
-__all__ = ["ERRORS", "MEMORY", "TOTALS", "Errors", "Memory", "Totals"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

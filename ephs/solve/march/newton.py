@@ -13,8 +13,6 @@ from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 from ephs.solve.march.stiff import Solver, Stiff, whole
 
-__all__ = ["ITERATIONS", "filtered", "newton"]
-
 ITERATIONS = 10
 """Iterations after which a step is given up."""
 FAST = 0.3

@@ -4,8 +4,6 @@ from typing import Any, final
 
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["Noted"]
-
 
 @final
 class Noted:

@@ -22,16 +22,6 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.march.account import Account
 
-__all__ = [
-    "TABLEAU",
-    "Control",
-    "Ending",
-    "Field",
-    "Motion",
-    "Status",
-    "Tableau",
-]
-
 
 class Ending(IntEnum):
     """Outcome of a march.

@@ -29,8 +29,6 @@ from ephs.solve.march.newton import newton
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 from ephs.solve.march.stiff import Stiff
 
-__all__ = ["DRIFT", "STEPS", "allow", "attempt", "book", "drift", "error_of", "first", "measure", "stiffness_of"]
-
 DRIFT = 1e-2
 """Share of a step's drift off the constraints that counts as its error.
 

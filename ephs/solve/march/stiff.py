@@ -27,8 +27,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["STIFF", "Newton", "Solver", "Stiff", "whole"]
-
 
 class Newton(Record):
     """State of the iteration.

@@ -16,8 +16,6 @@ from typing import final
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
 from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account
 
-__all__ = ["Missing", "Moved", "store"]
-
 ROUNDS = 8
 """Iterations."""
 FARTHEST = 0.5

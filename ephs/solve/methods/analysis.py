@@ -19,8 +19,6 @@ from ephs.solve.methods.records import STORING, Order, OrderOf
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.sparse import Index, order
 
-__all__ = ["Analysis", "analyse", "dependent_rows", "entangled", "exchanged"]
-
 SHRUNK = 1e-6
 DEFECT = 1e-11
 """Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""

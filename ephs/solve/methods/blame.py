@@ -10,8 +10,6 @@ from ephs.solve.methods.scales import NOTHING
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.sparse import Index
 
-__all__ = ["Blame"]
-
 
 @final
 class Blame:

@@ -4,8 +4,6 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["moments", "values"]
-
 
 def moments(nodes: Array, theta: float) -> Array:
     """(stages,) weights of the stages' values for the integral from 0 to theta of the polynomial through them."""

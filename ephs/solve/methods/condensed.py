@@ -20,8 +20,6 @@ from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import Evaluation, Model
 from ephs.solve.sparse import equilibrate
 
-__all__ = ["condensed", "solved_by_parts"]
-
 SOUND = 1e-6
 """A pivot is used if it is at least this part of its row's largest entry, in every copy."""
 DENSE = 400

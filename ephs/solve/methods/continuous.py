@@ -18,8 +18,6 @@ from ephs.solve.methods.records import STORING
 from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import Evaluation, Model
 
-__all__ = ["Continuous", "Instant", "Matrices"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,8 +8,6 @@ from ephs.solve.methods.places import add_to, raise_to
 from ephs.solve.methods.records import STORING, Columns, Dims, row_of
 from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
 
-__all__ = ["bend", "correct_joints", "correct_storages", "rest"]
-
 _A: Final[list[list[float]]] = SCHEME.tolist()
 _B: Final[list[float]] = WEIGHTS.tolist()
 _NONE: Final = 1e-280

@@ -13,8 +13,6 @@ from ephs.solve.model import Model, evaluate_at
 from ephs.solve.problem import NO_STATE, Problem, State
 from ephs.solve.snapshot import Snapshot
 
-__all__ = ["ComponentMethod", "advance_driven", "advance_whole", "started"]
-
 ROUNDED_INPUTS = 1e-13
 """Part of inputs that read the state by which they may change once more: rounding, times a condition of hundreds."""
 ROUNDS = 12

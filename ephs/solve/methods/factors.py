@@ -8,8 +8,6 @@ from scipy.linalg import get_lapack_funcs
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
 
-__all__ = ["factors"]
-
 
 def factors(matrix: Any, equation: str = "") -> tuple[Array, Any]:
     """(LU, pivots) of a real or complex square matrix, for `scipy.linalg.lu_solve`.

@@ -50,8 +50,6 @@ from ephs.solve.methods.scheme import (
 )
 from ephs.solve.methods.stages import linearise
 
-__all__ = ["advance", "gauss_program"]
-
 MOST: Final = 60
 """Iterations of Newton's method."""
 PATIENCE: Final = 25

@@ -51,8 +51,6 @@ from ephs.solve.methods.residuals import FAULTS, called
 from ephs.solve.model import Model
 from ephs.solve.sparse import Index
 
-__all__ = ["Integral", "integral_program"]
-
 
 def _product(on: Evaluator, start: Integers, column: Integers, value: Vector, i: Integer, x: Vector) -> Real:
     """Row i of a sparse matrix times x."""

@@ -21,16 +21,6 @@ from ephs.solve.model import Model
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index
 
-__all__ = [
-    "Chunk",
-    "Decided",
-    "Loop",
-    "Natural",
-    "NaturalState",
-    "has_choice",
-    "of_status",
-]
-
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""
 _OUTCOMES = {DIVERGED: Outcome.DIVERGED, PIVOT: Outcome.SINGULAR, INCONSISTENT: Outcome.CONTRADICTION}

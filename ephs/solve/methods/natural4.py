@@ -58,8 +58,6 @@ from ephs.solve.model import Model, evaluate_at
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index, order
 
-__all__ = ["Natural4"]
-
 INSTANT = 1e-7
 """The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
 AS_BEFORE, AT_START, WITHIN = 0, 1, 2

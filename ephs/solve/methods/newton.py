@@ -45,22 +45,6 @@ from ephs.solve.methods.records import (
 from ephs.solve.methods.residuals import FAULTS, account, balance, evaluated
 from ephs.solve.methods.scales import COMMON, FAR, measure, reach, weigh
 
-__all__ = [
-    "BEFORE",
-    "RUNNING",
-    "SOLVED",
-    "STALLED",
-    "advance",
-    "extrapolated",
-    "natural_program",
-    "pivots_of",
-    "restrain",
-    "retract",
-    "settle",
-    "somewhere",
-    "tighten",
-]
-
 RUNNING: Final = -1
 """The status of a step that is not at its end."""
 MOST: Final = 80

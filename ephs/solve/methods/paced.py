@@ -22,8 +22,6 @@ from ephs.solve.snapshot import Snapshot
 from ephs.solve.starting import check_start
 from ephs.solve.stepping import Attempt, Counts, Row, Span
 
-__all__ = ["Paced", "PacedState"]
-
 FIRST = 16
 """Steps in the first compiled call, by which the time of a step becomes known."""
 

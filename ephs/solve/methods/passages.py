@@ -12,8 +12,6 @@ from ephs.solve.heats import Heats, exponential_law
 from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.model import Model
 
-__all__ = ["Booked", "Passages"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,6 @@ from typing import final
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 from ephs.solve.methods.records import Columns, Dims, row_of
 
-__all__ = ["Part", "add_to", "copy", "fill", "raise_to"]
-
 
 def copy(on: Evaluator, source: Vector, out: Vector) -> None:
     """out = source, of one length."""

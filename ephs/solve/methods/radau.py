@@ -27,8 +27,6 @@ from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Row, Span
 
-__all__ = ["COEFFICIENTS", "DEFECT", "GAMMA", "NODES", "T_INVERSE", "VALUES", "Radau", "RadauState", "T"]
-
 PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""
 

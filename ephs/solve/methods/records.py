@@ -12,12 +12,6 @@ from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, vec
 from ephs.semantics.stage.kinds import Kind, group
 from ephs.semantics.stage.memory import Held
 
-__all__ = [
-    "COMPONENT", "DIVERGED", "DONE", "INCONSISTENT", "IRREVERSIBLE", "MEMORY", "ORDER", "PIVOT", "REVERSIBLE",
-    "STORING", "TABLES", "WORKING", "Columns", "Dims", "Elimination", "Memory", "Order", "Outer", "Scratch", "State",
-    "Tables", "flat", "kind_of", "parts_of", "row_of",
-]  # fmt: skip
-
 DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
 """Outcome of a step: COMPONENT + the value that a component's kernel returned (see `ephs.semantics.kernel_table`)."""
 

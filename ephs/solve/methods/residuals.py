@@ -9,8 +9,6 @@ from ephs.solve.methods.places import Part, add_to, copy, fill
 from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, WORKING, Columns, Dims, Outer, Scratch, row_of
 from ephs.solve.methods.scales import FAR, reach, still, weigh
 
-__all__ = ["FAULTS", "account", "balance", "called", "evaluated"]
-
 FAULTS: Final = 64
 """A fault is a component's number times this, and a status; 0 is none."""
 

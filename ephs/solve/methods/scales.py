@@ -10,8 +10,6 @@ from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
 from ephs.solve.methods.places import Part, fill, raise_to
 from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
-__all__ = ["COMMON", "FAR", "SPREAD", "TAKES_PART", "measure", "reach", "still", "weigh"]
-
 NOTHING = 1e-200
 """Least scale of a balance, so that quotients by it are finite."""
 

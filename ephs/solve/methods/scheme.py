@@ -12,11 +12,6 @@ from ephs.semantics.stage.kinds import group
 from ephs.solve.methods.collocation import moments, values
 from ephs.solve.methods.records import flat
 
-__all__ = [
-    "AHEAD", "GROUPS", "NODES", "SCHEME", "STAGES", "STAGE_MEMORY", "WEIGHTS", "GroupColumns", "Groups", "GroupsOf",
-    "Node", "Place", "StageScratch", "Stages", "StagesOf", "Velocity",
-]  # fmt: skip
-
 STAGES: Final = 3
 NODES: Final = 0.5 * (1.0 + np.polynomial.legendre.leggauss(STAGES)[0])
 SCHEME: Final = np.array([moments(NODES, c) for c in NODES])

@@ -25,8 +25,6 @@ from ephs.solve.methods.records import MEMORY, STORING, TABLES, Columns, Scratch
 from ephs.solve.methods.residuals import FAULTS, called
 from ephs.solve.model import Model
 
-__all__ = ["PUT", "TOTAL", "Settling", "settling_program"]
-
 ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY = range(6)
 """Numbers of a state's account: those of `Account`; the heat in J that went to stores of heat, and its rounding."""
 

@@ -17,8 +17,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.numbering import Index
 from ephs.solve.errors import Outcome, SolveError
 
-__all__ = ["Solver", "Solvers"]
-
 DENSE = 48
 """Unknowns up to which factorising without regard to zeros is faster."""
 NARROW = 16

@@ -28,8 +28,6 @@ from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, r
 from ephs.solve.methods.residuals import evaluated
 from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
 
-__all__ = ["exponents", "linearise"]
-
 LAST = 2e-16
 """Relative change at the level of the last digit."""
 

@@ -10,8 +10,6 @@ from ephs.semantics.numbering import spans
 from ephs.solve.errors import SolveError
 from ephs.solve.model import Evaluation, Model
 
-__all__ = ["Stored", "guessed_efforts", "stored_energies"]
-
 
 @final
 class Stored:

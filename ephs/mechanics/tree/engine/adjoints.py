@@ -9,8 +9,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.gradients import Gradients, Shares
 
-__all__ = ["StepAdjoint"]
-
 
 @final
 class StepAdjoint:

@@ -11,8 +11,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.semantics.bundle import Array
 
-__all__ = ["Column", "columns_of_trees", "directions"]
-
 Column = tuple[int, Index]
 """A column, and the rows in which it may have entries."""
 

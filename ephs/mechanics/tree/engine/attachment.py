@@ -16,8 +16,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["Attachment", "attached_energy", "attachment_of", "laws_in"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

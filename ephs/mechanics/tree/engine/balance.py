@@ -27,8 +27,6 @@ from ephs.solve.march.storing import Missing
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
 
-__all__ = ["Correction", "correct", "held", "measure"]
-
 ROUNDS = 8
 """Iterations that move positions."""
 RIGID = 1e-24

@@ -31,8 +31,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["Whole", "engine_of", "whole_of"]
-
 
 def engine_of(
     reduced: "Reduced",

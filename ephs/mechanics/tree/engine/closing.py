@@ -15,8 +15,6 @@ import numpy as np
 from ephs.operad.disjoint import DisjointSets
 from ephs.solve.sparse import Index
 
-__all__ = ["Closing", "closing"]
-
 
 class Closing(NamedTuple):
     """The program of the elimination, for links 0 … n − 1 and the ground as link n."""

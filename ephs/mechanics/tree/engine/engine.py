@@ -12,8 +12,6 @@ from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.march import ERRORS, TOTALS, Account, Control
 
-__all__ = ["Engine"]
-
 
 @final
 class Engine:

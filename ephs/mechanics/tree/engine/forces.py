@@ -25,8 +25,6 @@ from ephs.semantics.spaces import se3, so3
 from ephs.semantics.spaces.vectors import Rows, apply_transposed, dot, product, scale, sub, transposed
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Variable, Vector, staged
 
-__all__ = ["act", "strain"]
-
 
 def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
     for k, x in enumerate(by):

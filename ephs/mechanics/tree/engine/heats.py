@@ -5,8 +5,6 @@ from ephs.semantics.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 from ephs.solve.heats import LITTLE, PLAIN
 
-__all__ = ["absorb", "count", "entropies", "heat_rates", "hold", "lawless", "warm"]
-
 ROUNDING = 100.0 * 2.220446049250313e-16
 """Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
 

@@ -21,8 +21,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["islands_of"]
-
 
 def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], frozenset[int]]) -> tuple[Index, Array]:
     """The island of each link, −1 where it is held, and (islands, 6, 6) bases of twists of the ground's frame.

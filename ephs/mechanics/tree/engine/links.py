@@ -18,8 +18,6 @@ from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
 
-__all__ = ["Found", "Frames", "links_of", "plane_of"]
-
 FLAT = 1e-9
 """Pitch in m, and cosine of axis and translations, of motions in a plane: rounding of axes over `ASSEMBLY`."""
 

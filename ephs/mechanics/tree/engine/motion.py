@@ -16,8 +16,6 @@ from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Tru
 from ephs.solve.march.account import BEYOND, Account, rounding
 from ephs.solve.march.records import Motion, Status
 
-__all__ = ["Mechanism"]
-
 
 def _whole(x: Matrix) -> Vector:
     return Vector(x.cells, x.start, x.rows * x.columns)

@@ -42,9 +42,6 @@ from ephs.solve.march import (
 from ephs.solve.march.account import worth
 from ephs.solve.march.steps import attempt, book
 
-__all__ = ["motion_of_loops", "motion_of_trees", "motion_program", "of_motion", "stiff_program"]
-
-
 _MOVING = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
 """Kinds of a mechanism's arguments, which all entry functions have first."""
 

@@ -38,8 +38,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["ACTIVE", "MOVING", "Residuals", "point_program", "residuals"]
-
 ACTIVE: Final = (
     "work", "place", "relative", "value", "covector", "force", "pushed", "attached", "pulled", "temperature", "entropy",
     "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",

@@ -9,8 +9,6 @@ from ephs.solve.march.records import Status
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
 
-__all__ = ["close"]
-
 ROUNDS = 20
 """Iterations that close loops."""
 

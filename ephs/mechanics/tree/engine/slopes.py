@@ -15,8 +15,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Evaluator, Integer, Program, Vector, vector
 from ephs.solve.sparse import Index
 
-__all__ = ["Call", "RateSlopes", "calls_of", "rate_slopes"]
-
 Call = tuple[tuple[Index, Index], Index, Index, Index]
 """Places of the seeds of one call, and rows, columns and directions of its derivatives."""
 

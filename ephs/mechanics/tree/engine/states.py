@@ -30,21 +30,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = [
-    "ELEMENT",
-    "ENTROPY",
-    "MOMENTUM",
-    "POSE",
-    "RELATIVE",
-    "STATES",
-    "Ends",
-    "Source",
-    "Stored",
-    "Walked",
-    "energies",
-    "rows",
-]  # fmt: skip
-
 POSE, MOMENTUM, ELEMENT, RELATIVE, ENTROPY = range(5)
 """Source of a state: a link's pose or momentum, a joint's element, a spring's relative pose, an entropy."""
 

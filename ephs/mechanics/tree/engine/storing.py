@@ -8,8 +8,6 @@ from ephs.solve.march.storing import Moved, store
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.balance import Correction
 
-__all__ = ["store_attached"]
-
 
 def store_attached(run: "Correction") -> None:
     """Move attached states along what the step changed, and what h ẋ at its end is beside that."""

@@ -10,8 +10,6 @@ from ephs.semantics.stage import Record, Table
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
 from ephs.solve.sparse import Index
 
-__all__ = ["Forces", "table_of"]
-
 
 class Forces(NamedTuple):
     """Forces besides inertia and gravity: components of joints and springs, entropies, wrenches on bodies."""

@@ -37,8 +37,6 @@ from ephs.solve.heats import PLAIN
 from ephs.solve.march import TABLEAU, Account, Control, Tableau
 from ephs.solve.march.steps import attempt
 
-__all__ = ["DIRECTIONS", "StepTangent", "evaluated", "paired_tables", "reaching", "step_program", "step_tangents"]
-
 BEYOND: Final = 1e100
 """Errors that are allowed of a step where its length is given."""
 DIRECTIONS: Final = 4

@@ -19,8 +19,6 @@ from ephs.solve.snapshot import Snapshot
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 
-__all__ = ["KEEP", "OWN", "Accounts"]
-
 OWN = 4
 """Numbers of an account before the momenta that steps keep."""
 KEEP = ("energy", "energy and momenta")

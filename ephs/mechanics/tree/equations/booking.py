@@ -20,8 +20,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 
-__all__ = ["Booking"]
-
 
 @final
 class Booking:

@@ -20,8 +20,6 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.heats import Heats
 from ephs.solve.march.records import Status
 
-__all__ = ["Dense", "unmoved"]
-
 ROUNDS = 12
 SLIP = 1e-2
 """Part of the rates by which constraints may be missed that are left out as repeating others: where they only nearly

@@ -14,8 +14,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.solve.problem import Problem
 
-__all__ = ["Given"]
-
 
 @final
 class Given:

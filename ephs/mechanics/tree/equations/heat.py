@@ -7,8 +7,6 @@ from ephs.mechanics.tree.sweeps.acting import Node
 from ephs.semantics.bundle import Array
 from ephs.solve.heats import PLAIN, Heats
 
-__all__ = ["heats_of"]
-
 
 def heats_of(reduced: Reduced, theta: float) -> Heats:
     """The storages of heat of a mechanism; flows are by its components that make entropy.

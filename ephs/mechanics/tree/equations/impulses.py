@@ -12,8 +12,6 @@ from ephs.solve.errors import Outcome, SolveError
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations
 
-__all__ = ["TWIST", "Impulses"]
-
 TWIST = slice(Place.twist.offset, Place.twist.offset + 6)
 """Position of the twist in a link's row of `places`."""
 

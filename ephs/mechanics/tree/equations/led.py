@@ -17,8 +17,6 @@ from ephs.semantics.primitives import Storage
 from ephs.solve.mobility import mobility
 from ephs.solve.problem import Problem
 
-__all__ = ["Led"]
-
 
 @final
 class Led:

@@ -17,8 +17,6 @@ from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.problem import Problem
 
-__all__ = ["PaperStates"]
-
 NEAR, OFF = 1e-6, 1e-3
 """Initial positions and momenta may differ by this from what the joints make of them, relative to their size where that
 is above 1: nodal momenta of some methods do differ, to their order."""

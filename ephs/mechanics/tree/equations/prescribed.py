@@ -9,8 +9,6 @@ from ephs.mechanics.tree.equations.state import ReducedState
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.semantics.bundle import Array
 
-__all__ = ["Prescribed"]
-
 
 @final
 class Prescribed:

@@ -8,8 +8,6 @@ from ephs.mechanics.tree.finding.layout import Layout
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 
-__all__ = ["JointStates"]
-
 
 @final
 class JointStates(Mapping[Path, Array]):

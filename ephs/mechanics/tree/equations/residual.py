@@ -17,8 +17,6 @@ from ephs.mechanics.tree.sweeps.pack import STANDARD
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
 
-__all__ = ["Residual"]
-
 ALL: Final = kinds_of((joint.code, joint.size, joint.dim) for joint in STANDARD)
 """Kinds of groups that the program of all mechanisms has."""
 

@@ -12,8 +12,6 @@ from ephs.solve.sparse import Index
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.residual import Residual
 
-__all__ = ["Slopes"]
-
 DIRECTIONS: Final = 4
 """Directions of one call: vector units take four."""
 

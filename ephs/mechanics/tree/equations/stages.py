@@ -8,8 +8,6 @@ from ephs.semantics.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march.collocation import ENOUGH, ROUGH, ROUGH_ON_GRID, STALLED, SWEEPS
 
-__all__ = ["evaluated"]
-
 
 def evaluated(
     rates: Callable[[float, Array], Array],

@@ -7,8 +7,6 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 
-__all__ = ["ReducedState"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,6 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.semantics.bundle import Array
 
-__all__ = ["Linearised"]
-
 
 @final
 class Linearised:

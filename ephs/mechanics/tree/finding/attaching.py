@@ -20,8 +20,6 @@ from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.sparse import Index
 
-__all__ = ["Attaching", "Gear", "attaching_of", "makers_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,6 @@ from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Stora
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.sparse import Index
 
-__all__ = ["network_of"]
-
 NEGLIGIBLE = 1e-12
 """Entry of a contracted relation that counts as zero, relative to the largest of the relation that it came from."""
 

@@ -19,8 +19,6 @@ from ephs.semantics.kept import once
 from ephs.semantics.primitives import Primitive
 from ephs.semantics.spaces import SE3, Pair
 
-__all__ = ["GROUND", "Frame", "Frames", "Link", "LinkJoint", "Unplaced", "frames_of", "inertia_of"]
-
 GROUND = -1
 """Number of the ground among links."""
 KINETIC = 1e-14

@@ -17,8 +17,6 @@ from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN
 from ephs.solve.sparse import Index
 
-__all__ = ["Layout"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

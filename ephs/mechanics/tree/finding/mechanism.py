@@ -28,8 +28,6 @@ from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.sparse import Index
 
-__all__ = ["Reduced", "reduce_system"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

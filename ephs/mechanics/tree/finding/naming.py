@@ -8,8 +8,6 @@ from ephs.semantics.bundle import Array
 from ephs.solve.control import Tolerance
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 
-__all__ = ["counted", "tolerances", "within"]
-
 
 def within(reduced: Reduced, q: Array, r: Array, heats: Array) -> None:
     """Hold elements, rates and heats against the range of numbers.

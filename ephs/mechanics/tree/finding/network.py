@@ -20,8 +20,6 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import StateSlot
 
-__all__ = ["Attached", "Inertia", "Injection", "Network", "Tie"]
-
 
 @final
 @dataclass(frozen=True, slots=True)

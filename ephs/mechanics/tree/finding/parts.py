@@ -21,8 +21,6 @@ from ephs.semantics.spaces import SE3, pair
 from ephs.solve.motion_law import MotionLaw, PolynomialMotion
 from ephs.solve.problem import Problem
 
-__all__ = ["Acting", "Parts", "parts_of"]
-
 FREE = pair("free")
 OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")
 """Energies of a free joint that may lead to a body; with others it is a force between two frames."""

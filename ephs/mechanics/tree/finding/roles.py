@@ -12,8 +12,6 @@ from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Stora
 from ephs.semantics.pullback import pulled_ports
 from ephs.solve.heats import exponential_law
 
-__all__ = ["Role", "Roles", "offset_of", "strikes"]
-
 
 class Role(Enum):
     """Part of a primitive in a mechanism."""

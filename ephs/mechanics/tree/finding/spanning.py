@@ -14,8 +14,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3, Pair
 from ephs.solve.motion_law import MotionLaw
 
-__all__ = ["Edge", "frames_of_joints", "islands", "loop_algebra", "spanning_tree", "twists_of"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

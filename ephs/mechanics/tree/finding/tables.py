@@ -5,8 +5,6 @@ from typing import NamedTuple
 from ephs.semantics.bundle import Array
 from ephs.solve.sparse import Index
 
-__all__ = ["CUT", "SPRING", "TREE", "Mechanism"]
-
 TREE, CUT, SPRING = 0, 1, 2
 """Kinds of edges."""
 

@@ -11,8 +11,6 @@ from ephs.semantics.descriptor import ComponentSlot, Descriptor, StateSlot
 from ephs.semantics.numbering import Index, starts
 from ephs.semantics.primitives import Storage
 
-__all__ = ["Wiring"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,8 +11,6 @@ from ephs.semantics.spaces.se3 import twist_inward
 from ephs.semantics.spaces.vectors import add, combine, dot
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 
-__all__ = ["Force", "accelerate_outward", "accelerations", "no_force"]
-
 Force: TypeAlias = Callable[[Integer, Joint, Link], list[Real]]
 """The forces (d,) on the rates of a link's joint: called with the link's number, its joint and its constants."""
 

@@ -28,27 +28,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = [
-    "ABOVE",
-    "APART",
-    "BEYOND",
-    "ON_BODIES",
-    "ON_CUT",
-    "ON_TREE",
-    "TABLES",
-    "WORK",
-    "Acting",
-    "Body",
-    "Component",
-    "Conduction",
-    "Node",
-    "Own",
-    "Port",
-    "Sink",
-    "Tables",
-    "Work",
-]  # fmt: skip
-
 ABOVE, BEYOND, APART = 1, 2, 3
 """End of a spring's action: above a plane z = reach of its first frame, beyond a distance from it."""
 ON_TREE, ON_CUT, ON_BODIES = range(3)

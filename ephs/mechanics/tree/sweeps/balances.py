@@ -21,8 +21,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["ATTACH", "network_program", "slopes_of"]
-
 UNSOLVED: Final = 9
 """Status where efforts do not follow from the balances of flows."""
 ROUNDING: Final = 2e-15

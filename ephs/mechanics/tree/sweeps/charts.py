@@ -7,8 +7,6 @@ from typing import Final, final
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.stage import Evaluator, Integer, Record, Table, Vector, integer
 
-__all__ = ["TIE", "Chart", "Kind", "advance", "of_joints", "visit_kind"]
-
 TIE: Final = 100
 """Code of a joint that a gear ties to others."""
 

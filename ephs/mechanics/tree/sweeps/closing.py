@@ -15,8 +15,6 @@ from ephs.semantics.spaces.se3 import wrench_outward
 from ephs.semantics.spaces.vectors import add, apply, combine, dot, scale, sub, symmetric
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 
-__all__ = ["Rows", "carry", "carry_load", "dependent", "eliminate", "eliminate_load", "multipliers", "push"]
-
 TARGET, MULTIPLIER, SIZE, PIVOT = range(4)
 """Columns of a row's numbers."""
 

@@ -10,8 +10,6 @@ from ephs.mechanics.tree.sweeps.records import Tree
 from ephs.semantics.spaces.vectors import add, dot, scale
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Table, Vector
 
-__all__ = ["Closures"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -31,23 +31,6 @@ from ephs.semantics.stage import (
     reals,
 )
 
-__all__ = [
-    "Cut",
-    "Place",
-    "Relative",
-    "across",
-    "between",
-    "fit",
-    "gaps",
-    "motion_of",
-    "place_of",
-    "poses",
-    "relative_rates",
-    "rows",
-    "show_place",
-    "velocities",
-]
-
 
 class Cut(Record):
     """A cut joint.

@@ -7,8 +7,6 @@ from ephs.semantics.spaces.se3 import twist_inward
 from ephs.semantics.spaces.vectors import Entries, add, apply_transposed, combine, dot, scale
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
 
-__all__ = ["energy"]
-
 
 def _length(on: Evaluator, x: Entries) -> Real:
     """The sum of the sizes of a vector's entries, which is no less than its length."""

@@ -29,8 +29,6 @@ from ephs.semantics.stage import (
     vector,
 )
 
-__all__ = ["ABOUT", "About", "Expansion"]
-
 
 class Expansion(Record):
     """A component at a point.

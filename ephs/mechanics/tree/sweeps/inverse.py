@@ -15,8 +15,6 @@ from ephs.semantics.spaces.se3 import bracket, wrench_outward
 from ephs.semantics.spaces.vectors import add, apply_transposed, combine, dot, sub
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
 
-__all__ = ["Take", "action", "armatures", "gather", "masses", "needed_forces", "row_of_covector", "weigh"]
-
 Take: TypeAlias = Callable[[Integer, Joint, Link, list[Real], list[Real]], None]
 """Called with a link's number, joint and constants, the load on it, and the force that this is on the joint's rates."""
 

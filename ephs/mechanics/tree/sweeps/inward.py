@@ -28,8 +28,6 @@ from ephs.semantics.spaces.vectors import (
 )
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
 
-__all__ = ["inward", "load_inward"]
-
 
 def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> None:
     """Eliminate the joint of link i from its articulated inertia, which its parent takes up.

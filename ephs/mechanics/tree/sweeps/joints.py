@@ -12,8 +12,6 @@ from ephs.semantics.spaces.staged_groups import about_z, included
 from ephs.semantics.spaces.vectors import Rows, add, apply, apply_transposed, dot, product, scale, transposed
 from ephs.semantics.stage import Evaluator, Real, Vector
 
-__all__ = ["force_inside", "force_outside", "frame", "rate_inside", "rate_outside"]
-
 
 def _element(on: Evaluator, joint: Joint, link: Link, q: Vector) -> tuple[Rows, list[Real]]:
     """The frame of the joint's element as it is stored, or, of abelian pairs, as it is walked."""

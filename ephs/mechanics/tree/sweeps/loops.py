@@ -24,8 +24,6 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import ArrayReals
 
-__all__ = ["ARGUMENTS", "common_loops", "kinds_of", "loop_program"]
-
 
 def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
     """The kinds among joints (code, size, dim), in order."""

@@ -19,8 +19,6 @@ from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Condition, Count, IntegerOperation, Number, Operation, Order
 from ephs.semantics.stage.reaching import Part
 
-__all__ = ["NO_INTEGERS", "Compact", "LaidOut", "Layout", "Survey", "layout_of"]
-
 Row = TypeVar("Row", bound=Record)
 
 

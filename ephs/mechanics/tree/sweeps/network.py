@@ -25,8 +25,6 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import ArrayReals
 
-__all__ = ["INTEGERS", "REALS", "Called", "Net", "Stores"]
-
 NO_REALS: Final = ArrayReals(np.zeros(0))
 
 

@@ -17,8 +17,6 @@ from ephs.semantics.spaces.vectors import (
 )
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 
-__all__ = ["momentum", "outward"]
-
 
 def momentum(link: Link, u: Entries) -> list[Real]:
     """I u of a link's own inertia and a twist."""

@@ -13,8 +13,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import codes, pair
 from ephs.semantics.stage import Table
 
-__all__ = ["SLIDE", "STANDARD", "TURN", "Class", "Packed", "Part", "packed"]
-
 TURN = Joint(codes.VECTOR, 1, ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),))
 """A joint that turns about z."""
 SLIDE = Joint(codes.VECTOR, 1, ((0.0, 0.0, 0.0, 1.0, 0.0, 0.0),))

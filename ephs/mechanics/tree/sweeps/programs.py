@@ -35,8 +35,6 @@ from ephs.semantics.stage import (
 from ephs.semantics.stage.known import known
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 
-__all__ = ["ARGUMENTS", "Sweeps", "common_sweeps", "sweeps"]
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,6 @@ from typing import Protocol, TypeVar, final
 
 from ephs.semantics.stage import Evaluator, Integer, Real, Record, integer, real, reals
 
-__all__ = ["Joint", "Link", "Links", "State", "States", "Tree"]
-
 Row = TypeVar("Row")
 
 

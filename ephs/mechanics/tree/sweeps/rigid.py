@@ -30,8 +30,6 @@ from ephs.semantics.spaces.vectors import (
 )
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Vector
 
-__all__ = ["SUMS", "rigid"]
-
 SUMS: Final = 16
 """Numbers of an island: mass, first moments, inertia about the ground's origin (upper triangle), momentum."""
 FLAT: Final = 1e-13

@@ -7,8 +7,6 @@ from ephs.semantics.spaces.se3 import twist_inward
 from ephs.semantics.spaces.vectors import add, apply, apply_transposed, combine, dot, symmetric
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 
-__all__ = ["driven_power", "spread"]
-
 
 def spread(on: Evaluator, tree: Tree, q: Vector, x: Vector) -> None:
     """The twists that rates x of the joints make, to where links keep their accelerations."""
