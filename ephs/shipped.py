@@ -22,6 +22,7 @@ SHIPPED: Final = (
     "ephs.mechanics.tree.engine.programs:motion_of_trees",
     "ephs.mechanics.tree.engine.programs:stiff_program",
     "ephs.mechanics.tree.engine.slopes:rate_slopes",
+    "ephs.mechanics.tree.engine.residuals:point_program",
     "ephs.mechanics.tree.sweeps.balances:network_program",
     "ephs.mechanics.sensitivity.implicit:tangent_program",
     "ephs.solve.methods.newton:natural_program",

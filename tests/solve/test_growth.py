@@ -69,7 +69,7 @@ def test_errors_that_grow_are_found_where_their_sum_passes(method, estimates):
         ephs.simulate(unstable(), END, method=method, step=0.06)
     ((estimate, summed),) = estimates
     assert summed < ALLOWED < estimate.size
-    short = float(caught.value.findings[0].advice.split()[4])
+    short = float(caught.value.findings[0].advice.split()[5])
     assert short < 0.06
     assert ephs.simulate(unstable(), END, method=method, step=short).audit.passed
 
