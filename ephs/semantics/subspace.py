@@ -24,8 +24,9 @@ class Subspace:
     basis
         (n, r), orthonormal columns.
     condition
-        Largest singular value over the least that counted, multiplied over the eliminations that led here: by what
-        factor the basis may carry rounding.
+        Largest singular value, or the usual one, over the least that counted, and of equations the length before they
+        were restricted to the subspace over that after; multiplied over the eliminations that led here: by what factor
+        the basis may carry rounding.
     """
 
     basis: Array
@@ -41,7 +42,7 @@ class Subspace:
             return Subspace(np.eye(n))
         _, sigma, vt = np.linalg.svd(rows, full_matrices=True)
         rank = rank_of(sigma, ELIMINATION)
-        return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank))
+        return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank, sigma[0]))
 
     @staticmethod
     def from_span(vectors: Array, usual: float = 0.0) -> "Subspace":
@@ -50,7 +51,7 @@ class Subspace:
             return Subspace(np.zeros((vectors.shape[0], 0)))
         u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
         rank = rank_of(sigma, ELIMINATION, usual)
-        return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank))
+        return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank, max(sigma[0], usual)))
 
     @property
     def ambient(self) -> int:
@@ -75,9 +76,11 @@ class Subspace:
         """The vectors of this subspace which also satisfy matrix z = 0."""
         product = matrix @ self.basis
         # a dependent row leaves rounding, which is no equation
-        left = np.linalg.norm(product, axis=1) > ELIMINATION * np.linalg.norm(matrix, axis=1)
+        lengths = np.linalg.norm(product, axis=1) / np.maximum(np.linalg.norm(matrix, axis=1), TINY)
+        left = lengths > ELIMINATION
         coefficients = Subspace.from_kernel(product[left])
-        return Subspace(self.basis @ coefficients.basis, coefficients.condition)._after(self)
+        shortened = 1.0 / lengths[left].min(initial=1.0)
+        return Subspace(self.basis @ coefficients.basis, shortened * coefficients.condition)._after(self)
 
     def image(self, matrix: Array) -> "Subspace":
         """The image under a linear map, (m, n)."""
@@ -104,5 +107,5 @@ class Subspace:
         return float(np.linalg.norm(off) / max(np.linalg.norm(vector), TINY))
 
 
-def _condition(sigma: Array, rank: int) -> float:
-    return float(sigma[0] / sigma[rank - 1]) if rank else 1.0
+def _condition(sigma: Array, rank: int, largest: float) -> float:
+    return float(largest / sigma[rank - 1]) if rank else 1.0

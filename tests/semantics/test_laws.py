@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ephs.operad import Path, Pattern, junction, quantity
-from ephs.semantics import Reference, System, library
+from ephs.semantics import Reference, System, library, structures
 from ephs.semantics.laws import SYSTEM_LAWS, isotropy, power_form, random_probe
 from ephs.semantics.natural import step
 from ephs.semantics.relations import pattern_relation
@@ -44,6 +44,19 @@ def test_also_where_there_is_no_motion(data, seed):
 @given(systems(posed=False), seeds)
 def test_also_where_states_are_stored_twice_or_by_nobody(system, seed):
     check_functoriality(system, seed=seed)
+
+
+def test_a_constraint_that_cancels_on_a_junction_is_no_equation():
+    """Constraint 0 = (0.1 + 0.2) e₁ − 0.3 e₂ of two ports on one junction: what rounding leaves holds no effort."""
+    interface = library.power_ports(p0=quantity.momentum, p1=quantity.momentum)
+    row = structures.constant_structure("row", interface, np.zeros((2, 2)), np.array([[0.1 + 0.2, -0.3]]))
+    pattern = Pattern(junctions={"j": junction(quantity.momentum, exposed=True)}, boxes={"row": {"p0": "j", "p1": "j"}})
+    system = System(pattern, {Path.of("row"): row})
+    probe = random_probe(system, 0)
+    for route in ("flat", "nested"):
+        relation = system.relation(probe.reference, route=route).at(probe.state, probe.ports)
+        assert relation.dimension == 2  # any effort at no flow, and the constant coordinate
+    check_functoriality(system)
 
 
 @patient
