@@ -1,6 +1,6 @@
-"""Robots of gymnasium that fall onto a floor, and scenes of contact: time, balance of energy and overlap, by both.
+"""Robots of gymnasium that fall onto a floor, and scenes of contact: time, balance of energy and overlap, by all.
 
-Both read the same models. Contact laws differ, so that motions are not compared digit by digit: each is held against a
+All read the same models. Contact laws differ, so that motions are not compared digit by digit: each is held against a
 refined run of its own, in the places of bodies at the end. Beside that stand processor time, the share of the energy
 that has no place in the balance, and how deep bodies sink. MuJoCo runs at the step of the file. The time of steps is
 that of the calls of compiled code, with the set-up of derivatives; all else of a run is its start.
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 import ephs
+from benchmarks import contact_drake
 from benchmarks.report import Report, table_of
 from benchmarks.touching import SCENES
 from ephs.mechanics.methods.marching import March
@@ -47,7 +48,7 @@ COLUMNS = {
 
 
 def report() -> Report:
-    """Run every model by both."""
+    """Run every model by `ephs`, by MuJoCo, and scenes of contact by Drake where it is installed."""
     found = find_spec("gymnasium")
     if found is None or not found.submodule_search_locations:
         return Report("gymnasium is not installed", [])
@@ -69,6 +70,10 @@ def report() -> Report:
 def _beside(name: str, scene: Any, mjcf: str, until: float) -> list[dict[str, Any]]:
     other = _mujoco(mjcf, until)
     rows = [{"model": name, **row, "ratio": row["seconds"] / other["seconds"]} for row in _ours(scene, until)]
+    rows += [
+        {"model": name, **row, "ratio": row["seconds"] / other["seconds"]}
+        for row in contact_drake.beside(name, mjcf, until, REPEATS)
+    ]
     return [*rows, {"model": name, **other, "ratio": 1.0}]
 
 
