@@ -115,7 +115,7 @@ def test_drawn_systems_move_and_dissipate():
     """The laws of steps would be empty words if few systems took one, or if in few of them something happened."""
     steps, motions, heats = [], [], []
 
-    @settings(patient, max_examples=30, derandomize=True, database=None)
+    @settings(patient, max_examples=100, derandomize=True, database=None)
     @given(systems(max_depth=2), seeds)
     def collect(system, seed):
         probe = random_probe(system, seed)
