@@ -43,7 +43,7 @@ def frozen(values: ArrayLike) -> Array:
 
 
 def part_of(annotation: Any, kind: type[T]) -> T | None:
-    """What an attribute's annotation says of a kind: its `Number`, its `Named`, or its meaning."""
+    """Entry of a kind in an attribute's annotation: its `Number`, its `Named`, or its meaning."""
     return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, kind)), None)
 
 

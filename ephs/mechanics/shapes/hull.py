@@ -54,7 +54,7 @@ def hull_of(points: Sequence[Sequence[float]]) -> Hull:
 
 
 def inside_of(points: Sequence[Sequence[float]], share: float) -> tuple[Hull, float]:
-    """What is left of a convex hull within a distance of all its faces, and this distance in m.
+    """A convex hull without a layer of some depth below its faces, and this depth in m.
 
     Parameters
     ----------

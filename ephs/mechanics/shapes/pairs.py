@@ -160,7 +160,7 @@ class _Rounded:
 
     @property
     def body(self) -> Body:
-        """What points meet."""
+        """The body that points meet."""
         return polyhedron(self.core, self.frame, self.radius)
 
     def edges(self) -> Iterator[tuple[Array, float]]:

@@ -189,7 +189,7 @@ def rim(size: float, radius: float) -> Feature:
     """
 
     def across(way: Vector, axis: Vector) -> Vector:
-        """What a vector has in the circle's plane."""
+        """Part of a vector in the plane of the circle."""
         return moved(way, -dot(way, axis), axis)
 
     def softly(way: Vector) -> tuple[Vector, Any]:
