@@ -172,7 +172,7 @@ class Explicit(ReducedMethod):
     ) -> Leg[ReducedState] | None:
         """Many steps in one compiled call, if no step needs Python.
 
-        Where stability, whose limit is h·|λ| = ``limit``, holds its steps back, or after ``most``
-        steps, it calls left(t, h, reason) and ends.
+        The leg calls left(t, h, reason) and ends after ``most`` steps, or when stability limits the steps: h·|λ| is
+        ``limit`` then.
         """
         return March(self, self.method.arrays, span, limit, left, most=most) if self.equations.constant else None

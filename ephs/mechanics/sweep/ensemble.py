@@ -149,7 +149,7 @@ class Ensemble:
 
 @final
 class _Runs:
-    """What one thread has bound."""
+    """Calls and memory of one thread."""
 
     def __init__(self, ensemble: Ensemble) -> None:
         self._ensemble, self._made, most = ensemble, ensemble.images.anew(), ensemble.together

@@ -1,9 +1,9 @@
 """Members of one scene that differ in numbers only: one set of compiled tables, with other numbers for each.
 
-What a member's tables and start hold is its *image*: all their numbers in one row. Where the numbers that one path
-changes are none that another one does, the image of a member is put together from images along each path; where they
-follow a path's value in a straight line, or as its inverse does, three images say all others. Both are checked on
-members built in full; where they do not hold, every member is.
+The *image* of a member is one row with all numbers of its tables and its start. If no two paths change the same number,
+images along each path are combined into the image of a member. If numbers are linear in the value of a path or in its
+inverse, they are interpolated from three images. Both are checked on members built in full; if a check fails, every
+member is built in full.
 """
 
 import threading

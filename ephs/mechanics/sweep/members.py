@@ -1,6 +1,6 @@
 """Marches of many members in one call of compiled code, and the energies at some of their instants.
 
-Whatever depends on the structure is bound once a thread. A member is a row in stacks of arrays: its start, what its
+Calls and arrays of the structure are bound once a thread. A member is a row in stacks of arrays: its start, what its
 march keeps, and those tables whose numbers differ from member to member.
 """
 
@@ -20,7 +20,7 @@ from ephs.solve.sparse import Index
 Stack = tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]
 """An array of bound calls, and one of its shape for every member, in rows."""
 OWN = ("q", "y", "carry", "rows_t", "rows_q", "rows_y")
-"""What each member has of the memory of a march; the rest is written before it is read."""
+"""Memory of a march that each member has; the rest is written before it is read."""
 
 
 @final
