@@ -25,6 +25,15 @@ ROWS = 1024
 WINDOW, LATEST = 10, 30
 """Steps of implicit legs, rejected ones included, that are weighed against those of a rival: at a new matrix, and
 after so many without one."""
+
+
+class Lagging(Protocol):
+    """What semi-implicit steps need, see `ephs.mechanics.methods.semi.Semi`."""
+
+    onsager: dict[int, int]
+    memory: dict[str, Any]
+
+
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
 
@@ -98,6 +107,8 @@ class March:
         Of implicit steps.
     most
         Explicit steps after which ``left`` is called, too.
+    lagged
+        Memory of semi-implicit steps.
 
     Attributes
     ----------
@@ -117,6 +128,7 @@ class March:
         kept: Kept | None = None,
         rival: Rival | None = None,
         most: int | None = None,
+        lagged: Lagging | None = None,
     ) -> None:
         eq, start = method.equations, method.equations.accounts.opened(span.state)
         self.own, eq.accounts.kept = eq.accounts.own, True
@@ -144,9 +156,14 @@ class March:
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
-        a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
+        a.alone = int(not (kept is None and lagged is None) and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
-        self.march = eq.engine.bind("march", *given, 0) if kept is None else eq.engine.implicit(*given, kept.memory, 0)
+        if lagged is not None:
+            self.march = eq.engine.lagged(lagged.onsager, *given, lagged.memory, 0)
+        elif kept is not None:
+            self.march = eq.engine.implicit(*given, kept.memory, 0)
+        else:
+            self.march = eq.engine.bind("march", *given, 0)
         c, policy, control = self.control, span.policy, span.control
         c.end, c.span, c.origin = span.until - span.t0, abs(span.until - span.t0), span.t0
         c.step, c.least_step, c.most_step = span.h, control.least, control.most

@@ -4,8 +4,8 @@ They have the arguments of `ephs.semantics.kernel_table`. The Jacobian comes fro
 that know their partial derivatives.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Final, TypeAlias, final
 
@@ -243,31 +243,62 @@ class Irreversible:
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
         """Write flows and, unless bare, their derivatives by efforts and increments."""
         n, partials = len(self.reference), Duals(on, 0 if bare else sum(self.dimensions[:3]))
-        p, x, e, _ = _given(partials, self, a)
+        there = self._at(partials, a)
+        if len(self.hot) == n:
+            flows = [conducted(there.rows[i * n : i * n + n], there.energy, i) for i in range(n)]
+        else:
+            theta = partials.dual(a.scal[1])
+            flows = [dot(there.rows[i * n : i * n + n], there.efforts) / theta for i in range(n)]
+        good = _written(partials, self, a, there.through.outward(flows))
+        return on.select(there.cold, TEMPERATURE, on.select(on.both(good, there.inside), OK, DOMAIN))
+
+    def onsager(self, on: Evaluator, a: Arguments) -> Integer:
+        """Write M/θ₀ (n, n), seen through the maps, in place of derivatives."""
+        n, outside, plain = len(self.reference), self.dimensions[0], Duals(on, 0)
+        there, theta = self._at(plain, a), plain.dual(a.scal[1])
+        good = there.inside
+        for j in range(outside):
+            unit = there.through.inward([plain.dual(float(i == j)) for i in range(outside)])
+            flows = [dot(there.rows[i * n : i * n + n], unit) / theta for i in range(n)]
+            for i, entry in enumerate(there.through.outward(flows)):
+                a.jac[i * outside + j] = value = plain.dual(entry).value
+                good = on.both(good, on.absolute(value) <= HUGE)
+        return on.select(there.cold, TEMPERATURE, on.select(good, OK, DOMAIN))
+
+    def _at(self, on: Duals, a: Arguments) -> "_Point":
+        """M at the middle of the step."""
+        p, x, e, _ = _given(on, self, a)
         through = _Through(self.maps, p[self._own :])
         e = through.inward(e)
         energy: list[Real] = []
         cold: Truth = False
         for i, (hot, wide) in enumerate(self.reference):
-            shift: Real = partials.dual(hot * a.scal[1] + wide * a.scal[2])
+            shift: Real = on.dual(hot * a.scal[1] + wide * a.scal[2])
             if i in self.potentials:
                 shift = shift + p[self.potentials.index(i)]
             energy.append(e[i] + shift)
             if i in self.hot:
-                cold = on.either(cold, partials.dual(energy[i]).value <= 0.0)
+                cold = on.either(cold, on.dual(energy[i]).value <= 0.0)
         inputs = [energy[i] if effort else x[i] for effort, i in self.takes]
-        rows = evaluate(partials, self.matrix, inputs, p[len(self.potentials) : self._own])
-        if len(self.hot) == n:
-            flows = [conducted(rows[i * n : i * n + n], energy, i) for i in range(n)]
-        else:
-            theta = partials.dual(a.scal[1])
-            flows = [dot(rows[i * n : i * n + n], e) / theta for i in range(n)]
-        values = through.outward(flows)
-        good = on.both(
-            _written(partials, self, a, values), _inside(on, self.domain, [partials.dual(each).value for each in x])
+        rows = evaluate(on, self.matrix, inputs, p[len(self.potentials) : self._own])
+        inside = on.both(
+            _inside(on.base, self.domain, [on.dual(each).value for each in x]),
+            _inside(on.base, self.between, [on.dual(each).value for each in energy]),
         )
-        good = on.both(good, _inside(on, self.between, [partials.dual(each).value for each in energy]))
-        return on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN))
+        return _Point(e, energy, rows, through, cold, inside)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Point:
+    """M of an irreversible element at a point: efforts, energy efforts, rows, and what the point says."""
+
+    efforts: list[Real]
+    energy: list[Real]
+    rows: list[Real]
+    through: "_Through"
+    cold: Truth
+    inside: Truth
 
 
 Relation: TypeAlias = Storage | Reversible | Irreversible | Holonomic | Closing
@@ -347,35 +378,54 @@ def sizes(relation: Relation) -> dict[str, int]:
 @cache
 def program(relation: Relation) -> Program:
     """The program of a relation; its entry `value` has the signature of `ephs.semantics.kernel_table`."""
-    return _program(relation)
+    return _program(relation, _with_derivatives, name="element")
 
 
 @cache
 def bare(relation: Relation) -> Program:
     """The same without the derivatives that a relation writes, which its tangents do not need."""
-    return _program(relation, bare=True)
+    return _program(relation, _bare, name="bare")
 
 
 @cache
 def at_rest(relation: Relation) -> Program:
     """The bare relation over a step of zero length: increments are zero, whatever the arguments."""
-    return _program(relation, bare=True, rest=True)
+    return _program(relation, _bare, name="resting", rest=True)
 
 
-def _program(relation: Relation, *, bare: bool = False, rest: bool = False) -> Program:
+@cache
+def onsager(relation: Irreversible) -> Program:
+    """The program that writes M/θ₀ (n, n) of an irreversible element at rest in place of derivatives."""
+
+    def write(_: Relation, on: Evaluator, a: Arguments) -> Integer:
+        return relation.onsager(on, a)
+
+    return _program(relation, write, name="onsager", rest=True)
+
+
+def _program(
+    relation: Relation, write: Callable[[Relation, Evaluator, Arguments], Integer], *, name: str, rest: bool = False
+) -> Program:
     size = sizes(relation)
 
     def value(on: Evaluator, dims: Any, scal: Any, p: Any, x0: Any, v: Any, e: Any, lam: Any, f: Any, c: Any,
               jac: Any, work: Any) -> Integer:  # fmt: skip
         if rest:
             v = Vector(Held([0.0] * size["v"]), 0, size["v"])
-        if bare and isinstance(relation, Holonomic | Closing):  # writes to memory that is never read are eliminated
-            jac = on.scratch(size["jac"])
-        return relation.stage(on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work), bare=bare)
+        return write(relation, on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work))
 
     kinds = {name: pointer("reals", count) for name, count in size.items()}
-    name = "resting" if rest else "bare" if bare else "element"
     return Program(name, value=Entry(value, dims=pointer("integers", 4), **kinds))
+
+
+def _with_derivatives(relation: Relation, on: Evaluator, a: Arguments) -> Integer:
+    return relation.stage(on, a, bare=False)
+
+
+def _bare(relation: Relation, on: Evaluator, a: Arguments) -> Integer:
+    if isinstance(relation, Holonomic | Closing):  # writes to memory that is never read are eliminated
+        a = replace(a, jac=on.scratch(sizes(relation)["jac"]))
+    return relation.stage(on, a, bare=True)
 
 
 def entry_of(relation: Relation | Linear, *, derivatives: bool = True, rest: bool = False) -> tuple[Program, str]:

@@ -8,6 +8,7 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 from ephs.solve.march.account import Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
+from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
 from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
@@ -22,11 +23,11 @@ ROUNDING = 16.0 * 2.220446049250313e-16
 
 def march(
     on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, account: Account, steps: Integer,
-    stiff: Stiff | None = None,
+    stiff: Stiff | None = None, lagged: Lagged | None = None,
 ) -> Integer:  # fmt: skip
     """Take steps from the state in (memory.q, memory.y) until the end, or ``steps`` of them.
 
-    With memory for that, steps are implicit, their stages by Newton's method.
+    With memory for that, steps are implicit, their stages by Newton's method, or semi-implicit.
 
     Instants in memory.times are kept where control.saved is not negative, else every step is.
 
@@ -35,7 +36,7 @@ def march(
     Integer
         An `Ending`.
     """
-    run = _Run(on, motion, tableau, memory, control, account, stiff, on.counter(GOING), on.counter(0), on.counter(0))
+    run = _Run(on, motion, tableau, memory, control, account, stiff, lagged, on.counter(GOING), on.counter(0), on.counter(0))
     tries = on.counter(0)
 
     def one() -> Truth:
@@ -65,6 +66,7 @@ class _Run:
     control: Control
     account: Account
     stiff: Stiff | None
+    lagged: Lagged | None
     ending: Variable[Integer]
     status: Variable[Integer]
     accepted: Variable[Integer]
@@ -107,7 +109,8 @@ class _Run:
     def _begin(self) -> None:
         """Evaluate the rates at the state."""
         on = self.on
-        self.status.value = first(on, self.motion, self.memory, self.control)
+        if self.lagged is None:
+            self.status.value = first(on, self.motion, self.memory, self.control)
 
         def open_account() -> None:
             self.status.value = self.motion.open(on, self.account, self.memory.q, self.memory.y)
@@ -136,12 +139,14 @@ class _Run:
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         self.accepted.value = 0
         self.status.value = attempt(
-            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1, self.stiff
+            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1, self.stiff,
+            self.lagged,
         )
 
         def look() -> None:
             allow(on, motion, m.errors, m.y, m.y1)
-            c.stiff = stiffness_of(on, motion, self.tableau, m, h)
+            if self.lagged is None:
+                c.stiff = stiffness_of(on, motion, self.tableau, m, h)
 
         on.when(self.sound, look)
         totals = Totals(m.y, m.y1, m.carry, m.carry1, m.change, m.size, m.whole, m.low)
@@ -183,7 +188,7 @@ class _Run:
         """Project the end of a step, or of a part of one, to a state that obeys the laws; return its error."""
         on, motion, m, c, y = self.on, self.motion, self.memory, self.control, totals.end
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
-        damped = None if self.stiff is None else q
+        damped = None if self.stiff is None and self.lagged is None else q
 
         def keep_books() -> None:
             self.status.value = book(on, motion, self.tableau, k, h, totals, self.account.anchor, part, damped)
@@ -271,7 +276,8 @@ class _Run:
             copy(on, m.k.row(0), m.k2.row(0))
             part = self.sign * (wanted - c.time)
             self.status.value = attempt(
-                on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff
+                on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff,
+                self.lagged,
             )
 
             # Near a change of rank a part may be wrong and the whole right: closing removes transverse components.

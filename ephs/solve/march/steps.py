@@ -24,6 +24,7 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
+from ephs.solve.march.lagged import Lagged, lag
 from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
 from ephs.solve.march.records import Control, Motion, Status, Tableau
@@ -59,10 +60,12 @@ def attempt(
     y: Vector,
     q: Vector,
     stiff: Stiff | None = None,
+    lagged: Lagged | None = None,
 ) -> Integer:
     """Evaluate the stages of a step of length h from (base, start), k[0] known; by iteration where they need it.
 
-    Without errors for iterations to end at, the method is an explicit one; with memory for that, it is Newton's.
+    Without errors for iterations to end at, the method is an explicit one; with memory for that, it is Newton's, or
+    semi-implicit, whose stages need no k[0] and leave q.
     The step's end goes to y and q, the rates there to the last row of k, y at the last stage to ``last``.
 
     Returns
@@ -70,6 +73,8 @@ def attempt(
     Integer
         A status.
     """
+    if lagged is not None:
+        return lag(on, motion, tableau, control, base, start, h, k, lagged, y, q)
     count = tableau.a.columns
     stage, status = on.counter(1), on.counter(0)
 

@@ -6,10 +6,11 @@ from typing import Any, cast, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.closing import Closing
-from ephs.mechanics.tree.engine.programs import motion_program, stiff_program
+from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, stiff_program
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
+from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.march import ERRORS, TOTALS, Account, Control
 
 
@@ -80,6 +81,18 @@ class Engine:
     def implicit(self, *arguments: Any) -> Bound:
         """Return implicit steps, bound to this tree and to further arguments."""
         return stiff_program().compiled()["march"].bind(*arguments, first=self._first)
+
+    def lagged(self, onsager: Mapping[int, int], *arguments: Any) -> Bound:
+        """Return semi-implicit steps, bound to this tree and to further arguments.
+
+        ``onsager``: addresses of the programs of M/θ₀ of the components of friction, by their numbers.
+        """
+        rows = self.tables["component"]
+        component = Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
+        for number, address in onsager.items():
+            component[number].onsager = address
+        march = lagged_program().compiled()["march"]
+        return march.bind(*arguments, first=march.first({**self.tables, "component": component}, self.work))
 
     def array(self, name: str) -> Array:
         """Return an array of the memory."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 from ephs.mechanics.tree.sweeps.acting import (
     ABOVE,
@@ -25,6 +25,9 @@ from ephs.semantics.spaces import se3, so3
 from ephs.semantics.spaces.vectors import Rows, apply_transposed, dot, product, scale, sub, transposed
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Variable, Vector, staged
 
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.engine.drags import Drags
+
 
 def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
     for k, x in enumerate(by):
@@ -34,7 +37,7 @@ def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
 @staged
 def act(
     on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, s_rate: Vector, made: Vector, totals: Vector,
-    kept: About | None, read: About | None,
+    kept: About | None, read: About | None, drags: "Drags | None" = None,
 ) -> Integer:  # fmt: skip
     """Write forces on joints and wrenches on links, rates of entropies, entropies made and powers; return a status.
 
@@ -46,13 +49,18 @@ def act(
         Receives what was evaluated; None: it is not kept.
     read
         Is read instead: nothing is evaluated but what was, to first order.
+    drags
+        Receives resistances in place of friction, which then does not act.
     """
-    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read)
+    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read, drags)
     totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
-    on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: acting.if_near(tables.acting[i], acting.edge)))
+    on.loop(
+        tables.acting.size,
+        lambda i: acting.unless_refused(lambda: acting.if_near(tables.acting[i], lambda edge: acting.edge(edge, i))),
+    )
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
 
@@ -92,15 +100,19 @@ class _Acting:
     status: Variable[Integer]
     kept: About | None
     read: About | None
+    drags: "Drags | None" = None
 
     def unless_refused(self, following: Callable[[], None]) -> None:
         """Go on where no component has refused."""
         self.on.when(self.on.same(self.status.value, 0), following)
 
-    def _evaluate(self, number: Integer, *, stored: bool = False, moving: Integer = 0) -> None:
+    def _evaluate(
+        self, number: Integer, *, stored: bool = False, moving: Integer = 0, onsager: bool = False
+    ) -> None:
         """Call a component at the states in the memory, without increments: efforts go to e, flows to f.
 
-        ``moving``: how many degrees of freedom the state of what is no storage may have.
+        ``moving``: how many degrees of freedom the state of what is no storage may have; with ``onsager`` M/θ₀ goes to
+        jac in place of flows.
         """
         on, tables, w, row = self.on, self.tables, self.work, self.tables.component[number]
         dims = Integers(row.integers, row.integer_start + Component.dims.offset, 4)
@@ -112,7 +124,7 @@ class _Acting:
             return
         parameters = tables.parameters.part(row.at, tables.parameters.size - row.at)
         found = on.reach(
-            row.law, dims, tables.scal, parameters, w.x, w.v, w.e, w.lam, w.f, w.c, w.jac, w.scratch
+            row.onsager if onsager else row.law, dims, tables.scal, parameters, w.x, w.v, w.e, w.lam, w.f, w.c, w.jac, w.scratch
         )  # fmt: skip
 
         def refuse() -> None:
@@ -248,8 +260,8 @@ class _Acting:
                 found = on.either(found, on.absolute(place) > half + spread + edge.margin)
         return found
 
-    def edge(self, edge: Acting) -> None:
-        """Add the forces of an edge to those on joints, or to the wrenches on links."""
+    def edge(self, edge: Acting, number: Integer) -> None:
+        """Add the forces of an edge with this number to those on joints, or to the wrenches on links."""
         on, w = self.on, self.work
         rate, pull = on.scratch(6), on.scratch(6)
         motion = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
@@ -271,7 +283,7 @@ class _Acting:
             pressed.value = on.select(on.both(edge.support > 0, w.c[0] <= 0.0), 0, 1)
 
         def friction() -> None:
-            on.when(on.both(edge.friction >= 0, on.same(pressed.value, 1)), lambda: self._friction(edge, rate, pull))
+            on.when(on.both(edge.friction >= 0, on.same(pressed.value, 1)), lambda: self._friction(edge, number, rate, pull))
 
         on.when(edge.spring >= 0, spring)
         self.unless_refused(friction)
@@ -357,11 +369,14 @@ class _Acting:
 
         self.on.loop(edge.dim, one)
 
-    def _friction(self, edge: Acting, rate: Vector, pull: Vector) -> None:
+    def _friction(self, edge: Acting, number: Integer, rate: Vector, pull: Vector) -> None:
         w, d, heat = self.work, edge.dim, edge.heat
         copy(self.on, rate.part(0, d), w.e.part(0, d))
         w.e[d] = w.temperature[heat]
-        self._evaluate(edge.friction, moving=d)
+        self._evaluate(edge.friction, moving=d, onsager=self.drags is not None)
+        if self.drags is not None:
+            self.drags.note(self.on, self.tables, w, edge, number)
+            return
 
         def one(j: Integer) -> None:
             pull[j] = pull[j] - w.f[j]

@@ -1,7 +1,7 @@
 """A mechanism's equations of motion: accelerations, rates of all that a step advances, loops closed after it."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 from ephs.mechanics.tree.engine.balance import correct, held, measure
 from ephs.mechanics.tree.engine.forces import act
@@ -15,6 +15,9 @@ from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
 from ephs.solve.march.account import BEYOND, Account, rounding
 from ephs.solve.march.records import Motion, Status
+
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.engine.drags import Drags
 
 
 def _whole(x: Matrix) -> Vector:
@@ -129,9 +132,13 @@ class Mechanism(Motion):
         return self.work.alter
 
     def accelerate(
-        self, on: Evaluator, q: Vector, r: Vector, rate: Vector, s_rate: Vector, made: Vector, totals: Vector
-    ) -> Integer:
-        """Write ṙ, ṡ, what each component makes, and the powers of friction and of what drives; return a status."""
+        self, on: Evaluator, q: Vector, r: Vector, rate: Vector, s_rate: Vector, made: Vector, totals: Vector,
+        drags: "Drags | None" = None,
+    ) -> Integer:  # fmt: skip
+        """Write ṙ, ṡ, what each component makes, and the powers of friction and of what drives; return a status.
+
+        With ``drags`` there is no friction: its resistances go there.
+        """
         w, own, status = self.work, self.tables.own[0], on.counter(0)
 
         def fall() -> None:
@@ -143,7 +150,7 @@ class Mechanism(Motion):
             clear(on, w.force)
 
             def forced() -> None:
-                status.value = act(on, self.tables, w, q, r, s_rate, made, totals, None, None)
+                status.value = act(on, self.tables, w, q, r, s_rate, made, totals, None, None, drags)
 
             def inward() -> None:
                 status.value = self.fold(on, q, w.force, w.pushed)
@@ -177,7 +184,9 @@ class Mechanism(Motion):
 
     # ---- what a march asks for ---------------------------------------------------------------------------------------
 
-    def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
+    def rates(
+        self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector, drags: "Drags | None" = None
+    ) -> tuple[Integer, Integer]:
         e, w, nv, n, ns = self.tables, self.work, self.increments, self.freedoms, self.tables.node.size
         at, status = nv + n + ns, on.counter(0)
         clear(on, out.part(at, out.size - at))
@@ -187,15 +196,18 @@ class Mechanism(Motion):
         status.value = entropies(on, e, w, y.part(nv + n, ns))
 
         def accelerate() -> None:
-            status.value = self.accelerate(on, q, r, out.part(nv, n), s_rate, made, out.part(at, 2))
-
-        def finish() -> None:
-            heat_rates(on, e, w, s_rate, made)
-            self.velocities(on, y, r, out)
+            status.value = self.accelerate(on, q, r, out.part(nv, n), s_rate, made, out.part(at, 2), drags)
 
         on.when(on.same(status.value, 0), accelerate)
-        on.when(on.same(status.value, 0), finish)
+        if drags is None:
+            on.when(on.same(status.value, 0), lambda: self.flow(on, y, r, out))
         return status.value, w.fault[0]
+
+    def flow(self, on: Evaluator, y: Vector, r: Vector, out: Vector) -> None:
+        """Write v̇ of the rates r, and turn rates of entropies into those of energies, where y has been evaluated."""
+        at, ns = self.summed, self.tables.node.size
+        heat_rates(on, self.tables, self.work, out.part(at, ns), out.part(at + (ns + 2), out.size - (at + ns + 2)))
+        self.velocities(on, y, r, out)
 
     def advance(self, on: Evaluator, base: Vector, v: Vector, q: Vector) -> None:
         """Write base·exp(v), joint by joint, to q."""

@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 from ephs.mechanics.tree.engine.balance import held, measure
+from ephs.mechanics.tree.engine.drags import DRAGS, Drags
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
@@ -162,6 +163,25 @@ def stiff_program() -> Program:
         march=of_motion(
             marched, looped=False, tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY),
             control=table(Control), account=table(Account), stiff=group(Stiff, **STIFF), steps=integer(),
+        ),
+    )  # fmt: skip
+
+
+@cache
+def lagged_program() -> Program:
+    """Return the program of semi-implicit steps of trees, many in one call."""
+
+    def marched(
+        on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
+        account: Table[Account], drags: Drags, steps: Integer,
+    ) -> Integer:  # fmt: skip
+        return march(on, motion, tableau, memory, control[0], account[0], steps, lagged=drags)
+
+    return Program(
+        "lagged_steps_of_trees",
+        march=of_motion(
+            marched, looped=False, tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY),
+            control=table(Control), account=table(Account), drags=group(Drags, **DRAGS), steps=integer(),
         ),
     )  # fmt: skip
 

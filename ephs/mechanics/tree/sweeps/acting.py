@@ -75,6 +75,7 @@ class Own(Record):
     unfold = _sweep("unfold")
     resolve = _sweep("resolve")
     spread = _sweep("spread")
+    axes = _sweep("axes")
     power = _sweep("power")
     dependent = _sweep("dependent")
     energy = _sweep("energy")
@@ -104,12 +105,15 @@ class Component(Record):
         Where its parameters start.
     made
         Place of the entropy that it makes, −1: none.
+    onsager
+        Of friction, M/θ₀ in place of the relation, where steps ask for that.
     """
 
     law = function(SIGNATURE)
     dims = integers(4)
     at = integer()
     made = integer()
+    onsager = function(SIGNATURE)
 
 
 class Acting(Record):

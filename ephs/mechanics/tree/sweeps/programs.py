@@ -17,7 +17,7 @@ from ephs.mechanics.tree.sweeps.outward import outward
 from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Class
 from ephs.mechanics.tree.sweeps.records import Link, State, States, Tree
 from ephs.mechanics.tree.sweeps.rigid import SUMS, rigid
-from ephs.mechanics.tree.sweeps.spreading import driven_power, spread
+from ephs.mechanics.tree.sweeps.spreading import axes, driven_power, spread
 from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.stage import (
     Entry,
@@ -78,6 +78,7 @@ ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
     "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
     "spread": {**MECHANISM, "q": vector(), "x": vector(), "change": matrix(6)},
+    "axes": {**MECHANISM, "q": vector(), "columns": matrix(6)},
     "power": {**MECHANISM, **ROWS, "q": vector(), "r": vector(), "force": vector(), "out": vector()},
     "dependent": {**ROWS, "largest": vector()},
     "energy": {**MECHANISM, "q": vector(), "r": vector(), "momenta": matrix(6), "spin": vector(), "out": vector(3)},
@@ -274,8 +275,8 @@ class Sweeps:
             return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
 
         functions: dict[str, Callable[..., Any]] = {
-            "move": move, "fold": fold, "unfold": outwards, "resolve": resolve, "spread": spread_out, "power": power,
-            "dependent": dependent,
+            "move": move, "fold": fold, "unfold": outwards, "resolve": resolve, "spread": spread_out, "axes": axes,
+            "power": power, "dependent": dependent,
         }  # fmt: skip
         entries = {name: self.entry(function, ARGUMENTS[name]) for name, function in functions.items()}
         return entries | self._kept()

@@ -3,9 +3,9 @@
 from ephs.mechanics.tree.sweeps.closing import MULTIPLIER, Rows
 from ephs.mechanics.tree.sweeps.joints import rate_inside
 from ephs.mechanics.tree.sweeps.records import Joint, Link, State, Tree
-from ephs.semantics.spaces.se3 import twist_inward
+from ephs.semantics.spaces.se3 import twist_inward, twist_outward
 from ephs.semantics.spaces.vectors import add, apply, apply_transposed, combine, dot, symmetric
-from ephs.semantics.stage import Evaluator, Integer, Real, Vector
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
 
 
 def spread(on: Evaluator, tree: Tree, q: Vector, x: Vector) -> None:
@@ -17,6 +17,23 @@ def spread(on: Evaluator, tree: Tree, q: Vector, x: Vector) -> None:
             change = twist_inward(state.rotation, state.place, tree.states[link.parent].change)
             rate = rate_inside(on, joint, link, q, [x[link.r_at + j] for j in range(joint.dim)])
             state.change = add(change, combine(joint.basis, rate)) if joint.dim else change
+
+        tree.visit(on, i, through)
+
+    tree.each(on, one)
+
+
+def axes(on: Evaluator, tree: Tree, q: Vector, columns: Matrix) -> None:
+    """The twists (n, 6) about the ground's origin and along its axes that units of the joints' rates make."""
+
+    def one(i: Integer) -> None:
+        def through(joint: Joint, link: Link) -> None:
+            state = tree.states[i]
+            for j in range(joint.dim):
+                rate = rate_inside(on, joint, link, q, [float(j == k) for k in range(joint.dim)])
+                twist = twist_outward(state.turn, state.at, combine(joint.basis, rate))
+                for k, x in enumerate(twist):
+                    columns[link.r_at + j, k] = x
 
         tree.visit(on, i, through)
 

@@ -1,0 +1,89 @@
+"""Semi-implicit steps of trees: losses are taken implicitly, with resistances of explicit stages; all else explicitly.
+
+SSP3(4,3,3) of Pareschi and Russo, J. Sci. Comput. 25 (2005) 129-155, of order 3: its explicit part preserves strong
+stability, its implicit one is L-stable. No weight is negative, so that no step loses entropy, whatever its length.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final, final
+
+import numpy as np
+
+from ephs.mechanics.methods.marching import March
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.tree.engine.drags import frictions, memory_of
+from ephs.mechanics.tree.engine.links import links_of
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.semantics.bundle import Array
+from ephs.semantics.derive.relations import Irreversible, onsager
+from ephs.solve.control import Control
+from ephs.solve.stepping import Attempt, Leg, Span
+
+ALPHA: Final = (9.0 - 57.0**0.5) / 6.0
+"""Diagonal of the implicit coefficients, which makes them L-stable."""
+_LAST = 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0
+ARRAYS: Final[Mapping[str, Any]] = {
+    # After a first stage without weight that is never evaluated; the first two have the state of the step's start.
+    "a": np.array([
+        [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.25, 0.25, 0.0], [0.0, 0.0, *_LAST],
+    ]),
+    "guess": np.zeros((0, 5)),
+    "error": np.array([0.0, 0.0, _LAST[0] - 0.5, _LAST[1] - 0.5, _LAST[2], 0.0]),
+    "coarse": np.zeros(6),
+    "eighth": np.zeros(1, dtype=np.int64),
+}  # fmt: skip
+"""The explicit coefficients as `ephs.solve.march.Tableau`; the estimate is by weights of order 2, (0, ½, ½, 0)."""
+SCHEME: Final = np.array([
+    [0.0, 0.0, 0.0, 0.0, 0.0],
+    [0.0, ALPHA, 0.0, 0.0, 0.0],
+    [0.0, -ALPHA, ALPHA, 0.0, 0.0],
+    [0.0, 0.0, 1.0 - ALPHA, ALPHA, 0.0],
+    [0.0, 0.25 * ALPHA, 0.25 - 0.5 * ALPHA, 0.25 - 0.75 * ALPHA, ALPHA],
+])  # fmt: skip
+"""The implicit coefficients."""
+AGAIN: Final = np.array([0, 0, 1, 0, 0])
+"""1 where a stage has the explicit state of the one before."""
+
+
+@final
+class Semi(ReducedMethod):
+    """The method on one tree.
+
+    Attributes
+    ----------
+    onsager
+        Addresses of the programs of M/θ₀ of the components of friction, by their numbers.
+    memory
+        Of the stages, by the names of `ephs.mechanics.tree.engine.drags.Drags`.
+    """
+
+    name = "semi"
+    exponent = 3.0
+
+    def __init__(self, equations: Equations, control: Control) -> None:
+        super().__init__(equations, control)
+        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
+        engine = equations.engine
+        relations = {number: _relation(equations, number) for number in frictions(engine.tables)}
+        self.onsager = {
+            number: onsager(relation).compiled()["value"].address
+            for number, relation in relations.items()
+            if relation is not None
+        }
+        memory = memory_of(engine.tables, links_of(equations.reduced).parts, engine.sizes[1])
+        self.memory: dict[str, Any] = memory | {"scheme": SCHEME, "again": AGAIN}
+
+    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
+        """One step of h seconds."""
+        raise NotImplementedError
+
+    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
+        """Many steps in one compiled call."""
+        return March(self, ARRAYS, span, lagged=self)
+
+
+def _relation(equations: Equations, number: int) -> Irreversible | None:
+    kernel = equations.problem.descriptor.components[number].primitive.kernel
+    found = None if kernel is None else kernel.relation
+    return found if isinstance(found, Irreversible) else None

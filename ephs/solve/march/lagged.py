@@ -1,0 +1,91 @@
+"""Semi-implicit stages: losses act on the rates at a stage's end, with resistances of an explicit stage beside it.
+
+ẏ = H(y, y) is taken as H(Y, Z) with two stage values: Y is explicit and says what acts, Z is implicit and is what the
+resistances act on. H is linear in Z, so that a stage needs one linear system, and no derivatives. Boscarino, Filbet and
+Russo, J. Sci. Comput. 68 (2016) 975-1001.
+"""
+
+from abc import ABC, abstractmethod
+
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
+from ephs.solve.march.collocation import combine
+from ephs.solve.march.records import Control, Motion, Tableau
+
+
+class Lagged(ABC):
+    """What semi-implicit stages of a motion need besides it. Subclasses are frozen dataclasses.
+
+    Attributes
+    ----------
+    scheme
+        (stages, stages): coefficients of Z, lower triangular.
+    again
+        (stages,): 1 where Y is that of the stage before.
+    seen
+        Memory of what `observe` writes.
+    reached
+        (degrees of freedom,): the known part of Z.
+    """
+
+    __slots__ = ()
+    scheme: Matrix
+    again: Integers
+    seen: Vector
+    reached: Vector
+
+    @abstractmethod
+    def observe(
+        self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector
+    ) -> tuple[Integer, Integer]:
+        """Evaluate Y without losses, whose resistances are kept; return a status and the component that it is of."""
+
+    @abstractmethod
+    def resist(self, on: Evaluator, motion: Motion, y: Vector, weight: Real, fresh: Truth, out: Vector) -> Integer:
+        """Complete ẏ, where rates are those reached and ``weight`` times their own; return a status.
+
+        ``fresh``: whether Y is that of the stage before.
+        """
+
+
+@staged
+def lag(
+    on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
+    lagged: Lagged, y: Vector, q: Vector,
+) -> Integer:  # fmt: skip
+    """Evaluate the stages after the first, and write the step's end to y; return a status."""
+    count, nv, n = tableau.a.columns, motion.increments, motion.freedoms
+    stage, status = on.counter(1), on.counter(0)
+
+    def observe() -> None:
+        combine(on, tableau.a.row(stage.value), stage.value, h, k, start, y)
+        control.evaluations = control.evaluations + 1
+        status.value, control.component = lagged.observe(on, motion, base, y, q)
+
+    def one() -> Truth:
+        i = stage.value
+        known = on.same(lagged.again[i], 1)
+        on.when(known, lambda: None, observe)
+
+        def resist() -> None:
+            copy(on, lagged.seen, k.row(i))
+            copy(on, start.part(nv, n), lagged.reached)
+
+            def add(j: Integer) -> None:
+                weight = h * lagged.scheme[i, j]
+
+                def entry(m: Integer) -> None:
+                    lagged.reached[m] = lagged.reached[m] + weight * k[j, nv + m]
+
+                on.loop(n, entry)
+
+            on.loop(i, add, start=1)
+            status.value = lagged.resist(on, motion, y, h * lagged.scheme[i, i], known, k.row(i))
+
+        on.when(on.same(status.value, 0), resist)
+        stage.value = i + 1
+        return on.either(on.negate(on.same(status.value, 0)), stage.value >= count)
+
+    on.repeat(one)
+    combine(on, tableau.a.row(count), count, h, k, start, y)
+    return status.value
