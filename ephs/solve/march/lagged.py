@@ -53,7 +53,7 @@ def lag(
     on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
     lagged: Lagged, y: Vector, q: Vector,
 ) -> Integer:  # fmt: skip
-    """Evaluate the stages after the first, and write the step's end to y; return a status."""
+    """Evaluate the stages after the first, and write the step's end to y and q; return a status."""
     count, nv, n = tableau.a.columns, motion.increments, motion.freedoms
     stage, status = on.counter(1), on.counter(0)
 
@@ -88,4 +88,9 @@ def lag(
 
     on.repeat(one)
     combine(on, tableau.a.row(count), count, h, k, start, y)
+
+    def settle() -> None:
+        status.value = motion.settle(on, base, y, q)
+
+    on.when(on.same(status.value, 0), settle)
     return status.value

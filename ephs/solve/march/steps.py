@@ -65,7 +65,7 @@ def attempt(
     """Evaluate the stages of a step of length h from (base, start), k[0] known; by iteration where they need it.
 
     Without errors for iterations to end at, the method is an explicit one; with memory for that, it is Newton's, or
-    semi-implicit, whose stages need no k[0] and leave q.
+    semi-implicit, whose stages need no k[0].
     The step's end goes to y and q, the rates there to the last row of k, y at the last stage to ``last``.
 
     Returns
