@@ -1,5 +1,7 @@
 """Automatic choice of the method: one without damping until stability limits the steps, then radau.
 
+Where surfaces may touch and tolerances are coarse, steps are semi-implicit: losses alone limit explicit ones there.
+
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
 Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less.
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any, final
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.marching import Rival
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.semi import Semi, serves
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
@@ -32,6 +35,8 @@ TRIAL = 400
 """Explicit steps between surfaces that may touch, after which radau is tried: a stop at slip 0 hides its stiffness."""
 LOOSE = 1e-2
 """Tolerances above this are for radau where surfaces may touch: explicit steps may gain more than is mended."""
+COARSE = 3e-4
+"""Tolerances above this are for semi-implicit steps where surfaces may touch, where these serve."""
 DIGITS = 1e-5
 """Tolerances below this are for order 8."""
 
@@ -58,17 +63,32 @@ class Auto(ReducedMethod):
         self._begun: Implicit | None = None
         self._held = self._free = self._failures = 0
         self._trial: int | None = None
+        self._semi: Semi | None = None
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
         if name == "rk54" and _touches(equations):
-            if control.rtol.value > LOOSE:
-                self._go_implicit()
-                self.name = self.counts["chosen"] = "radau"
-            else:
-                self._trial = TRIAL
+            if control.rtol.value > COARSE and serves(equations):
+                self._semi = Semi(equations, control)
+                self.name = self.counts["chosen"] = self._semi.name
+                self.exponent, self.share = self._semi.exponent, self._semi.share
+            elif equations.n <= FREEDOMS:
+                self._begin()
+
+    def _begin(self) -> None:
+        """Begin as tolerances ask for, where surfaces may touch."""
+        self.exponent, self.share = self._explicit.exponent, self._explicit.share
+        self.name, self._trial = self._explicit.name, TRIAL
+        if self.control.rtol.value > LOOSE:
+            self._trial = None
+            self._go_implicit()
+            self.name = "radau"
+        self.counts["chosen"] = self.name
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
+        if self._semi is not None:  # which steps in compiled code alone
+            self._semi = None
+            self._begin()
         if self._implicit is not None:
             return self._implicit.step(state, h)
         try:
@@ -92,6 +112,11 @@ class Auto(ReducedMethod):
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
+        if self._semi is not None and span.until >= span.t0:
+            return self._semi.many(span)
+        if self._semi is not None:  # losses gain energy backward in time, which implicit steps do not see
+            self._semi = None
+            self._begin()
         if self._implicit is not None:
             if self._trial is None or not isinstance(self._explicit, Explicit):
                 return self._implicit.many(span)
@@ -130,10 +155,14 @@ class Auto(ReducedMethod):
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
             "nearness": [self._held, self._free, self._failures, self._trial],
             "name": self.name,
+            "semi": self._semi is not None,
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
+        if self._semi is not None and not own["semi"]:
+            self._semi = None
+            self._begin()
         self._explicit.take(own["explicit"], state)
         if own["implicit"] is not None:
             self._go_implicit().restore(own["implicit"], state)
@@ -144,4 +173,4 @@ class Auto(ReducedMethod):
 def _touches(equations: Equations) -> bool:
     """Whether surfaces of a tree may touch, and implicit steps are taken many in one compiled call."""
     compiled = equations.constant and not (equations.engine.looped or equations.reduced.attaching.network.attached)
-    return compiled and equations.n <= FREEDOMS and bool(equations.reduced.tables.support.any())
+    return compiled and bool(equations.reduced.tables.support.any())

@@ -14,6 +14,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.engine.drags import frictions, memory_of
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.bundle import Array
 from ephs.semantics.derive.relations import Irreversible, onsager
 from ephs.solve.control import Control
@@ -64,18 +65,13 @@ class Semi(ReducedMethod):
     def __init__(self, equations: Equations, control: Control) -> None:
         super().__init__(equations, control)
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
-        engine = equations.engine
-        relations = {number: _relation(equations, number) for number in frictions(engine.tables)}
-        self.onsager = {
-            number: onsager(relation).compiled()["value"].address
-            for number, relation in relations.items()
-            if relation is not None
-        }
+        engine, found = equations.engine, _relations(equations)
+        self.onsager = {number: onsager(one).compiled()["value"].address for number, one in found.items() if one}
         memory = memory_of(engine.tables, links_of(equations.reduced).parts, engine.sizes[1])
         self.memory: dict[str, Any] = memory | {"scheme": SCHEME, "again": AGAIN}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """One step of h seconds."""
+        """There are no single steps."""
         raise NotImplementedError
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
@@ -83,7 +79,18 @@ class Semi(ReducedMethod):
         return March(self, ARRAYS, span, lagged=self)
 
 
-def _relation(equations: Equations, number: int) -> Irreversible | None:
-    kernel = equations.problem.descriptor.components[number].primitive.kernel
-    found = None if kernel is None else kernel.relation
-    return found if isinstance(found, Irreversible) else None
+def serves(equations: Equations) -> bool:
+    """Whether the losses of a tree are known, and act by forces."""
+    return None not in _relations(equations).values() and strikes(equations.problem.descriptor.components) is None
+
+
+def _relations(equations: Equations) -> dict[int, Irreversible | None]:
+    """Relations of the components of friction, by their numbers; None where one is not in machine code."""
+    kernels = {
+        number: equations.problem.descriptor.components[number].primitive.kernel
+        for number in frictions(equations.engine.tables)
+    }
+    return {
+        number: kernel.relation if kernel is not None and isinstance(kernel.relation, Irreversible) else None
+        for number, kernel in kernels.items()
+    }
