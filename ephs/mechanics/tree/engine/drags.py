@@ -5,7 +5,7 @@ u on the rates. All twists are about one point, the place of the first link, and
 matrix is that of composite bodies, see Featherstone, *Rigid Body Dynamics Algorithms*, 2008, 6.2.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, final
 
@@ -17,7 +17,8 @@ from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.pack import Part
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.bundle import Array
-from ephs.semantics.linear.dense import backward, cholesky, clear, copy, dot, forward
+from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.linear.skyline import skyline_cholesky, skyline_solve, skyline_times
 from ephs.semantics.spaces import se3, vectors
 from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
 from ephs.semantics.stage import (
@@ -51,6 +52,8 @@ class Drags(Lagged):
         (n,): rates, those of parents first; the rate before each in its chain, −1: none; its link.
     tip
         (links,): the last rate that moves a link, −1: none.
+    reach, first
+        (n,): the least number in the chain of a rate; where its row of M and D begins.
     counts
         (2,): see `EDGES`.
     edge, pair, chain
@@ -64,8 +67,8 @@ class Drags(Lagged):
         (n, 6): twists by units of the rates; memory.
     body
         (links, 10): mass, moment and inertia of a link and what it carries.
-    mass, drag, factor
-        (n, n): M, D, and the Cholesky factor of M + w D.
+    mass, drag
+        (n, n): M, then the factor of M + w D; D: lower triangles, see `ephs.semantics.linear.skyline`.
     part, sign
         (n,): memory.
     """
@@ -78,6 +81,8 @@ class Drags(Lagged):
     above: Integers
     owner: Integers
     tip: Integers
+    reach: Integers
+    first: Integers
     counts: Integers
     edge: Integers
     pair: Integers
@@ -90,7 +95,6 @@ class Drags(Lagged):
     body: Matrix
     mass: Matrix
     drag: Matrix
-    factor: Matrix
     part: Vector
     sign: Vector
 
@@ -187,6 +191,7 @@ def _resist(
 
     def solve() -> None:
         def assemble() -> None:
+            _begin(on, drags)
             _masses(on, drags, motion)
             _losses(on, drags, motion)
             status.value = _factorise(on, drags, weight)
@@ -195,15 +200,11 @@ def _resist(
         on.when(on.same(status.value, 0), change)
 
     def change() -> None:
-        def pull(i: Integer) -> None:
-            part[i] = -dot(on, drags.drag.row(i), z)
-
         def move(i: Integer) -> None:
-            rate[i], z[i] = rate[i] + part[i], z[i] + weight * part[i]
+            rate[i], z[i] = rate[i] - part[i], z[i] - weight * part[i]
 
-        on.loop(n, pull)
-        forward(on, drags.factor, part)
-        backward(on, drags.factor, part)
+        skyline_times(on, drags.drag, drags.first, z, part)
+        skyline_solve(on, drags.mass, drags.first, part)
         on.loop(n, move)
         _heat(on, drags, motion, out)
 
@@ -213,6 +214,48 @@ def _resist(
     return status.value
 
 
+def _walk(on: Evaluator, drags: Drags, link: Integer, body: Callable[[Integer], None]) -> None:
+    """Call body(rate) for the rates that move a link, the last one first."""
+    at = on.counter(on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)]))
+
+    def step() -> Truth:
+        body(at.value)
+        at.value = drags.above[at.value]
+        return at.value < 0
+
+    on.when(at.value >= 0, lambda: on.repeat(step))
+
+
+def _begin(on: Evaluator, drags: Drags) -> None:
+    """Find where rows begin, and clear them."""
+
+    def lone(i: Integer) -> None:
+        drags.first[i] = drags.reach[i]
+
+    def join(p: Integer) -> None:
+        low, links = on.counter(drags.order.size), (drags.pair[2 * p], drags.pair[2 * p + 1])
+
+        def find(i: Integer) -> None:
+            low.value = on.select(drags.first[i] < low.value, drags.first[i], low.value)
+
+        def lower(i: Integer) -> None:
+            drags.first[i] = on.select(low.value < drags.first[i], low.value, drags.first[i])
+
+        for body in (find, lower):
+            for link in links:
+                _walk(on, drags, link, body)
+
+    def empty(i: Integer) -> None:
+        def entry(j: Integer) -> None:
+            drags.mass[i, j], drags.drag[i, j] = 0.0, 0.0
+
+        on.loop(i + 1, entry, start=drags.first[i])
+
+    on.loop(drags.order.size, lone)
+    on.loop(drags.counts[PAIRS], join)
+    on.loop(drags.order.size, empty)
+
+
 def _factorise(on: Evaluator, drags: Drags, weight: Real) -> Integer:
     """Factorise M + w D; return a status."""
 
@@ -220,10 +263,10 @@ def _factorise(on: Evaluator, drags: Drags, weight: Real) -> Integer:
         def entry(j: Integer) -> None:
             drags.mass[i, j] = drags.mass[i, j] + weight * drags.drag[i, j]
 
-        on.loop(i + 1, entry)
+        on.loop(i + 1, entry, start=drags.first[i])
 
     on.loop(drags.mass.rows, row)
-    return on.select(cholesky(on, drags.mass, drags.factor) > 0, int(Status.STILL), 0)
+    return on.select(skyline_cholesky(on, drags.mass, drags.first) > 0, int(Status.STILL), 0)
 
 
 @staged
@@ -256,17 +299,19 @@ def _masses(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
 
     def row(j: Integer) -> None:
         load = _momentum([drags.body[drags.owner[j], k] for k in range(10)], [drags.column[j, k] for k in range(6)])
-        at = on.counter(j)
-        clear(on, drags.mass.row(j))
 
-        def entry() -> Truth:
-            i = at.value
-            value = vectors.dot([drags.column[i, k] for k in range(6)], load)
-            drags.mass[j, i], drags.mass[i, j] = value, value
-            at.value = drags.above[i]
+        def entry(i: Integer) -> None:
+            low, high = on.select(i < j, i, j), on.select(i < j, j, i)
+            drags.mass[high, low] = vectors.dot([drags.column[i, k] for k in range(6)], load)
+
+        at = on.counter(j)
+
+        def step() -> Truth:
+            entry(at.value)
+            at.value = drags.above[at.value]
             return at.value < 0
 
-        on.repeat(entry)
+        on.repeat(step)
 
     def armature(i: Integer) -> None:
         def grow() -> None:
@@ -305,7 +350,7 @@ def _momentum(body: list[Real], twist: list[Real]) -> list[Real]:
 @staged
 def _losses(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
     """D of all losses."""
-    n, tables = drags.order.size, motion.tables
+    tables = motion.tables
 
     def within(c: Integer) -> None:
         edge = tables.acting[drags.edge[c]]
@@ -315,22 +360,21 @@ def _losses(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
                 a, b = edge.r_at + i, edge.r_at + j
                 drags.drag[a, b] = drags.drag[a, b] + drags.resistance[c, edge.dim * i + j]
 
-            on.loop(edge.dim, entry)
+            on.loop(i + 1, entry)
 
         on.when(on.same(edge.kind, ON_TREE), lambda: on.loop(edge.dim, row))
 
     def between(p: Integer) -> None:
-        size, sums = on.counter(0), drags.joined.row(p)
+        size, sums, links = on.counter(0), drags.joined.row(p), (drags.pair[2 * p], drags.pair[2 * p + 1])
 
-        def walk(link: Integer, sign: float) -> None:
-            at = on.counter(on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)]))
+        def clear_sign(j: Integer) -> None:
+            drags.sign[j] = 0.0
 
-            def step() -> Truth:
-                drags.sign[at.value] = drags.sign[at.value] + sign
-                at.value = drags.above[at.value]
-                return at.value < 0
+        def leave(j: Integer) -> None:
+            drags.sign[j] = drags.sign[j] - 1.0
 
-            on.when(at.value >= 0, lambda: on.repeat(step))
+        def join(j: Integer) -> None:
+            drags.sign[j] = drags.sign[j] + 1.0
 
         def gather(j: Integer) -> None:
             def take() -> None:
@@ -348,18 +392,20 @@ def _losses(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
 
             def entry(b: Integer) -> None:
                 j = drags.chain[b]
-                value = vectors.dot([drags.column[i, k] for k in range(6)], [drags.moved[j, k] for k in range(6)])
-                drags.drag[i, j] = drags.drag[i, j] + drags.sign[i] * value
+
+                def grow() -> None:
+                    value = vectors.dot([drags.column[i, k] for k in range(6)], [drags.moved[j, k] for k in range(6)])
+                    drags.drag[i, j] = drags.drag[i, j] + drags.sign[i] * value
+
+                on.when(j <= i, grow)
 
             on.loop(size.value, entry)
 
-        clear(on, drags.sign)
-        walk(drags.pair[2 * p], -1.0)
-        walk(drags.pair[2 * p + 1], 1.0)
-        on.loop(n, gather)
+        for one, other in ((clear_sign, clear_sign), (leave, join), (gather, gather)):
+            _walk(on, drags, links[0], one)
+            _walk(on, drags, links[1], other)
         on.loop(size.value, row)
 
-    on.loop(n, lambda i: clear(on, drags.drag.row(i)))
     on.loop(drags.counts[EDGES], within)
     on.loop(drags.counts[PAIRS], between)
 
@@ -421,19 +467,21 @@ def frictions(tables: Mapping[str, Any]) -> list[int]:
 def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Array]:
     """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
     n = sum(part.joint.dim for part in parts)
-    above, owner, tip, order = np.full(n, -1), np.full(n, -1), np.full(len(parts), -1), list[int]()
+    above, owner, reach = np.full((3, n), -1)
+    tip, order = np.full(len(parts), -1), list[int]()
     for i, part in enumerate(parts):
         last = int(tip[part.parent]) if part.parent >= 0 else -1
         for j in range(part.r_at, part.r_at + part.joint.dim):
             above[j], owner[j], last = last, i, j
+            reach[j] = j if above[j] < 0 else min(j, reach[above[j]])
             order.append(j)
         tip[i] = last
     losses = len(frictions(tables))
-    whole = {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "counts": np.zeros(2)}
+    whole = {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach, "first": reach, "counts": np.zeros(2)}
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses), "chain": np.zeros(n)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
-        **dict.fromkeys(("mass", "drag", "factor"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
+        **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
         "body": (len(parts), 10), "seen": (size,),
     }  # fmt: skip
     return {name: array.astype(np.int64) for name, array in whole.items()} | {
@@ -443,8 +491,8 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
 
 DRAGS: Final[dict[str, Any]] = {
     "scheme": matrix(), "again": indices(), "seen": vector(), "reached": vector(), "order": indices(),
-    "above": indices(), "owner": indices(), "tip": indices(), "counts": indices(2), "edge": indices(),
+    "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(), "counts": indices(2), "edge": indices(),
     "pair": indices(), "chain": indices(), "resistance": matrix(36), "row": matrix(36), "joined": matrix(36),
     "column": matrix(6), "moved": matrix(6), "body": matrix(10), "mass": matrix(), "drag": matrix(),
-    "factor": matrix(), "part": vector(), "sign": vector(),
+    "part": vector(), "sign": vector(),
 }  # fmt: skip
