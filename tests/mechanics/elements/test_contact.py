@@ -318,7 +318,7 @@ shape = {{ plane = {{}} }}
 SHAPES = ("sphere = 0.1", "capsule = [0.05, 0.2]", "cylinder = [0.1, 0.1]", "box = [0.2, 0.1, 0.15]")
 
 
-@pytest.mark.parametrize("method", ["rk54", "radau"])
+@pytest.mark.parametrize("method", ["rk54", "radau", "auto"])
 @given(seed=st.integers(0, 2**20), shape=st.sampled_from(SHAPES), rtol=st.sampled_from([1e-2, 1e-3]))
 @settings(max_examples=8)
 def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol, tmp_path_factory):

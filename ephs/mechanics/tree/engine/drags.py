@@ -27,6 +27,7 @@ from ephs.semantics.stage import (
     Integers,
     Matrix,
     Real,
+    Table,
     Truth,
     Vector,
     indices,
@@ -34,6 +35,7 @@ from ephs.semantics.stage import (
     staged,
     vector,
 )
+from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.records import Motion, Status
 
@@ -464,6 +466,15 @@ def frictions(tables: Mapping[str, Any]) -> list[int]:
     return [number for number in numbers if number >= 0]
 
 
+def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str, Any]:
+    """Tables with the addresses of the programs of M/θ₀ of the components of friction, by their numbers."""
+    rows: Any = tables["component"]
+    component: Any = Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
+    for number, address in onsager.items():
+        component[number].onsager = address
+    return {**tables, "component": component}
+
+
 def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Array]:
     """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
     n = sum(part.joint.dim for part in parts)
@@ -477,7 +488,8 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
             order.append(j)
         tip[i] = last
     losses = len(frictions(tables))
-    whole = {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach, "first": reach, "counts": np.zeros(2)}
+    whole = {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach, "first": reach}
+    whole |= {"counts": np.zeros(2)}
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses), "chain": np.zeros(n)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
@@ -491,8 +503,8 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
 
 DRAGS: Final[dict[str, Any]] = {
     "scheme": matrix(), "again": indices(), "seen": vector(), "reached": vector(), "order": indices(),
-    "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(), "counts": indices(2), "edge": indices(),
-    "pair": indices(), "chain": indices(), "resistance": matrix(36), "row": matrix(36), "joined": matrix(36),
+    "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(),
+    "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(), "resistance": matrix(36), "row": matrix(36), "joined": matrix(36),
     "column": matrix(6), "moved": matrix(6), "body": matrix(10), "mass": matrix(), "drag": matrix(),
     "part": vector(), "sign": vector(),
 }  # fmt: skip

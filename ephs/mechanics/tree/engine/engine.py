@@ -6,11 +6,11 @@ from typing import Any, cast, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.closing import Closing
+from ephs.mechanics.tree.engine.drags import resisting
 from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, stiff_program
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
-from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.march import ERRORS, TOTALS, Account, Control
 
 
@@ -87,12 +87,8 @@ class Engine:
 
         ``onsager``: addresses of the programs of M/θ₀ of the components of friction, by their numbers.
         """
-        rows = self.tables["component"]
-        component = Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
-        for number, address in onsager.items():
-            component[number].onsager = address
         march = lagged_program().compiled()["march"]
-        return march.bind(*arguments, first=march.first({**self.tables, "component": component}, self.work))
+        return march.bind(*arguments, first=march.first(resisting(self.tables, onsager), self.work))
 
     def array(self, name: str) -> Array:
         """Return an array of the memory."""

@@ -1,0 +1,229 @@
+"""Semi-implicit steps: their coefficients, their stages, and what contact loses by them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi, serves
+from ephs.mechanics.tree.engine.drags import DRAGS, Drags, resisting
+from ephs.mechanics.tree.engine.programs import of_motion
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.stage import Program, group, real, vector
+from ephs.solve.control import Control, Tolerance
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.testing.mechanisms import mechanisms
+
+EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
+IMPLICIT = SCHEME[1:, 1:]
+
+
+def test_coefficients_are_of_order_three():
+    """All conditions of two coupled methods with the same weights, to order 3."""
+    ones = np.ones(4)
+    assert LAST.sum() == pytest.approx(1.0, rel=1e-15)
+    for a in (EXPLICIT, IMPLICIT):
+        assert LAST @ a @ ones == pytest.approx(0.5, rel=1e-14)
+        for b in (EXPLICIT, IMPLICIT):
+            assert LAST @ ((a @ ones) * (b @ ones)) == pytest.approx(1.0 / 3.0, rel=1e-14)
+            assert LAST @ a @ b @ ones == pytest.approx(1.0 / 6.0, rel=1e-14)
+
+
+def test_no_weight_is_negative_and_stiff_parts_vanish():
+    assert np.all(LAST >= 0.0)
+    assert 1.0 - LAST @ np.linalg.solve(IMPLICIT, np.ones(4)) == pytest.approx(0.0, abs=1e-14)
+    z = 1j * np.logspace(-3, 3, 200)
+    grown = [abs(1.0 + x * LAST @ np.linalg.solve(np.eye(4) - x * IMPLICIT, np.ones(4))) for x in z]
+    assert max(grown) <= 1.0 + 1e-14
+
+
+def test_the_estimate_is_by_a_method_of_order_two():
+    other = LAST - ARRAYS["error"][1:5]
+    for a in (EXPLICIT, IMPLICIT):
+        assert (other.sum(), other @ a.sum(axis=1)) == pytest.approx((1.0, 0.5), rel=1e-14)
+    assert other @ EXPLICIT.sum(axis=1) ** 2 != pytest.approx(1.0 / 3.0, rel=1e-3)
+
+
+def probe(on, motion, drags, base, y, q, out, known, weight):
+    status, _ = drags.observe(on, motion, base, y, q)
+    copy(on, known, drags.reached)
+    copy(on, drags.seen, out)
+    on.when(on.same(status, 0), lambda: drags.resist(on, motion, y, weight, on.same(status, 1), out))
+    return status
+
+
+ENTRY = of_motion(
+    probe, looped=False, drags=group(Drags, **DRAGS), base=vector(), y=vector(), q=vector(), out=vector(),
+    known=vector(), weight=real(),
+)  # fmt: skip
+PROBE = Program("probe", probe=ENTRY)
+
+
+class Stage:
+    """One stage of a scene's equations at its start, with other rates."""
+
+    def __init__(self, scene, seed):
+        self.eq = eq = Equations(problem_of_scene(scene), 0.0)
+        self.state = eq.start(0.0)
+        self.y = eq.vector(self.state)
+        self.rates = slice(eq.nv, eq.nv + eq.n)
+        self.y[self.rates] += np.random.default_rng(seed).normal(size=eq.n)
+        tolerance = Tolerance.of("rtol", 1e-3, 1e-3)
+        semi = Semi(eq, Control(tolerance, tolerance, None, 0.0, np.inf, None))
+        call = PROBE.compiled()["probe"]
+        coordinates, size = eq.engine.sizes
+        self.out, self.known, self.memory = np.zeros(size), np.zeros(eq.n), semi.memory
+        first = call.first(resisting(eq.engine.tables, semi.onsager), eq.engine.work)
+        given = self.memory, self.state.q.copy(), self.y.copy(), np.zeros(coordinates), self.out, self.known
+        self.run = call.bind(*given, 0.0, first=first)
+
+    def at(self, known, weight):
+        self.known[:] = known
+        assert self.run(weight) == 0
+        return self.out.copy()
+
+
+SELF = """
+format = 1
+name = "hug"
+[thermal.skin]
+capacity = 2.0
+temperature = 320.0
+[bodies.trunk]
+mass = 2.0
+inertia = [0.02, 0.03, 0.04]
+position = [5.0, 1.0, 0.08]
+[bodies.arm]
+mass = 1.0
+inertia = [0.02, 0.02, 0.01]
+position = [5.15, 1.0, 0.08]
+[bodies.hand]
+mass = 0.5
+inertia = [1e-3, 2e-3, 1e-3]
+position = [5.15, 1.15, 0.1]
+[joints.shoulder]
+type = "spherical"
+bodies = ["arm", "trunk"]
+at = [5.1, 1.0, 0.08]
+friction = 0.1
+[joints.elbow]
+type = "cylindrical"
+bodies = ["arm", "hand"]
+at = [5.15, 1.05, 0.1]
+axis = [0.0, 0.6, 0.8]
+friction = [0.05, 2.0]
+heat = "skin"
+[surfaces.trunk]
+body = "trunk"
+shape = { sphere = 0.1 }
+stiffness = 1e4
+loss = 0.4
+friction = 0.6
+[surfaces.hand]
+body = "hand"
+shape = { sphere = 0.15 }
+stiffness = 2e4
+loss = 0.2
+friction = 0.5
+rolling = 0.01
+spinning = 0.02
+heat = "skin"
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+"""
+
+
+@pytest.fixture(scope="module")
+def hug(tmp_path_factory):
+    file = tmp_path_factory.mktemp("hug") / "hug.toml"
+    file.write_text(SELF, encoding="utf-8")
+    with pytest.warns(ephs.SceneWarning):  # of overlaps
+        return ephs.load(file)
+
+
+def check(stage, seed):
+    eq = stage.eq
+    rng = np.random.default_rng(seed)
+    status, _, rates = eq.engine.rates(stage.state.q, stage.y)
+    assert status == 0
+    # Without weight, losses are those of the rates.
+    found = stage.at(stage.y[stage.rates], 0.0)
+    size = 1.0 + np.abs(rates)
+    assert np.abs(found - rates).max() <= 1e-9 * size.max()
+    # With weight, they are those of the rates that are reached.
+    known, weight = rng.normal(size=eq.n), 10.0 ** rng.uniform(-4, 1)
+    there = stage.at(known, weight)
+    again = stage.at(known + weight * there[stage.rates], 0.0)
+    loss = np.abs(again[stage.rates] - stage.at(np.zeros(eq.n), 0.0)[stage.rates]).max()
+    assert np.abs(there - again).max() <= 1e-9 * (1.0 + np.abs(again).max() + loss)
+    made = there[eq.nv + eq.n + eq.ns + 2 :]
+    assert np.all(made >= 0.0)
+
+
+@given(scene=mechanisms(loops=False), seed=st.integers(0, 2**20))
+@settings(max_examples=25)
+def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
+    stage = Stage(scene, seed)
+    if stage.eq.n and serves(stage.eq) and not stage.eq.engine.looped:
+        check(stage, seed)
+
+
+@given(seed=st.integers(0, 2**20))
+@settings(max_examples=10)
+def test_so_do_those_of_contacts_within_a_mechanism(hug, seed):
+    stage = Stage(hug, seed)
+    check(stage, seed)
+    assert list(stage.memory["counts"]) == [5, 3]  # shoulder, elbow, and three contacts
+
+
+def test_steps_converge_with_order_three(tmp_path):
+    """Where friction is smooth beside the steps, and nothing touches or parts."""
+    file = tmp_path / "hug.toml"
+    file.write_text(SELF.replace("loss =", "slip = 1.0\nloss ="), encoding="utf-8")
+    with pytest.warns(ephs.SceneWarning):
+        hug = ephs.load(file)
+
+    def end(step):
+        sol = ephs.simulate(hug, 4e-3, rtol=1e-2, atol=1e10, max_step=step, audit="off")
+        assert sol.stats["method"] == "semi"
+        return np.concatenate([sol.body("hand").velocity[-1], sol.body("trunk").angular_velocity[-1]])
+
+    exact = ephs.simulate(hug, 4e-3, method="rk87", rtol=1e-12, atol=1e-14, audit="off")
+    exact = np.concatenate([exact.body("hand").velocity[-1], exact.body("trunk").angular_velocity[-1]])
+    errors = [np.abs(end(4e-3 / count) - exact).max() for count in (16, 32, 64)]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+
+
+@pytest.mark.parametrize("slip", [1e-2, 1e-4, 1e-6])
+def test_stiff_friction_does_not_shorten_steps(slip, tmp_path):
+    """A ball that slides until it rolls: its speed 5/7, and heat 2/7 of its energy, whatever the slip."""
+    file = tmp_path / "ball.toml"
+    file.write_text(f"""
+format = 1
+name = "ball"
+[bodies.ball]
+mass = 1.0
+inertia = [4e-3, 4e-3, 4e-3]
+position = [0.0, 0.0, 0.0999]
+velocity = [1.0, 0.0, 0.0]
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = 0.1 }}
+stiffness = 1e5
+loss = 1.0
+friction = 0.5
+slip = {slip}
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+""", encoding="utf-8")
+    scene = ephs.load(file)
+    sol = ephs.simulate(scene, 0.5, rtol=1e-3, audit="off")
+    assert sol.stats["method"] == "semi" and sol.stats["steps"] < 1000
+    assert sol.body("ball").velocity[-1, 0] == pytest.approx(5.0 / 7.0, abs=1e-2)
+    assert sol.heat[-1] == pytest.approx(0.5 * 2.0 / 7.0, rel=2e-2)
+    assert np.abs(sol.energy_error).max() <= 1e-11
+    assert sol.stats["least_production"] >= 0.0
