@@ -11,7 +11,7 @@ from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.recording import Untraceable, record
-from ephs.semantics.derive.relations import Port
+from ephs.semantics.derive.relating import Port
 from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN

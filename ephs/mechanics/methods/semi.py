@@ -16,7 +16,8 @@ from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.bundle import Array
-from ephs.semantics.derive.relations import Irreversible, onsager
+from ephs.semantics.derive.irreversible import Irreversible
+from ephs.semantics.derive.relations import onsager
 from ephs.solve.control import Control
 from ephs.solve.stepping import Attempt, Leg, Span
 

@@ -35,9 +35,7 @@ class Lagged(ABC):
     reached: Vector
 
     @abstractmethod
-    def observe(
-        self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector
-    ) -> tuple[Integer, Integer]:
+    def observe(self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector) -> tuple[Integer, Integer]:
         """Evaluate Y without losses, whose resistances are kept; return a status and the component that it is of."""
 
     @abstractmethod

@@ -36,7 +36,9 @@ def march(
     Integer
         An `Ending`.
     """
-    run = _Run(on, motion, tableau, memory, control, account, stiff, lagged, on.counter(GOING), on.counter(0), on.counter(0))
+    run = _Run(
+        on, motion, tableau, memory, control, account, stiff, lagged, on.counter(GOING), on.counter(0), on.counter(0)
+    )
     tries = on.counter(0)
 
     def one() -> Truth:
@@ -139,7 +141,19 @@ class _Run:
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         self.accepted.value = 0
         self.status.value = attempt(
-            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1, self.stiff,
+            on,
+            motion,
+            self.tableau,
+            c,
+            m.q,
+            m.y,
+            self.sign * h,
+            m.k,
+            m.errors,
+            m.last,
+            m.y1,
+            m.q1,
+            self.stiff,
             self.lagged,
         )
 
@@ -276,7 +290,19 @@ class _Run:
             copy(on, m.k.row(0), m.k2.row(0))
             part = self.sign * (wanted - c.time)
             self.status.value = attempt(
-                on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff,
+                on,
+                motion,
+                self.tableau,
+                c,
+                m.q,
+                m.y,
+                part,
+                m.k2,
+                m.errors,
+                m.last,
+                m.y2,
+                m.q2,
+                self.stiff,
                 self.lagged,
             )
 

@@ -207,7 +207,19 @@ def _kinds(charts: Index, cut: Index) -> tuple[Kind, ...]:
 
 def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
     """Function of `Own` -> the program and the entry that it is; sweeps of a free tree have one of their own."""
-    own = ("accelerations", "move", "fold", "unfold", "resolve", "spread", "axes", "power", "dependent", "energy", "rigid")
+    own = (
+        "accelerations",
+        "move",
+        "fold",
+        "unfold",
+        "resolve",
+        "spread",
+        "axes",
+        "power",
+        "dependent",
+        "energy",
+        "rigid",
+    )
     cut = ("rows", "poses", "fit", "gaps", "relative_rates", "across", "advance", "velocities")
     found = {name: (sweeps, name) for name in own if name in sweeps.entries}
     return found | {name: (loops, name) for name in cut} | {"displace": (loops, "move")}

@@ -1,26 +1,24 @@
-"""Resistances of a tree's losses, and their linear system (M + w D) for the accelerations.
+"""Resistances of a tree's losses.
 
 A loss pulls with −μ u on the relative twist u of two links, or on a joint's rates; so D = Σ Jᵀ μ J with the rows J of
-u on the rates. All twists are about one point, the place of the first link, and along the ground's axes. The mass
-matrix is that of composite bodies, see Featherstone, *Rigid Body Dynamics Algorithms*, 2008, 6.2.
+u on the rates. All twists are about one point, the place of the first link, and along the ground's axes.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.mechanics.tree.engine.motion import Mechanism
+from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.pack import Part
-from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.bundle import Array
-from ephs.semantics.linear.dense import clear, copy
-from ephs.semantics.linear.skyline import skyline_cholesky, skyline_solve, skyline_times
-from ephs.semantics.spaces import se3, vectors
-from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
+from ephs.semantics.linear.dense import clear
+from ephs.semantics.spaces import se3
+from ephs.semantics.spaces.vectors import add, apply, product, sub
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
@@ -37,10 +35,7 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.march.lagged import Lagged
-from ephs.solve.march.records import Motion, Status
-
-EDGES, PAIRS = 0, 1
-"""Places of the numbers of losses and of pairs of links between which they act."""
+from ephs.solve.march.records import Motion
 
 
 @final
@@ -102,9 +97,7 @@ class Drags(Lagged):
 
     # ---- what acts -------------------------------------------------------------------------------------------------
 
-    def observe(
-        self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector
-    ) -> tuple[Integer, Integer]:
+    def observe(self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector) -> tuple[Integer, Integer]:
         assert isinstance(motion, Mechanism)
         self.counts[EDGES], self.counts[PAIRS] = 0, 0
         status, component = motion.rates(on, base, y, q, self.seen, self)
@@ -123,7 +116,7 @@ class Drags(Lagged):
 
     def resist(self, on: Evaluator, motion: Motion, y: Vector, weight: Real, fresh: Truth, out: Vector) -> Integer:
         assert isinstance(motion, Mechanism)
-        return _resist(on, self, motion, y, weight, on.select(fresh, 1, 0), out)
+        return resist(on, self, motion, y, weight, on.select(fresh, 1, 0), out)
 
 
 @staged
@@ -181,284 +174,6 @@ def _join(on: Evaluator, drags: Drags, work: Work, edge: Acting, c: Integer) -> 
     on.loop(d, grow)
 
 
-@staged
-def _resist(
-    on: Evaluator, drags: Drags, motion: Mechanism, y: Vector, weight: Real, fresh: Integer, out: Vector
-) -> Integer:
-    n, status, z, part = motion.freedoms, on.counter(0), drags.reached, drags.part
-    rate, losses = out.part(motion.increments, n), drags.counts[EDGES] > 0
-
-    def reach(i: Integer) -> None:
-        z[i] = z[i] + weight * rate[i]
-
-    def solve() -> None:
-        def assemble() -> None:
-            _begin(on, drags)
-            _masses(on, drags, motion)
-            _losses(on, drags, motion)
-            status.value = _factorise(on, drags, weight)
-
-        on.when(on.same(fresh, 1), lambda: None, assemble)
-        on.when(on.same(status.value, 0), change)
-
-    def change() -> None:
-        def move(i: Integer) -> None:
-            rate[i], z[i] = rate[i] - part[i], z[i] - weight * part[i]
-
-        skyline_times(on, drags.drag, drags.first, z, part)
-        skyline_solve(on, drags.mass, drags.first, part)
-        on.loop(n, move)
-        _heat(on, drags, motion, out)
-
-    on.loop(n, reach)
-    on.when(losses, solve)
-    on.when(on.same(status.value, 0), lambda: motion.flow(on, y, z, out))
-    return status.value
-
-
-def _walk(on: Evaluator, drags: Drags, link: Integer, body: Callable[[Integer], None]) -> None:
-    """Call body(rate) for the rates that move a link, the last one first."""
-    at = on.counter(on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)]))
-
-    def step() -> Truth:
-        body(at.value)
-        at.value = drags.above[at.value]
-        return at.value < 0
-
-    on.when(at.value >= 0, lambda: on.repeat(step))
-
-
-def _begin(on: Evaluator, drags: Drags) -> None:
-    """Find where rows begin, and clear them."""
-
-    def lone(i: Integer) -> None:
-        drags.first[i] = drags.reach[i]
-
-    def join(p: Integer) -> None:
-        low, links = on.counter(drags.order.size), (drags.pair[2 * p], drags.pair[2 * p + 1])
-
-        def find(i: Integer) -> None:
-            low.value = on.select(drags.first[i] < low.value, drags.first[i], low.value)
-
-        def lower(i: Integer) -> None:
-            drags.first[i] = on.select(low.value < drags.first[i], low.value, drags.first[i])
-
-        for body in (find, lower):
-            for link in links:
-                _walk(on, drags, link, body)
-
-    def empty(i: Integer) -> None:
-        def entry(j: Integer) -> None:
-            drags.mass[i, j], drags.drag[i, j] = 0.0, 0.0
-
-        on.loop(i + 1, entry, start=drags.first[i])
-
-    on.loop(drags.order.size, lone)
-    on.loop(drags.counts[PAIRS], join)
-    on.loop(drags.order.size, empty)
-
-
-def _factorise(on: Evaluator, drags: Drags, weight: Real) -> Integer:
-    """Factorise M + w D; return a status."""
-
-    def row(i: Integer) -> None:
-        def entry(j: Integer) -> None:
-            drags.mass[i, j] = drags.mass[i, j] + weight * drags.drag[i, j]
-
-        on.loop(i + 1, entry, start=drags.first[i])
-
-    on.loop(drags.mass.rows, row)
-    return on.select(skyline_cholesky(on, drags.mass, drags.first) > 0, int(Status.STILL), 0)
-
-
-@staged
-def _masses(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
-    """The lower triangle of the mass matrix; columns are moved to the first link's place."""
-    tables, place, links = motion.tables, motion.work.place, motion.tables.links
-    origin = place_of(on, place, 0).at
-
-    def link_of(i: Integer) -> Link:
-        return Link(tables.integers.cells, i * Link.integer_width, tables.reals.cells, i * Link.real_width)
-
-    def one(i: Integer) -> None:
-        link, here, body = link_of(i), place_of(on, place, i), drags.body.row(i)
-        for k, x in enumerate(_inertia(link, here.turn, sub(here.at, origin))):
-            body[k] = x
-
-    def carry(i: Integer) -> None:
-        parent = link_of(i).parent
-
-        def grow() -> None:
-            for k in range(10):
-                drags.body[parent, k] = drags.body[parent, k] + drags.body[i, k]
-
-        on.when(parent < links, grow)
-
-    def column(j: Integer) -> None:
-        here = drags.column.row(j)
-        for k, x in enumerate(cross([here[0], here[1], here[2]], origin)):
-            here[3 + k] = here[3 + k] + x
-
-    def row(j: Integer) -> None:
-        load = _momentum([drags.body[drags.owner[j], k] for k in range(10)], [drags.column[j, k] for k in range(6)])
-
-        def entry(i: Integer) -> None:
-            low, high = on.select(i < j, i, j), on.select(i < j, j, i)
-            drags.mass[high, low] = vectors.dot([drags.column[i, k] for k in range(6)], load)
-
-        at = on.counter(j)
-
-        def step() -> Truth:
-            entry(at.value)
-            at.value = drags.above[at.value]
-            return at.value < 0
-
-        on.repeat(step)
-
-    def armature(i: Integer) -> None:
-        def grow() -> None:
-            j = drags.tip[i]
-            drags.mass[j, j] = drags.mass[j, j] + link_of(i).armature
-
-        on.when(link_of(i).armature > 0.0, grow)
-
-    n = drags.order.size
-    on.loop(links, one)
-    on.loop(links, carry, down=True)
-    on.loop(n, column)
-    on.loop(n, lambda k: row(drags.order[k]))
-    on.loop(links, armature)
-
-
-def _inertia(link: Link, turn: Any, at: Any) -> list[Real]:
-    """Mass, moment and inertia (upper triangle) of a link about a point, from which its frame is at ``at``."""
-    moment = apply(turn, link.moment)
-    inertia = product(product(turn, symmetric(link.inertia)), transposed(turn))
-    out = [[moment[i] * at[j] + at[i] * (moment[j] + link.mass * at[j]) for j in range(3)] for i in range(3)]
-    trace = out[0][0] + out[1][1] + out[2][2]
-    moved = [[(trace if i == j else 0.0) - out[i][j] for j in range(3)] for i in range(3)]
-    return [link.mass, *add(moment, scale(link.mass, at)), *upper(plus(inertia, moved))]
-
-
-def _momentum(body: list[Real], twist: list[Real]) -> list[Real]:
-    """(l, p) of mass, moment and inertia about a point, for a twist about it."""
-    mass, moment, inertia = body[0], body[1:4], symmetric(body[4:])
-    turning, moving = twist[:3], twist[3:]
-    return [
-        *add(apply(inertia, turning), cross(moment, moving)), *add(scale(mass, moving), cross(turning, moment))
-    ]  # fmt: skip
-
-
-@staged
-def _losses(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
-    """D of all losses."""
-    tables = motion.tables
-
-    def within(c: Integer) -> None:
-        edge = tables.acting[drags.edge[c]]
-
-        def row(i: Integer) -> None:
-            def entry(j: Integer) -> None:
-                a, b = edge.r_at + i, edge.r_at + j
-                drags.drag[a, b] = drags.drag[a, b] + drags.resistance[c, edge.dim * i + j]
-
-            on.loop(i + 1, entry)
-
-        on.when(on.same(edge.kind, ON_TREE), lambda: on.loop(edge.dim, row))
-
-    def between(p: Integer) -> None:
-        size, sums, links = on.counter(0), drags.joined.row(p), (drags.pair[2 * p], drags.pair[2 * p + 1])
-
-        def clear_sign(j: Integer) -> None:
-            drags.sign[j] = 0.0
-
-        def leave(j: Integer) -> None:
-            drags.sign[j] = drags.sign[j] - 1.0
-
-        def join(j: Integer) -> None:
-            drags.sign[j] = drags.sign[j] + 1.0
-
-        def gather(j: Integer) -> None:
-            def take() -> None:
-                drags.chain[size.value] = j
-                size.value = size.value + 1
-                for k in range(6):
-                    drags.moved[j, k] = drags.sign[j] * vectors.dot(
-                        [sums[6 * k + m] for m in range(6)], [drags.column[j, m] for m in range(6)]
-                    )
-
-            on.when(on.absolute(drags.sign[j]) > 0.5, take)
-
-        def row(a: Integer) -> None:
-            i = drags.chain[a]
-
-            def entry(b: Integer) -> None:
-                j = drags.chain[b]
-
-                def grow() -> None:
-                    value = vectors.dot([drags.column[i, k] for k in range(6)], [drags.moved[j, k] for k in range(6)])
-                    drags.drag[i, j] = drags.drag[i, j] + drags.sign[i] * value
-
-                on.when(j <= i, grow)
-
-            on.loop(size.value, entry)
-
-        for one, other in ((clear_sign, clear_sign), (leave, join), (gather, gather)):
-            _walk(on, drags, links[0], one)
-            _walk(on, drags, links[1], other)
-        on.loop(size.value, row)
-
-    on.loop(drags.counts[EDGES], within)
-    on.loop(drags.counts[PAIRS], between)
-
-
-@staged
-def _heat(on: Evaluator, drags: Drags, motion: Mechanism, out: Vector) -> None:
-    """Add what losses make at the rates that are reached: rates of entropies, entropies, the power of friction."""
-    tables, w, at = motion.tables, motion.work, motion.summed
-    ns, z = tables.node.size, drags.reached
-    s_rate, made, power = out.part(at, ns), out.part(at + (ns + 2), out.size - (at + ns + 2)), on.variable(0.0)
-
-    def move(j: Integer) -> None:
-        above, rate = drags.above[j], z[j]
-        before = on.select(above < 0, 0, above)
-        for k in range(6):
-            drags.moved[j, k] = on.select(above < 0, 0.0, drags.moved[before, k]) + drags.column[j, k] * rate
-
-    def twist(link: Integer) -> list[Real]:
-        tip = on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)])
-        return [on.select(tip < 0, 0.0, drags.moved[on.select(tip < 0, 0, tip), k]) for k in range(6)]
-
-    def one(c: Integer) -> None:
-        edge, u, total = tables.acting[drags.edge[c]], on.scratch(6), on.variable(0.0)
-        d = edge.dim
-
-        def between() -> None:
-            change = sub(twist(edge.second), twist(edge.first))
-
-            def along(i: Integer) -> None:
-                u[i] = vectors.dot([drags.row[c, 6 * i + k] for k in range(6)], change)
-
-            on.loop(d, along)
-
-        def pull(i: Integer) -> None:
-            def by(j: Integer) -> None:
-                total.value = total.value + u[i] * drags.resistance[c, d * i + j] * u[j]
-
-            on.loop(d, by)
-
-        on.when(on.same(edge.kind, ON_TREE), lambda: copy(on, z.part(edge.r_at, d), u.part(0, d)), between)
-        on.loop(d, pull)
-        entropy = total.value / (w.temperature[edge.heat] + tables.scal[1])
-        power.value = power.value + total.value
-        s_rate[edge.heat] = s_rate[edge.heat] + entropy
-        made[tables.component[edge.friction].made] = entropy
-
-    on.loop(drags.order.size, lambda k: move(drags.order[k]))
-    on.loop(drags.counts[EDGES], one)
-    out[at + ns] = out[at + ns] + power.value
-
-
 def frictions(tables: Mapping[str, Any]) -> list[int]:
     """Numbers of the components of friction, edge by edge."""
     acting: Any = tables["acting"]
@@ -504,7 +219,7 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
 DRAGS: Final[dict[str, Any]] = {
     "scheme": matrix(), "again": indices(), "seen": vector(), "reached": vector(), "order": indices(),
     "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(),
-    "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(), "resistance": matrix(36), "row": matrix(36), "joined": matrix(36),
-    "column": matrix(6), "moved": matrix(6), "body": matrix(10), "mass": matrix(), "drag": matrix(),
-    "part": vector(), "sign": vector(),
+    "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(), "resistance": matrix(36),
+    "row": matrix(36), "joined": matrix(36), "column": matrix(6), "moved": matrix(6), "body": matrix(10),
+    "mass": matrix(), "drag": matrix(), "part": vector(), "sign": vector(),
 }  # fmt: skip

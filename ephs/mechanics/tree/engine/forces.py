@@ -106,9 +106,7 @@ class _Acting:
         """Go on where no component has refused."""
         self.on.when(self.on.same(self.status.value, 0), following)
 
-    def _evaluate(
-        self, number: Integer, *, stored: bool = False, moving: Integer = 0, onsager: bool = False
-    ) -> None:
+    def _evaluate(self, number: Integer, *, stored: bool = False, moving: Integer = 0, onsager: bool = False) -> None:
         """Call a component at the states in the memory, without increments: efforts go to e, flows to f.
 
         ``moving``: how many degrees of freedom the state of what is no storage may have; with ``onsager`` M/θ₀ goes to
@@ -124,7 +122,8 @@ class _Acting:
             return
         parameters = tables.parameters.part(row.at, tables.parameters.size - row.at)
         found = on.reach(
-            row.onsager if onsager else row.law, dims, tables.scal, parameters, w.x, w.v, w.e, w.lam, w.f, w.c, w.jac, w.scratch
+            row.onsager if onsager else row.law, dims, tables.scal, parameters, w.x, w.v, w.e, w.lam, w.f, w.c, w.jac,
+            w.scratch,
         )  # fmt: skip
 
         def refuse() -> None:
@@ -283,7 +282,9 @@ class _Acting:
             pressed.value = on.select(on.both(edge.support > 0, w.c[0] <= 0.0), 0, 1)
 
         def friction() -> None:
-            on.when(on.both(edge.friction >= 0, on.same(pressed.value, 1)), lambda: self._friction(edge, number, rate, pull))
+            on.when(
+                on.both(edge.friction >= 0, on.same(pressed.value, 1)), lambda: self._friction(edge, number, rate, pull)
+            )
 
         on.when(edge.spring >= 0, spring)
         self.unless_refused(friction)

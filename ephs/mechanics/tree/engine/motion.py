@@ -15,13 +15,10 @@ from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
 from ephs.solve.march.account import BEYOND, Account, rounding
 from ephs.solve.march.records import Motion, Status
+from ephs.solve.march.stiff import whole
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.drags import Drags
-
-
-def _whole(x: Matrix) -> Vector:
-    return Vector(x.cells, x.start, x.rows * x.columns)
 
 
 @final
@@ -85,11 +82,11 @@ class Mechanism(Motion):
         """
         e, w, own = self.tables, self.work, self.tables.own[0]
         on.reach(own.move, *self.swept, q, r, lead, w.place)
-        clear(on, _whole(w.pushed))
+        clear(on, whole(w.pushed))
         if not self.looped:
             return
         clear(on, w.entry)
-        clear(on, _whole(w.covector))
+        clear(on, whole(w.covector))
 
         def forget(a: Integer) -> None:
             w.value[a, SIZE] = 0.0
@@ -137,8 +134,7 @@ class Mechanism(Motion):
     ) -> Integer:  # fmt: skip
         """Write ṙ, ṡ, what each component makes, and the powers of friction and of what drives; return a status.
 
-        With ``drags`` there is no friction: its resistances go there.
-        """
+        With ``drags`` there is no friction: its resistances go there."""
         w, own, status = self.work, self.tables.own[0], on.counter(0)
 
         def fall() -> None:
@@ -384,12 +380,8 @@ class Mechanism(Motion):
             chart = e.chart[i]
 
             def one(j: Integer) -> None:
-                moved[chart.v_at + j] = 0.0
-
-                def on_tree() -> None:
-                    moved[chart.v_at + j] = alter[chart.r_at + j]
-
-                on.when(chart.cut < 0, on_tree)
+                tree = chart.cut < 0
+                moved[chart.v_at + j] = on.select(tree, alter[on.select(tree, chart.r_at + j, 0)], 0.0)
 
             on.loop(chart.dim, one)
 
