@@ -19,9 +19,12 @@ class Support:
         Half lengths in m of two boxes about the frames of a relative pose, or none.
     margin
         The largest distance in m of these boxes at which anything happens.
+    parallel
+        Square of the sine of the angle between the z axes below which nothing happens, of boxes along these.
     """
 
     places: tuple[int, ...]
     limit: float
     halves: tuple[float, ...] = ()
     margin: float = 0.0
+    parallel: float = 0.0

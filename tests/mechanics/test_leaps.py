@@ -60,6 +60,20 @@ def test_a_ball_that_passes_a_plate_in_a_step_is_found(method, kept, ball):
     assert START - SPEED * finding.at < 0.0, "the instant after it"
 
 
+def test_a_ball_at_the_end_of_an_arm_that_turns_is_found(tmp_path):
+    """Its body only turns, about a centre 1 m aside."""
+    text = SCENE.replace("SIDE", "-1.0").replace("START", repr(START)).replace(f"-{SPEED}]", "0.0]")
+    text = text.replace(
+        "[surfaces.ball]", f"angular_velocity = [0.0, {SPEED}, 0.0]\n[surfaces.ball]\nposition = [1.0, 0.0, 0.0]"
+    )
+    file = tmp_path / "arm.toml"
+    file.write_text(text)
+    run = ephs.simulate(ephs.load(file), 0.06, method="natural", step=0.0097, audit="off")
+    assert run.body("ball").position[-1] == pytest.approx([-1.0, 0.0, START]), "the control: it met nothing"
+    (leap,) = run.motion.leaps(0.0097)
+    assert leap[2] == pytest.approx(SPEED * 0.0097 / WAY, rel=1e-2)
+
+
 def test_the_step_that_is_advised_meets_the_plate(ball):
     run = ephs.simulate(ball(), 0.06, method="natural", step=0.0097, audit="off")
     short = float(run.audit.findings[0].advice.split(" of ")[1].split()[0])

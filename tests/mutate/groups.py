@@ -163,6 +163,7 @@ GROUPS = {
             "ephs/mechanics/tree/sweeps/outward.py",
             "ephs/mechanics/tree/sweeps/pack.py",
             "ephs/mechanics/tree/engine/links.py",
+            "ephs/mechanics/tree/engine/near.py",
             "ephs/mechanics/tree/engine/forces.py",
             "ephs/mechanics/tree/engine/heats.py",
             "ephs/mechanics/tree/engine/motion.py",

@@ -11,6 +11,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.motion.batch import compose, inverse
+from ephs.mechanics.motion.batch import gap as change
 from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.model import Scene
@@ -47,15 +48,17 @@ def leaps(scene: Scene, read: Moving, t: Array, h: float) -> Iterator[Leap]:
     share = np.minimum(1.0, h / np.maximum(np.abs(np.diff(t)), float(np.finfo(float).tiny)))
     for name, contact in scene.all_contacts():
         bodies, touches = contact_points(scene, contact)
-        longest = Leap(name, 0, 0.0)
-        for frame1, frame2, gap in touches if len(t) > 1 else ():
-            if gap.thickness == np.inf:
-                continue
-            first, second = (
-                compose(read.poses(body), np.broadcast_to(frame, (len(t), 7)))
-                for body, frame in zip(bodies, (frame1, frame2), strict=True)
-            )
-            pose = compose(inverse(first), second)
+        longest, thin = Leap(name, 0, 0.0), [touch for touch in touches if touch[2].thickness < np.inf]
+        if not thin or len(t) < 2:
+            continue
+        one, other = (read.poses(body) for body in bodies)
+        relative = compose(inverse(one), other)
+        turned, moved = change(relative[:-1].T, relative[1:].T)
+        arm = max(float(np.linalg.norm(frame[4:])) for _, frame, _ in thin)
+        if np.all(share * (moved + arm * turned) <= LEAP * min(gap.thickness for _, _, gap in thin)):
+            continue
+        for frame1, frame2, gap in thin:
+            pose = compose(compose(inverse(frame1[None]), relative), frame2[None])
             ways = np.linalg.norm(np.diff(pose[:, 4:], axis=0), axis=1)
             outside = np.asarray(gap.distance(pose.T))
             near = np.minimum(outside[:-1], outside[1:])

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.geometry import coupling
-from ephs.mechanics.shapes.pairs import touches
 from ephs.solve.auditing.audit import LEAP
 
 if TYPE_CHECKING:
@@ -34,8 +34,7 @@ def _contact_step(scene: "Scene") -> float:
     surfaces, bodies = dict(scene.all_surfaces()), dict(scene.all_bodies())
     thick = np.inf
     for _, contact in scene.all_contacts():
-        one, other = (surfaces[name] for name in contact.surfaces)
-        points, _ = touches(one.shape, one.frame, other.shape, other.frame)
+        _, points = contact_points(scene, contact)
         thick = min(thick, *(gap.thickness for _, _, gap in points))
     if thick == np.inf:
         return np.inf

@@ -128,11 +128,18 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
 
 
 def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
-    """Bodies 1 and 2 of a contact, and its gaps with their frames on these."""
-    surfaces: Mapping[str, Surface] = dict(scene.all_surfaces())
-    one, other = (surfaces[name] for name in of.surfaces)
-    points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
-    return ((other.body, one.body) if swapped else (one.body, other.body)), points
+    """Bodies 1 and 2 of a contact, and its gaps with their frames on these; made once and kept with the scene."""
+
+    def made() -> dict[tuple[str, str], tuple[tuple[str, str], tuple[Touch, ...]]]:
+        surfaces: Mapping[str, Surface] = dict(scene.all_surfaces())
+        out: dict[tuple[str, str], tuple[tuple[str, str], tuple[Touch, ...]]] = {}
+        for _, each in scene.all_contacts():
+            one, other = (surfaces[name] for name in each.surfaces)
+            points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
+            out[each.surfaces] = ((other.body, one.body) if swapped else (one.body, other.body)), points
+        return out
+
+    return once(scene, "contact points", made)[of.surfaces]
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Signal]:

@@ -189,7 +189,9 @@ def edges(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
         parallel = ramp(1.0 - (x * x + y * y) / square)
         return whole.distance(pose) + length * (parallel * parallel)
 
-    return replace(whole, name="edges", distance=distance)
+    wide = whole.support.margin
+    support = replace(whole.support, parallel=square * max(0.0, 1.0 - math.sqrt(wide / length)))
+    return replace(whole, name="edges", distance=distance, support=support)
 
 
 def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:

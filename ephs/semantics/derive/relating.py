@@ -106,6 +106,7 @@ def written(on: Duals, relation: Related, a: Arguments, values: Numbers) -> Trut
 
 
 def finite(on: Evaluator, values: Numbers) -> Truth:
+    """Tell whether all values are finite."""
     good: Truth = True
     for value in values:
         good = on.both(good, on.absolute(value) <= HUGE)
@@ -113,6 +114,7 @@ def finite(on: Evaluator, values: Numbers) -> Truth:
 
 
 def inside(on: Evaluator, bounds: Bounds, values: Numbers) -> Truth:
+    """Tell whether values are within bounds."""
     good: Truth = True
     for i, low, high in bounds:
         good = on.both(good, on.both(values[i] > low, values[i] < high))

@@ -1,6 +1,7 @@
 """Names and units of the components of a state."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import final
 
 from ephs.operad import Quantity
@@ -50,6 +51,7 @@ _WHOLE = {
 }
 
 
+@cache
 def labels_of(quantity: Quantity) -> Labels:
     """Names of the components of a state in solutions: relative poses in the joint's coordinates."""
     space = quantity.space

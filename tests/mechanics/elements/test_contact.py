@@ -134,7 +134,7 @@ def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching,
 
     def everywhere(*_):
         called.append(True)
-        return 0, [0.0] * 8
+        return 0, [0.0] * 9
 
     monkeypatch.setattr(mechanism, "_support", everywhere)
     oracle = run(scene_of(tmp_path, text, **options), until)

@@ -376,7 +376,7 @@ def _forces(
         part=np.array(parts, dtype=np.int64).reshape(-1, 4),
         frame=np.array(frames).reshape(-1, 24),
         left=np.array(left).reshape(-1, 36),
-        reach=np.array(reach).reshape(-1, 8),
+        reach=np.array(reach).reshape(-1, 9),
         body=np.array([bodies.link[b] if b in acted[1] else -1 for b in range(reduced.links)], dtype=np.int64),
         body_frame=np.array([_matrix(inside) for inside in bodies.inside]).reshape(-1, 12),
         node=reduced.nodes,

@@ -4,26 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
-from ephs.mechanics.tree.sweeps.acting import (
-    ABOVE,
-    APART,
-    BEYOND,
-    ON_BODIES,
-    ON_TREE,
-    Acting,
-    Component,
-    Conduction,
-    Tables,
-    Work,
-)
+from ephs.mechanics.tree.engine.near import Near
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import Relative, between, motion_of, place_of
 from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import se3, so3
-from ephs.semantics.spaces.vectors import Rows, apply_transposed, dot, product, scale, sub, transposed
-from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Variable, Vector, staged
+from ephs.semantics.spaces.vectors import apply_transposed, dot, product, scale, sub, transposed
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Variable, Vector, staged
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.drags import Drags
@@ -52,15 +42,17 @@ def act(
     drags
         Receives resistances in place of friction, which then does not act.
     """
+    near = Near.of(on, work.place)
     acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read, drags)
     totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
-    on.loop(
-        tables.acting.size,
-        lambda i: acting.unless_refused(lambda: acting.if_near(tables.acting[i], lambda edge: acting.edge(edge, i))),
-    )
+
+    def edge(i: Integer) -> None:
+        acting.unless_refused(lambda: near.when(tables.acting[i], lambda edge: acting.edge(edge, i)))
+
+    on.loop(tables.acting.size, edge)
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
 
@@ -71,6 +63,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
     Places of links in the memory are those at q where springs act between bodies.
     """
+    near = Near.of(on, work.place)
     acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, None)
 
     def one(i: Integer) -> None:
@@ -78,7 +71,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
             acting.store(edge, out)
 
         edge = tables.acting[i]
-        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.if_near(edge, store)))
+        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: near.when(edge, store)))
 
     on.loop(tables.acting.size, one)
     return acting.status.value
@@ -220,44 +213,6 @@ class _Acting:
 
         on.when(on.same(edge.kind, ON_TREE), in_tree, aside)
         return rate.value
-
-    def if_near(self, edge: Acting, body: Callable[[Acting], None]) -> None:
-        """Call body(edge) unless its frames are so far apart that nothing acts."""
-        on, near = self.on, self.on.counter(1)
-
-        def look() -> None:
-            one, other = place_of(on, self.work.place, edge.first), place_of(on, self.work.place, edge.second)
-            turn, there = between(one, other, edge.outer_turn, edge.outer_at)
-            x, y, z = at = apply_transposed(edge.inner_turn, sub(there, edge.inner_at))
-            square = edge.reach * edge.reach
-            above = on.both(on.same(edge.support, ABOVE), z > edge.reach)
-            beyond = on.both(edge.support >= BEYOND, x * x + y * y + z * z > square)
-            near.value = on.select(on.either(above, beyond), 0, 1)
-
-            def apart() -> None:
-                turned = product(transposed(edge.inner_turn), turn)
-                near.value = on.select(self._apart(edge, turned, at), 0, 1)
-
-            on.when(on.both(on.same(edge.support, APART), on.same(near.value, 1)), apart)
-
-        on.when(edge.support > 0, look)
-        on.when(on.same(near.value, 1), lambda: body(edge))
-
-    def _apart(self, edge: Acting, turn: Rows, at: list[Real]) -> Truth:
-        """Whether a plane along faces of either box about the frames of an edge is between them, at more than a margin.
-
-        ``turn`` and ``at`` are the second frame in the first.
-        """
-        on = self.on
-        found: Truth = False
-        one, other = ([edge.halves[3 * k + i] for i in range(3)] for k in (0, 1))
-        for rows, places, here, there in (
-            (turn, at, one, other), (transposed(turn), apply_transposed(turn, at), other, one)
-        ):  # fmt: skip
-            for row, place, half in zip(rows, places, here, strict=True):
-                spread = dot([on.absolute(x) for x in row], there)
-                found = on.either(found, on.absolute(place) > half + spread + edge.margin)
-        return found
 
     def edge(self, edge: Acting, number: Integer) -> None:
         """Add the forces of an edge with this number to those on joints, or to the wrenches on links."""

@@ -10,7 +10,7 @@ from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.closing import SIZE
 from ephs.mechanics.tree.sweeps.records import Link
-from ephs.semantics.linear.dense import clear
+from ephs.semantics.linear.dense import clear, subtract
 from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
 from ephs.solve.march.account import BEYOND, Account, rounding
@@ -349,8 +349,7 @@ class Mechanism(Motion):
     ) -> tuple[Integer, Real, Truth]:
         """Fit the cut joints, factorise, and move the tree if that helps; a status, the gap, and whether it is done.
 
-        With ``always`` it is moved in any case: the tangent of closing is that of a round that was taken.
-        """
+        With ``always`` it is moved in any case: the tangent of closing is that of a round that was taken."""
         own, w, status = self.tables.own[0], self.work, on.counter(0)
         self.outward(on, q, r, w.zero)
         on.reach(own.poses, *self._cuts)
@@ -379,11 +378,14 @@ class Mechanism(Motion):
         def joint(i: Integer) -> None:
             chart = e.chart[i]
 
-            def one(j: Integer) -> None:
-                tree = chart.cut < 0
-                moved[chart.v_at + j] = on.select(tree, alter[on.select(tree, chart.r_at + j, 0)], 0.0)
+            def rest(j: Integer) -> None:
+                moved[chart.v_at + j] = 0.0
 
-            on.loop(chart.dim, one)
+            def on_tree(j: Integer) -> None:
+                moved[chart.v_at + j] = alter[chart.r_at + j]
+
+            on.loop(chart.dim, rest)
+            on.when(chart.cut < 0, lambda: on.loop(chart.dim, on_tree))
 
         on.loop(e.chart.size, joint)
         on.reach(e.own[0].displace, e.charts, moved, q)
@@ -391,9 +393,4 @@ class Mechanism(Motion):
     def straighten(self, on: Evaluator, q: Vector, r: Vector) -> None:
         """Put the rates on the constraints, with the factors at hand."""
         on.reach(self.tables.own[0].relative_rates, *self._cuts, self.work.value)
-        alter = self._resolve(on, q)
-
-        def add(j: Integer) -> None:
-            r[j] = r[j] + alter[j]
-
-        on.loop(r.size, add)
+        subtract(on, -1.0, self._resolve(on, q), r)

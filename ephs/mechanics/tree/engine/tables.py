@@ -18,7 +18,7 @@ class Forces(NamedTuple):
     part: Index  # (edges, 4): component of the potential, of friction, entropy that takes its heat, −1: none; support
     frame: Array  # (edges, 24): rows of R and p of both joint frames in their links' frames
     left: Array  # (edges, 36): (BᵀB)⁻¹Bᵀ, row by row
-    reach: Array  # (edges, 8): from where on nothing acts; margin and half lengths of boxes
+    reach: Array  # (edges, 9): from where on nothing acts; margin and half lengths of boxes, angle of segments
     body: Index  # (bodies,): link on which the wrench acts, −1: none does
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
     node: Table[Node]
@@ -31,9 +31,12 @@ class Forces(NamedTuple):
 
     def tables(self) -> dict[str, Any]:
         """Return the records of the engine, by name."""
+        inner, inner_at, outer, outer_at = np.split(self.frame, [9, 12, 21], axis=1)
         return {
             "acting": table_of(
-                Acting, np.hstack([self.edge, self.part]), np.hstack([self.frame, self.left, self.reach])
+                Acting,
+                np.hstack([self.edge[:, :1], self.part[:, 3:], self.edge[:, 1:], self.part[:, :3]]),
+                np.hstack([inner_at, outer_at, self.reach[:, :2], inner, outer, self.reach[:, 2:], self.left]),
             ),
             "body": table_of(Body, self.body[:, None], self.body_frame),
             "node": self.node,

@@ -14,7 +14,7 @@ from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.parts import Acting, Parts, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
-from ephs.mechanics.tree.sweeps.acting import ABOVE, APART, BEYOND, Node
+from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Node
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept, once
@@ -206,7 +206,7 @@ def _tables(
     at_q = at_r = 0
     driven: list[int] = []
     spring, friction, heat = (np.full(count, -1) for _ in range(3))
-    support, reach = np.zeros(count, dtype=np.int64), np.zeros((count, 8))
+    support, reach = np.zeros(count, dtype=np.int64), np.zeros((count, 9))
     for i, (edge, kind) in enumerate(zip(edges, kinds, strict=True)):
         b, d = edge.pair.basis, edge.pair.dim
         basis[i, :, :d], left[i, :d] = b, left_inverse(edge.pair)
@@ -289,14 +289,17 @@ def _called(network: Network) -> list[int]:
 
 
 def _support(model: Model, parts: list[int]) -> tuple[int, Sequence[float]]:
-    """Where what acts in a spring vanishes, and from where on (8,); 0 where that is not said, or not alike by all."""
+    """Where what acts in a spring vanishes, and from where on (9,); 0 where that is not said, or not alike by all."""
     primitives = [model.descriptor.components[part].primitive for part in parts]
     said = {p.support if isinstance(p, Storage | Irreversible) else None for p in primitives}
     found = said.pop() if len(said) == 1 else None
     if found is None:
-        return 0, [0.0] * 8
-    kind = {HEIGHT: ABOVE, PLACE: APART if found.halves else BEYOND}.get(found.places, 0)
-    return kind, [found.limit, found.margin, *(found.halves or [0.0] * 6)]
+        return 0, [0.0] * 9
+    boxes = found.halves or (0.0,) * 6
+    across = boxes[0], boxes[1], boxes[3], boxes[4]
+    distant = (APART if any(across) else ALONG) if found.halves else BEYOND
+    kind = {HEIGHT: ABOVE, PLACE: distant}.get(found.places, 0)
+    return kind, [found.limit, found.margin, *boxes, found.parallel]
 
 
 def _length(edges: tuple[Edge, ...]) -> float:

@@ -33,8 +33,8 @@ class Mechanism(NamedTuple):
     spring: Index  # (edges,): component of the potential, −1: none
     friction: Index  # (edges,): component, −1: none
     heat: Index  # (edges,): entropy that takes the friction's heat
-    support: Index  # (edges,): 0, or where both components vanish: `ABOVE` a plane, `BEYOND` a distance, boxes `APART`
-    reach: Array  # (edges, 8): from which height or distance on; margin and half lengths of the boxes
+    support: Index  # (edges,): 0, or where both components vanish, see `ephs.mechanics.tree.sweeps.acting.Acting`
+    reach: Array  # (edges, 9): from which height or distance on; margin, half lengths of the boxes, angle of segments
     driven: Index  # (tree degrees of freedom,): 1 where the rate is prescribed
     armature: Array  # (tree degrees of freedom,): inertia on the rate itself
     node: Index  # (entropies,): component of the storage, −1: the environment, −2: a state of an attachment

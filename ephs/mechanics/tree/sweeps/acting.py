@@ -28,8 +28,8 @@ from ephs.semantics.stage import (
     vector,
 )
 
-ABOVE, BEYOND, APART = 1, 2, 3
-"""End of a spring's action: above a plane z = reach of its first frame, beyond a distance from it."""
+ABOVE, BEYOND, APART, ALONG = 1, 2, 3, 4
+"""End of a spring's action: above a plane z = reach of its first frame, beyond a distance, apart boxes or segments."""
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
 
@@ -136,7 +136,10 @@ class Acting(Record):
     support, reach
         `ABOVE` or `BEYOND`: where the second frame's place in the first is higher or farther, nothing acts; else 0.
     halves, margin
-        Of `APART`: nor where boxes of these half lengths about both frames are farther from each other.
+        Of `APART`: nor where boxes of these half lengths about both frames are farther from each other; of `ALONG`:
+        boxes that are segments of the z axes.
+    parallel
+        Square of the sine of the angle between the z axes of `ALONG` below which nothing acts, either.
     inner_turn, inner_at, outer_turn, outer_at
         Its first frame in the first link's, its second in the second's.
     left
@@ -144,6 +147,7 @@ class Acting(Record):
     """
 
     kind = integer()
+    support = integer()
     first = integer()
     second = integer()
     dim = integer()
@@ -154,15 +158,15 @@ class Acting(Record):
     spring = integer()
     friction = integer()
     heat = integer()
-    support = integer()
-    inner_turn = reals(3, 3)
     inner_at = reals(3)
-    outer_turn = reals(3, 3)
     outer_at = reals(3)
-    left = reals(6, 6)
     reach = real()
     margin = real()
+    inner_turn = reals(3, 3)
+    outer_turn = reals(3, 3)
     halves = reals(6)
+    parallel = real()
+    left = reals(6, 6)
 
 
 class Body(Record):
