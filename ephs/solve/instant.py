@@ -14,6 +14,7 @@ from ephs.operad import Path, Quantity
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.extents import room
+from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
@@ -163,7 +164,7 @@ def _constraints(d: Descriptor, x: Array) -> Array:
     for slot in d.components:
         if slot.multipliers and isinstance(slot.primitive, Reversible):
             _, constraint = slot.primitive.structure(d.point(slot, x))
-            _place(out, slot, constraint)
+            _place(out, slot, uncancelled(constraint, slot.efforts))
     return out
 
 

@@ -16,6 +16,7 @@ from ephs.operad import Path
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives import Reversible
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.instant import Mobility, is_velocity
@@ -95,7 +96,7 @@ def _conditions(
     for slot in d.components:
         if not (slot.multipliers and isinstance(slot.primitive, Reversible)):
             continue
-        _, constraint = slot.primitive.structure(d.point(slot, x))
+        constraint = uncancelled(slot.primitive.structure(d.point(slot, x))[1], slot.efforts)
         blocks: dict[int, Array] = {}
         for column, effort in enumerate(slot.efforts):
             if effort in junction_of:

@@ -12,8 +12,9 @@ from ephs.semantics.derive.relations import compiled
 from ephs.semantics.descriptor import Descriptor, Input
 from ephs.semantics.kept import once
 from ephs.semantics.kernel_table import Callback
+from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.numbering import spans, starts, sums
-from ephs.semantics.primitives import Primitive
+from ephs.semantics.primitives import Primitive, Reversible
 from ephs.semantics.spaces import manifold
 from ephs.solve.layout import entry_of, laid_out
 from ephs.solve.methods.newton import natural_program
@@ -342,3 +343,29 @@ def evaluate_at(model: Model, x: Array, z: Array, h: float) -> tuple[int, int, M
     """Residual and matrix at a point, for analysis and tests: (status, component, memory that holds them)."""
     evaluation = Evaluation(model)
     return *evaluation.at(x, z, h), evaluation.memory
+
+
+def without_cancelled(model: Model, x: Array, values: Array) -> Array:
+    """Entries of the matrix, those of constraints zero where ports of one component cancel each other on a junction."""
+    t, d = model.tables, model.descriptor
+
+    def found() -> tuple[int, ...]:
+        owner = np.repeat(np.arange(t.kind.size), t.dims[:, 0])
+        efforts = t.e_index[: owner.size] + t.counts[1] * owner
+        shared = np.setdiff1d(np.arange(owner.size), np.unique(efforts, return_index=True)[1])
+        return tuple(np.unique(owner[shared]).tolist())
+
+    out = values.copy()
+    for number in once(d, "components with ports that share a junction", found):
+        slot = d.components[number]
+        if slot.multipliers and isinstance(slot.primitive, Reversible):
+            _, constraint = slot.primitive.structure(d.point(slot, x))
+            (k, n), width = constraint.shape, int(t.dims[number, :3].sum())
+            left = uncancelled(constraint, slot.efforts)
+            gone = np.zeros((k, width), dtype=bool)
+            gone[:, :n] = left != constraint
+            gone[:, n:] = gone.any(axis=1, keepdims=True) & ~left.any(axis=1, keepdims=True)  # by states, all rounding
+            first = t.jacobian_at[number] + width * n
+            place = t.jacobian[first : first + width * k].reshape(k, width)
+            out[place[gone & (place >= 0)]] = 0.0
+    return out

@@ -1,9 +1,15 @@
-"""Sums over many steps that lose no more than rounding of their terms.
+"""Sums that know what of them is rounding: over many steps, and of entries in one place.
 
 Knuth, *The Art of Computer Programming* 2, 4.2.2, theorem B. Numbers are floats, arrays, or abstract ones.
 """
 
+from collections.abc import Iterable, Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ephs.semantics.spaces.rank import ROUNDED
 
 
 def grown(total: Any, carry: Any, change: Any) -> tuple[Any, Any]:
@@ -12,3 +18,23 @@ def grown(total: Any, carry: Any, change: Any) -> tuple[Any, Any]:
     found = total + wanted
     taken = found - total
     return found, (total - (found - taken)) + (wanted - taken)
+
+
+def summed(shape: tuple[int, int], terms: Iterable[tuple[Sequence[int], Sequence[int], NDArray[Any]]]) -> NDArray[Any]:
+    """Matrix of all terms (rows, columns, entries); what rounding leaves where entries cancel is no entry."""
+    total, gross = np.zeros(shape), np.zeros(shape)
+    for rows, columns, entries in terms:
+        np.add.at(total, np.ix_(rows, columns), entries)
+        np.add.at(gross, np.ix_(rows, columns), np.abs(entries))
+    return np.where(np.abs(total) > ROUNDED * gross, total, 0.0)
+
+
+def uncancelled(matrix: NDArray[Any], columns: Sequence[int]) -> NDArray[Any]:
+    """Matrix (k, n) whose columns lie in these places, without the entries of a row that cancel in one place.
+
+    Ports of one component may share a junction: what rounding leaves of a constraint there is no equation.
+    """
+    if len(set(columns)) == len(columns):
+        return matrix
+    same = np.equal.outer(columns, columns).astype(float)
+    return np.where(np.abs(matrix @ same) > ROUNDED * (np.abs(matrix) @ same), matrix, 0.0)

@@ -1,6 +1,6 @@
 """The flat route to a system's relation: one level, one matrix, all unknowns eliminated at once."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import final
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.linear.sums import summed
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.relations.base import BasePoint, StateClass, sorted_classes
 from ephs.semantics.relations.linear import LinearRelation, linear_parts, power_ports
-from ephs.semantics.spaces.rank import ROUNDED
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import System
 
@@ -82,9 +82,9 @@ class Flat:
                 balance.append((mine, lam, constraint[:, where].T))
         balance += [(efforts[port], flows[port], -np.eye(dim)) for port, dim in outer]
         one = columns.take(1)[0]
-        equations = [_summed((sum(map(len, efforts.values())), one + 1), balance)]
+        equations = [summed((sum(map(len, efforts.values())), one + 1), balance)]
         for at, entries in rows:
-            equations.append(_summed((entries.shape[0], one + 1), [(range(entries.shape[0]), at, entries)]))
+            equations.append(summed((entries.shape[0], one + 1), [(range(entries.shape[0]), at, entries)]))
         for at, values in constants:
             row = np.zeros((len(at), one + 1))
             row[range(len(at)), at] = 1.0
@@ -98,16 +98,6 @@ class Flat:
             Subspace.from_kernel(np.vstack(equations)).project([*kept, one]),
             point.unit,
         )
-
-
-def _summed(shape: tuple[int, int], terms: Iterable[tuple[range, range | list[int], Array]]) -> Array:
-    """The matrix of all terms: rows, columns, entries. Ports of one component may share a junction, so that entries
-    are added; what rounding leaves where they cancel is no entry."""
-    total, gross = np.zeros(shape), np.zeros(shape)
-    for where, at, entries in terms:
-        np.add.at(total, np.ix_(where, at), entries)
-        np.add.at(gross, np.ix_(where, at), np.abs(entries))
-    return np.where(np.abs(total) > ROUNDED * gross, total, 0.0)
 
 
 @dataclass(slots=True)

@@ -1,6 +1,8 @@
 """Evaluation with intervals, rounded outwards: bounds of a function on a box.
 
-Where a divisor is zero there is no value to bound.
+An operation that is undefined somewhere on the box (a divisor of zero, the root or logarithm of a negative number, a
+difference of infinities) has no bounds, nor has what is computed from it, and comparisons with it are undecided: where
+it is not a number they are false, whatever the order.
 """
 
 import math
@@ -37,19 +39,16 @@ class Interval(Number):
             case "-":
                 return _out((a - d, b - c))
             case "*":
-                return _out([_times(x, y) for x in (a, b) for y in (c, d)])
+                return _out([x * y for x in (a, b) for y in (c, d)])
             case "/":
-                if c < 0.0 < d or c == d == 0.0:
-                    return _WHOLE
-                inverse = (1.0 / d if d else -math.inf, 1.0 / c if c else math.inf)
-                if c and d:
-                    return _out([_over(x, y) for x in (a, b) for y in (c, d)])
-                return _out([_times(x, y) for x in (a, b) for y in inverse], ulps=2)
+                return _WHOLE if c <= 0.0 <= d else _out([x / y for x in (a, b) for y in (c, d)])
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
         if order in (">", ">="):
             left, right = right, left
         (a, b), (c, d) = _of(left), _of(right)
+        if _BOUNDLESS in ((a, b), (c, d)):
+            return Undecided()
         if order in ("<", ">"):
             return True if b < c else False if a >= d else Undecided()
         return True if b <= c else False if a > d else Undecided()
@@ -71,25 +70,23 @@ def _of(number: Real) -> tuple[float, float]:
     return number, number
 
 
-def _times(a: float, b: float) -> float:
-    return 0.0 if a == 0.0 or b == 0.0 else a * b
-
-
-def _over(a: float, b: float) -> float:
-    return math.copysign(0.0, a) if math.isinf(b) else a / b
-
-
 def _out(values: list[float] | tuple[float, ...], ulps: int = 1) -> Interval:
-    """Return the hull of values, widened by their rounding."""
+    """Return the hull of values, widened by their rounding, which changes no sign."""
     if any(math.isnan(value) for value in values):
         return _WHOLE
-    low, high = min(values), max(values)
+    low, high = min(values, key=_signed), max(values, key=_signed)
     for _ in range(ulps):
-        low, high = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
+        low = low if _signed(low) == (0.0, 1.0) else math.nextafter(low, -math.inf)
+        high = high if _signed(high) == (0.0, -1.0) else math.nextafter(high, math.inf)
     return Interval(low, high)
 
 
-_WHOLE: Final = Interval(-math.inf, math.inf)
+def _signed(value: float) -> tuple[float, float]:
+    return value, math.copysign(1.0, value)
+
+
+_BOUNDLESS: Final = (-math.inf, math.inf)
+_WHOLE: Final = Interval(*_BOUNDLESS)
 
 
 def _clipped(interval: Interval, least: float, most: float = math.inf) -> Interval:
@@ -97,7 +94,7 @@ def _clipped(interval: Interval, least: float, most: float = math.inf) -> Interv
 
 
 def _sqrt(low: float, high: float) -> Interval:
-    return _WHOLE if high < 0.0 else _clipped(_out((math.sqrt(max(low, 0.0)), math.sqrt(high))), 0.0)
+    return _WHOLE if low < 0.0 else _out((math.sqrt(low), math.sqrt(high)))
 
 
 def _absolute(low: float, high: float) -> Interval:
@@ -114,13 +111,15 @@ def _exp(low: float, high: float) -> Interval:
 
 
 def _log(low: float, high: float) -> Interval:
-    if high <= 0.0:
+    if low < 0.0:
         return _WHOLE
-    return _out((math.log(low) if low > 0.0 else -math.inf, math.log(high)), _ULPS)
+    return _out([math.log(end) if end else -math.inf for end in (low, high)], _ULPS)
 
 
 def _wave(low: float, high: float, peak: float) -> Interval:
     """Bound the cosine of x − peak."""
+    if math.isinf(low) or math.isinf(high):
+        return _WHOLE
     if max(abs(low), abs(high)) > _FAR:
         return Interval(-1.0, 1.0)
     turn, near = 2.0 * math.pi, NEAR
@@ -164,7 +163,10 @@ class Intervals(Interpreted):
     """Evaluation with intervals; a condition that is not decided chooses both."""
 
     def _function(self, name: Function, *arguments: Real) -> Real:
-        return _ONE[name](*_of(*arguments)) if name in _ONE else _TWO[name](*(_of(x) for x in arguments))
+        ends = [_of(argument) for argument in arguments]
+        if _BOUNDLESS in ends:
+            return _WHOLE
+        return _ONE[name](*ends[0]) if name in _ONE else _TWO[name](ends[0], ends[1])
 
     def _known(self, truth: Condition, what: str) -> bool:
         raise StageError("undecided", what=what, found="on the box")

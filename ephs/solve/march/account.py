@@ -17,7 +17,7 @@ MOST = 10.0
 """Largest correction of a state with chosen steps, in errors allowed by the tolerance."""
 WORTH = 0.1
 """Error of a step beside the correction that it needs: steps are refused whose correction is ten times what a tolerance
-allows."""
+allows. What cannot be corrected counts in full."""
 
 
 class Account(Record):

@@ -16,7 +16,7 @@ from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING, Order, OrderOf
-from ephs.solve.model import Model, evaluate_at
+from ephs.solve.model import Model, evaluate_at, without_cancelled
 from ephs.solve.sparse import Index, order
 
 SHRUNK = 1e-6
@@ -69,7 +69,7 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
     if status:
         raise SolveError.of_component(status, model, component)
     values = memory.data
-    dropped = dependent_rows(model, values, before)
+    dropped = dependent_rows(model, x, values, before)
     diagonal = np.arange(size) + t.row.size - size
     active = np.ones(t.row.size, dtype=bool)
     active[diagonal] = dropped == 1
@@ -106,7 +106,7 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
 
 
 def dependent_rows(
-    model: Model, values: Array, before: Index | None = None, rather: NDArray[np.bool_] | None = None
+    model: Model, x: Array, values: Array, before: Index | None = None, rather: NDArray[np.bool_] | None = None
 ) -> Index:
     """Marks constraint equations that depend on the others: (rows,) of 0 and 1.
 
@@ -129,6 +129,7 @@ def dependent_rows(
     rows = model.constraint_rows
     if not rows.size:
         return out
+    values = without_cancelled(model, x, values)
     of = np.full(size, -1)
     of[rows] = np.arange(rows.size)
     constrained = of[t.row] >= 0

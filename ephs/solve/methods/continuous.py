@@ -16,7 +16,7 @@ from ephs.semantics.bundle import Array
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING
 from ephs.solve.methods.stored import guessed_efforts
-from ephs.solve.model import Evaluation, Model
+from ephs.solve.model import Evaluation, Model, without_cancelled
 
 
 @final
@@ -116,7 +116,7 @@ class Continuous:
         rest[: t.counts[0]] = 0.0
         self._evaluate(x, rest, 1.0, inputs)
         states = 2.0 * (self._memory.data - unknowns)
-        return Matrices(whole(unknowns), whole(states))
+        return Matrices(whole(without_cancelled(self.model, x, unknowns)), whole(states))
 
     def instant(self, x: Array, z: Array, inputs: Array) -> Instant:
         """Powers and energies at (x, z)."""

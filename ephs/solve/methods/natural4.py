@@ -231,7 +231,7 @@ class Natural4:
             if status:
                 raise SolveError.of_component(status, model, component)
             values = np.where(np.isin(t.row, model.constraint_rows), memory.data, values)
-        dropped = self._dropped = dependent_rows(model, values, self._dropped, self._closing)
+        dropped = self._dropped = dependent_rows(model, x, values, self._dropped, self._closing)
         s = self._scratch
         fault = gauss_program().compiled()["linearise"](
             parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), model.scal(INSTANT),

@@ -20,8 +20,9 @@ from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.engine.storing import store_attached
 from ephs.mechanics.tree.sweeps.acting import Body
 from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
-from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account, rounding, stretch
+from ephs.solve.march.account import BEYOND, MOST, ROUNDING, WORTH, Account, rounding, stretch
 from ephs.solve.march.storing import Missing
 
 if TYPE_CHECKING:
@@ -235,7 +236,8 @@ class Correction(Missing):
         """Move the rates, no further than chosen steps may."""
         on, w, account = self.on, self.motion.work, self.account
         share = self._share(twice)
-        share = on.select(on.absolute(share) <= FARTHEST, share, 0.0)
+        near = on.absolute(share) <= FARTHEST
+        share = on.select(near, share, 0.0)
         chosen = on.both(on.same(account.chosen, 1), size > MOST)
         alpha = stretch(on, share) * on.select(chosen, MOST / on.select(chosen, size, 1.0), 1.0)
 
@@ -244,7 +246,8 @@ class Correction(Missing):
 
         on.loop(self.r.size, one)
         moved = twice * alpha * (1.0 + 0.5 * alpha)
-        account.moved, account.size = moved, size
+        mended = on.either(near, self.motion.tables.own[0].attached > 0)
+        account.moved, account.size = moved, on.select(mended, size, size / WORTH)
         self.energies[0] = self.energies[0] + moved
 
     def _everything(self, twice: Real) -> None:
@@ -273,16 +276,22 @@ class Correction(Missing):
             unsound = on.negate(on.same(self.status.value, 0))
             return on.either(on.either(unsound, self.close), rounds.value >= ROUNDS)
 
+        def size(far: Real) -> Real:
+            here = far * self._size(w.direction, self.r.size)
+            there = far * self.h * self.h * self._size(w.descent, 0)
+            return on.sqrt(0.5 * (here * here + there * there))
+
         def go() -> None:
             on.repeat(once)
-            n, far = self.r.size, on.absolute(gone.value)
-            here = far * self._size(w.direction, n)
-            there = far * self.h * self.h * self._size(w.descent, 0)
-            self.account.size = on.sqrt(0.5 * (here * here + there * there))
+            self.account.size = size(on.absolute(gone.value))
             self.account.moved = first.value - self.short
 
+        def stay() -> None:
+            share = 2.0 * on.absolute(self.short) / on.maximum(whole.value, TINY)
+            self.account.size = size(stretch(on, share)) / WORTH
+
         within = on.both(whole.value > 0.0, on.absolute(self.short) <= FARTHEST * whole.value)
-        on.when(on.both(within, on.same(self.status.value, 0)), go)
+        on.when(on.same(self.status.value, 0), lambda: on.when(within, go, stay))
 
     def _descend(self) -> None:
         """Write the accelerations from rest by weight and springs, and those of islands that turn by themselves."""

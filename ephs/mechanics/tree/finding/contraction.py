@@ -11,6 +11,7 @@ from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import StateSlot
+from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.sparse import Index
@@ -136,7 +137,7 @@ class _Contraction:
             places = self._places(number)
             left, constraint = primitive.structure({})
             np.add.at(skew, (np.array(places)[:, None], np.array(places)[None, :]), left)
-            for one in constraint:
+            for one in uncancelled(constraint, places):
                 row = np.zeros(count)
                 np.add.at(row, places, one)
                 rows.append(row)
