@@ -102,7 +102,7 @@ def _law(collision: Element, name: str, key: str, draft: Draft) -> dict[str, flo
             else:
                 found[_READ[path]] = value
         elif any(word.strip("-+0.") for word in text.split()) or "bitmask" in path:
-            draft.leave(f"contact parameters, {path.removeprefix('surface ')} of", name)
+            draft.leave(f"contact parameter {path.removeprefix('surface ')} of", name)
     return found
 
 

@@ -25,6 +25,9 @@ KINDS = {
 }
 AXIAL = ("revolute", "prismatic", "planar")
 ROOT = "root_joint"
+_BULLET = {"lateral_friction": "friction", "stiffness": "stiffness"}
+"""Elements of Bullet's ``<contact>`` in a link -> keys of surfaces."""
+_LINK = ("inertial", "visual", "collision", "contact")
 _PASSED_BY = {"gazebo": "simulator tags", "sensor": "sensors"}
 
 
@@ -58,7 +61,8 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
     for number, element in enumerate(root.findall("transmission")):
         _transmission(element, element.get("name") or f"transmission_{number + 1}", joints, draft)
     for name, joint in joints.items():
-        if _attribute(joint.find("limit"), "effort", f"joints.{name}.limit", draft, 0.0) and not draft.driven(name):
+        effort = _attribute(joint.find("limit"), "effort", f"joints.{name}.limit", draft, 0.0)
+        if effort and KINDS[str(joint.get("type"))] in ("revolute", "prismatic") and not draft.driven(name):
             draft.leave("limits of effort of", name)
         for tag in ("safety_controller", "calibration"):
             if joint.find(tag) is not None:
@@ -125,6 +129,9 @@ def _link(name: str, link: Element, draft: Draft) -> None:
             lambda entry: _attribute(entries, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
         )
         draft.body(name, mass, turned_tensor(place[:4], rows), place[4:])
+    for other in link:
+        if other.tag not in _LINK:
+            draft.leave("elements of links", f"{other.tag} of {name}")
     for number, visual in enumerate(link.findall("visual")):
         for solid in _solids(visual, f"links.{name}.visual[{number}]", draft):
             draw(draft, name, *solid)
@@ -157,13 +164,20 @@ def _collisions(name: str, link: Element, law: Mapping[str, Any], draft: Draft) 
     if found and not draft.contact:
         draft.leave("contacts of", name)
         return
+    bullet: dict[str, float] = {}
+    for element in link.findall("contact/*"):
+        value = _attribute(element, "value", f"links.{name}.contact.{element.tag}", draft, 0.0)
+        if element.tag in _BULLET:
+            bullet[_BULLET[element.tag]] = value
+        elif value:
+            draft.leave("contact parameters", f"{element.tag} of {name}")
     for number, collision in enumerate(found):
         own = collision.get("name") or (f"{name}_{number + 1}" if len(found) > 1 else name)
         for solid in _solids(collision, f"links.{name}.collision[{number}]", draft):
-            collide(draft, name, own, *solid, law)
+            collide(draft, name, own, *solid, {**law, **bullet})
         for other in collision:
-            if other.tag not in ("origin", "geometry"):
-                draft.leave("contact parameters", f"{other.tag} of {name}")
+            if other.tag not in ("origin", "geometry", "material"):
+                draft.leave("elements of collisions", f"{other.tag} of {name}")
 
 
 def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> None:

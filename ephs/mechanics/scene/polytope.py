@@ -11,6 +11,8 @@ MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""
 FLAT = 1e-5
 """Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes."""
+BLOCK = 2**22
+"""Numbers that are in memory at a time for the depth of vertices."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 HEAD = 84
 """Bytes before the triangles of a binary file: 80 of text, and their number."""
@@ -66,7 +68,10 @@ def depth_inside(points: Array) -> float:
 
 
 def _inside(faces: Array, points: Array) -> float:
-    return -float((faces[:, :3] @ points.T + faces[:, 3:]).max(axis=0).min())
+    """Greatest depth of points (n, 3) below the nearest of faces (m, 4), in blocks of moderate memory."""
+    each = np.unique(points, axis=0)
+    blocks = np.array_split(each, 1 + len(each) * len(faces) // BLOCK)
+    return max(-float((faces[:, :3] @ block.T + faces[:, 3:]).max(axis=0).min()) for block in blocks)
 
 
 def largest_hull(points: Array) -> tuple[Array, float]:

@@ -133,6 +133,19 @@ def test_links_of_a_urdf_meet_a_floor_and_not_each_other(tmp_path):
         assert all(contact.law == law for contact in each.contacts.values())
 
 
+def test_a_link_has_the_numbers_that_bullet_reads(tmp_path):
+    numbers = '<contact><lateral_friction value="0.25"/><stiffness value="3e4"/></contact>'
+    loaded(robot(collision(SOLIDS["sphere"][0]) + numbers), tmp_path, "urdf")
+    floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n'
+    (tmp_path / "hall.toml").write_text(
+        'format = 1\nname = "hall"\n[parts.it]\nuse = "model.urdf"\n' + floor, encoding="utf-8"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scene = ephs.load(tmp_path / "hall.toml", "free", contact=True)
+    assert [each.law for each in scene.contacts.values()] == [Law(3e4, loss=LOSS, friction=0.25, slip=SLIP)]
+
+
 def test_an_sdf_rests_on_its_ground_with_the_numbers_of_both(tmp_path):
     kp = "<surface><contact><ode><kp>2e4</kp></ode></contact><friction><ode><mu>0.7</mu></ode></friction></surface>"
     soft = "<contact><ode><kp>6e4</kp></ode></contact>"
@@ -195,7 +208,12 @@ URDF_NOTES = {
     "broken": (robot(collision('<mesh filename="broken.stl"/>')), r"contacts with meshes that cannot be read: broken"),
     "flat": (robot(collision('<mesh filename="flat.obj"/>')), "contacts with meshes that have no volume: l0"),
     "concave": (robot(collision('<mesh filename="dent.obj"/>')), "contacts inside of convex hulls: l0, 0.25 m deep"),
-    "parameters": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "contact parameters: verbose of l0"),
+    "collision": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "elements of collisions: verbose of l0"),
+    "link": (robot("<gravity/>"), "elements of links: gravity of l0"),
+    "restitution": (
+        robot(collision("<box size='1 1 1'/>") + '<contact><restitution value="0.5"/></contact>'),
+        "contact parameters: restitution of l0\n",
+    ),
     "velocity": (
         robot("", "").replace('"fixed">', '"revolute"><limit lower="-1" upper="1" velocity="3" effort="2"/>'),
         "limits of velocity of: j1\n.*limits of effort of: j1",
@@ -223,22 +241,22 @@ SURFACE = "<surface>{}</surface>"
 SDF_NOTES = {
     "kd": (
         SURFACE.format("<contact><ode><kd>10</kd></ode></contact>"),
-        "contact parameters, contact ode kd of: body_c",
+        "contact parameter contact ode kd of: body_c",
     ),
     "rigid": (SURFACE.format("<contact><ode><kp>1e12</kp></ode></contact>"), r"rigid contacts \(kp\) of: body_c"),
     "mu2": (
         SURFACE.format("<friction><ode><mu2>0.2</mu2></ode></friction>"),
-        "contact parameters, friction ode mu2 of: body_c",
+        "contact parameter friction ode mu2 of: body_c",
     ),
     "bounce": (
         SURFACE.format("<bounce><restitution_coefficient>0.5</restitution_coefficient></bounce>"),
-        "contact parameters, bounce restitution_coefficient of: body_c",
+        "contact parameter bounce restitution_coefficient of: body_c",
     ),
     "bitmask": (
         SURFACE.format("<contact><collide_bitmask>0</collide_bitmask></contact>"),
-        "contact parameters, contact collide_bitmask of: body_c",
+        "contact parameter contact collide_bitmask of: body_c",
     ),
-    "count": ("<max_contacts>10</max_contacts>", "contact parameters, max_contacts of: body_c"),
+    "count": ("<max_contacts>10</max_contacts>", "contact parameter max_contacts of: body_c"),
 }
 
 
