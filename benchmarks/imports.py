@@ -9,7 +9,7 @@ import ephs
 
 __all__ = ["table"]
 
-HEAD = ("model", "bodies", "DoF", "actuators", "dry friction", "armatures", "ratios", "contacts", "not modelled")
+HEAD = ("model", "bodies", "DoF", "actuators", "dry friction", "armatures", "ratios", "surfaces", "contacts", "not modelled")
 LOST = "not modelled: "
 
 
@@ -38,9 +38,10 @@ def row(path: Path) -> tuple[str, ...]:
     joints = [joint for _, joint in scene.all_joints()]
     counts = (
         len(scene.bodies), sum(j.dim for j in joints), len(scene.actuators), sum(j.dry is not None for j in joints),
-        sum(j.armature > 0.0 for j in joints), len(scene.gears), len(scene.contacts),
+        sum(j.armature > 0.0 for j in joints), len(scene.gears), len(scene.surfaces),
+        len(scene.contacts),
     )  # fmt: skip
-    told = ", ".join(f"{line.count(',') + 1} {line.partition(':')[0].partition(' that ')[0]}" for line in lost)
+    told = ", ".join(f"{line.count(',') + 1} {line.partition(':')[0].partition(' that ')[0].removesuffix(' of')}" for line in lost)
     return path.name, *(str(count or "") for count in counts), told
 
 

@@ -117,12 +117,18 @@ class Draft:
         elif not np.all(np.isnan(sides)):
             self._joints[self._joint_names[name]]["limits"] = sides
 
-    def surface(self, link: str, name: str, kind: str, value: Any, place: Array) -> str:
-        """A surface of a link; returns its name in the scene."""
+    def surface(self, link: str, name: str, kind: str, value: Any, place: Array, **law: Any) -> str:
+        """A surface of a link, with keys of its table; returns its name in the scene."""
         own = self._own(name, self._surfaces)
         size = {} if kind == "plane" else _plain(value)
-        self._surfaces[own] = {"body": self._names[link], "shape": {kind: size}, **_placed(self._at(link, place))}
+        at = _placed(self._at(link, place))
+        self._surfaces[own] = {"body": self._names[link], "shape": {kind: size}, **at, **law}
         return own
+
+    @property
+    def mass(self) -> float:
+        """Mass of all bodies so far, kg."""
+        return sum(body["mass"] for body in self._bodies.values())
 
     def touch(self, surfaces: tuple[str, str], law: Mapping[str, float]) -> None:
         """A contact of two surfaces."""
@@ -132,7 +138,7 @@ class Draft:
     def hold(self, name: str) -> None:
         """Lock a joint of one degree of freedom."""
         entries = self._joints[self._joint_names[name]]
-        for key in ("armature", "dry"):
+        for key in ("armature", "dry", "limits"):
             entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
 
@@ -204,6 +210,11 @@ class Draft:
         others = {each: table for each, table in self._tendons.items() if each != tendon}
         self._actuators[self._own(name, self._actuators | others)] = found | more
 
+    def driven(self, joint: str) -> bool:
+        """Whether an actuator acts on a joint."""
+        own = self._joint_names[joint]
+        return any(own in actuator.get("joints", ()) for actuator in self._actuators.values())
+
     def shape(self, link: str, kind: str, value: Any, place: Array, **more: Any) -> None:
         """Something to draw on a link."""
         if kind != "mesh" and not np.all(np.asarray(value, dtype=float) > 0.0):
@@ -252,7 +263,8 @@ class Draft:
             **({"gears": self._gears} if self._gears else {}),
             **({"actuators": self._actuators} if self._actuators else {}),
             **({"tendons": self._tendons} if self._tendons else {}),
-            **({"surfaces": self._surfaces, "contacts": self._contacts} if self._contacts else {}),
+            **({"surfaces": self._surfaces} if self._surfaces else {}),
+            **({"contacts": self._contacts} if self._contacts else {}),
         }
 
     def _at(self, link: str, place: Array, *, inverse: bool = True) -> Array:

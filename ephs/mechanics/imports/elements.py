@@ -1,9 +1,13 @@
-"""Common elements of URDF and SDF: named elements, joints with a kind, links that joints name, inertia by entries."""
+"""Common elements of URDF and SDF: named elements, joints with a kind, links that joints name, inertia by entries,
+pictures."""
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 from xml.etree.ElementTree import Element
 
+from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.semantics.bundle import Array
 
 
 def named(root: Element, tag: str, faults: list[Fault]) -> dict[str, Element]:
@@ -47,3 +51,13 @@ def tensor(entry: Callable[[str], float]) -> list[list[float]]:
     rows = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
     found = {name: entry(name) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
     return [[found[name] for name in row] for row in rows]
+
+
+def draw(draft: Draft, link: str, kind: str, value: Any, place: Array) -> None:
+    """A shape for pictures, or a note of it; a mesh has a file and a scale."""
+    if kind == "mesh":
+        draft.mesh(link, value[0], place, value[1])
+    elif kind in ("box", "sphere", "cylinder"):
+        draft.shape(link, kind, value, place)
+    else:
+        draft.leave("shapes", f"{kind} of {link}")

@@ -22,6 +22,8 @@ from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.semantics.spaces import SE3
 
 Inertias = dict[int, tuple[float, Any]]
+SOLREF = (0.02, 1.0)
+"""MuJoCo's default softness."""
 DIMENSIONS = {"free": 6, "spherical": 3, "prismatic": 1, "revolute": 1}
 READ = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
@@ -37,6 +39,7 @@ READ = (
         "site_quat",
     ),
     *("geom_pos", "geom_quat", "geom_size", "mesh_pos", "mesh_quat", "mesh_scale"),
+    *("geom_solref", "geom_friction", "geom_solmix", "pair_solref", "pair_friction", "mesh_vert"),
 )
 
 
@@ -170,6 +173,8 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], dra
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
         if kind in ("revolute", "prismatic") and _limited(model, j):
             draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
+            if draft.contact and (model.jnt_margin[j] or np.any(model.jnt_solref[j] - SOLREF)):
+                draft.leave("softness and margins of limits of", names.joints[j])
         elif model.jnt_limited[j]:
             draft.leave("limits of", names.joints[j])
         before, at = after, pose()

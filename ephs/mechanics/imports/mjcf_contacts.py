@@ -1,52 +1,132 @@
 """Contacts of a compiled MJCF.
 
-Pairs of geoms are those that MuJoCo looks at: bits that match, bodies that are neither one nor parent and child, pairs
-that are not excluded. Its contacts have no stiffness in N/m: the scene's are the model's mass by the square of the time
-constant of ``solref``, so that the model's weight on one contact sinks by g τ².
+Pairs of geoms are those that MuJoCo looks at: the model's own pairs, and others with bits that match, on bodies that
+are neither one nor parent and child, and that are not excluded. Its contacts have no stiffness in N/m: the scene's are
+the model's mass by MuJoCo's stiffness per mass, (τ ζ)⁻² of time constant and damping ratio of ``solref``. At ζ = 1 the
+model's weight on one contact sinks by g τ².
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
 from itertools import combinations
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.imports.collisions import LOSS, SINKING, SLIP, hull, many
 from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
+from ephs.semantics.bundle import Array
 
-LOSS, SLIP = 1.0, 1e-2
-"""Loss in s/m at a damping ratio of 1, and slip velocity in m/s: MuJoCo has neither."""
+SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
+"""MuJoCo's default impedance."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """Parameters of a pair: ``solref`` (2,), sliding, spinning and rolling ``friction`` (3,), and ``condim``."""
+
+    solref: Array
+    friction: Array
+    condim: int
 
 
 def contacts(model: Any, names: Names, draft: Draft) -> None:
     """Surfaces and contacts of a model, or a note of its contacts."""
     mujoco: Any = import_module("mujoco")
     off = model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    pairs = [] if off else list(_pairs(model))
+    pairs = {} if off else _pairs(model, names, draft)
     if not draft.contact:
         for b in sorted({int(model.geom_bodyid[g]) for pair in pairs for g in pair}):
             draft.leave("contacts of", names.bodies[b] or "the world")
         return
     shapes = {g: _shape(model, g) for pair in pairs for g in pair}
-    surfaces: dict[int, str] = {}
+    surfaces: dict[int, tuple[str, int]] = {}
     mass = float(np.sum(model.body_mass[1:]))
-    for one, other in pairs:
+    for (one, other), parameters in pairs.items():
         kinds = (shapes[one] or ("",))[0], (shapes[other] or ("",))[0]
+        told = f"{_named(model, names, one)} and {_named(model, names, other)}"
         if kinds not in PAIRS and kinds[::-1] not in PAIRS:
-            draft.leave("contacts between", f"{_named(model, names, one)} and {_named(model, names, other)}")
+            draft.leave("contacts between", told)
             continue
         for g in (one, other):
             if g not in surfaces:
-                kind, size = shapes[g] or ("", ())
-                place = pose(model.geom_pos[g], model.geom_quat[g])
-                body = names.bodies[int(model.geom_bodyid[g])]
-                surfaces[g] = draft.surface(body, _named(model, names, g), kind, size, place)
-        draft.touch((surfaces[one], surfaces[other]), _law(model, one, other, mass))
+                surfaces[g] = _surface(model, g, shapes[g] or ("", ()), names, draft)
+        if many(kinds, [surfaces[g][1] for g in (one, other)]):
+            draft.leave("contacts between shapes with many edges", told)
+        elif surfaces[one][0] and surfaces[other][0]:
+            draft.touch((surfaces[one][0], surfaces[other][0]), _law(parameters, mass))
+    _softened(model, names, {g for pair in pairs for g in pair}, draft)
 
 
-def _pairs(model: Any) -> Iterator[tuple[int, int]]:
+def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, int]:
+    """The name of a geom's surface, and its number of corners if it is a mesh."""
+    place = pose(model.geom_pos[g], model.geom_quat[g])
+    body, name = names.bodies[int(model.geom_bodyid[g])], _named(model, names, g)
+    if shape[0] == "mesh":
+        return hull(draft, body, name, shape[1], place, {})
+    return draft.surface(body, name, *shape, place), 0
+
+
+def _softened(model: Any, names: Names, touching: set[int], draft: Draft) -> None:
+    """Notes of parameters of contacts without a counterpart."""
+    moved = {
+        "margins of contacts of": np.column_stack([model.geom_margin, model.geom_gap]),
+        "impedance (solimp) of contacts of": model.geom_solimp - SOLIMP,
+        "adhesion of": model.geom_adhesion,
+        "surface velocities of": model.geom_surfacevel,
+    }
+    for what, values in moved.items():
+        for g in sorted(touching):
+            if np.any(values[g]):
+                draft.leave(what, _named(model, names, g))
+    pairs = {
+        "margins of contacts of": np.column_stack([model.pair_margin, model.pair_gap]),
+        "impedance (solimp) of contacts of": model.pair_solimp - SOLIMP,
+        "adhesion of": model.pair_adhesion,
+        "friction that depends on the direction, of": model.pair_friction[:, [0, 3]] - model.pair_friction[:, [1, 4]],
+        "softness of friction (solreffriction) of": model.pair_solreffriction,
+    }
+    for what, values in pairs.items():
+        for p in range(model.npair):
+            if np.any(values[p]):
+                ends = (_named(model, names, int(g[p])) for g in (model.pair_geom1, model.pair_geom2))
+                draft.leave(what, " and ".join(ends))
+
+
+def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Parameters]:
+    """Pairs of geoms with their parameters; those that the model names replace what is found."""
+    found: dict[tuple[int, int], Parameters] = {}
+    for p in range(model.npair):
+        one, other = sorted((int(model.pair_geom1[p]), int(model.pair_geom2[p])))
+        if model.geom_bodyid[one] == model.geom_bodyid[other]:
+            draft.leave("contacts within a body", f"{_named(model, names, one)} and {_named(model, names, other)}")
+            continue
+        friction = model.pair_friction[p, [0, 2, 3]]
+        found[one, other] = Parameters(model.pair_solref[p], friction, int(model.pair_dim[p]))
+    for one, other in _meeting(model):
+        found.setdefault((one, other), _mixed(model, one, other))
+    return found
+
+
+def _mixed(model: Any, one: int, other: int) -> Parameters:
+    """MuJoCo's rule (`mj_contactParam`): the geom of higher priority decides; of equal ones the larger friction and
+    ``condim``, and ``solref`` weighed by ``solmix``."""
+    if model.geom_priority[one] != model.geom_priority[other]:
+        g = one if model.geom_priority[one] > model.geom_priority[other] else other
+        return Parameters(model.geom_solref[g], model.geom_friction[g], int(model.geom_condim[g]))
+    weights, solref = model.geom_solmix[[one, other]], model.geom_solref[[one, other]]
+    share = weights / weights.sum() if weights.sum() > 0.0 else np.array([0.5, 0.5])
+    mixed = share @ solref if np.all(solref[:, 0] > 0.0) else solref.min(axis=0)
+    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
+    return Parameters(mixed, friction, max(int(model.geom_condim[one]), int(model.geom_condim[other])))
+
+
+def _meeting(model: Any) -> Iterator[tuple[int, int]]:
     mujoco: Any = import_module("mujoco")
     loose = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
     excluded = {(int(s) >> 16, int(s) & 0xFFFF) for s in model.exclude_signature}
@@ -78,6 +158,8 @@ def _shape(model: Any, g: int) -> tuple[str, Any] | None:
             return "cylinder", [size[0], 2.0 * size[1]]
         case kinds.mjGEOM_BOX:
             return "box", 2.0 * size
+        case kinds.mjGEOM_MESH:
+            return "mesh", _corners(model, int(model.geom_dataid[g]))
         case _:
             return None
 
@@ -87,15 +169,25 @@ def _named(model: Any, names: Names, g: int) -> str:
     return str(model.geom(g).name) or f"{body}_{g - int(model.body_geomadr[int(model.geom_bodyid[g])])}"
 
 
-def _law(model: Any, one: int, other: int, mass: float) -> dict[str, float]:
-    """Stiffness and loss by the mean of both time constants and damping ratios, the larger friction of both."""
-    solref = np.array([model.geom_solref[g] for g in (one, other)])
-    constants = np.where(solref[:, 0] > 0.0, solref[:, 0], 1.0 / np.sqrt(np.maximum(-solref[:, 0], 1.0)))
-    ratios = np.where(solref[:, 0] > 0.0, solref[:, 1], 1.0)
-    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
-    size = max(int(model.geom_condim[one]), int(model.geom_condim[other]))
-    law = {"stiffness": float(mass / np.mean(constants) ** 2), "loss": float(LOSS * np.mean(ratios)), "slip": SLIP}
-    for key, value, least in (("friction", friction[0], 3), ("spinning", friction[1], 4), ("rolling", friction[2], 6)):
-        if size >= least:
+def _corners(model: Any, m: int) -> Array:
+    """(n, 3) vertices of the convex hull with which MuJoCo collides, in the geom's frame."""
+    start, own = int(model.mesh_graphadr[m]), int(model.mesh_vertadr[m])
+    count = int(model.mesh_graph[start])
+    numbers = model.mesh_graph[start + 2 + count : start + 2 + 2 * count]
+    return np.array(model.mesh_vert[own + numbers], dtype=float)
+
+
+def _law(given: Parameters, mass: float) -> dict[str, float]:
+    first, second = map(float, given.solref)
+    if (first > 0.0) != (second > 0.0) or not first:  # MuJoCo takes its default for a mixture of both formats
+        first, second = SINKING, 1.0
+    if first > 0.0:
+        rate, ratio = 1.0 / max(first * second, 1.0 / LARGEST), second
+    else:  # stiffness and damping per mass, with the sign reversed
+        rate = np.sqrt(-first)
+        ratio = -second / (2.0 * rate)
+    law = {"stiffness": float(mass * rate**2), "loss": float(LOSS * ratio), "slip": SLIP}
+    for key, value, least in zip(("friction", "spinning", "rolling"), given.friction, (3, 4, 6), strict=True):
+        if given.condim >= least:
             law[key] = float(value)
     return law

@@ -16,7 +16,6 @@ from ephs.mechanics.scene.errors import fault
 _SECTIONS = {
     "sensor": "sensors",
     "deformable": "deformables",
-    "contact": "contact pairs and exclusions",
     "extension": "plugins",
 }
 # Actuators and tendons that may have a counterpart, and targets of actuators.
@@ -73,6 +72,7 @@ class Source:
         self._read: set[Path] = set()
         self.assets: dict[str, bytes] = {}
         self._files: dict[str, str] = {}
+        self._gone: set[str] = set()
         self._include(root, draft.folder, 0, 0)
         if draft.faults:
             self.text = ""
@@ -175,8 +175,9 @@ class Source:
             for reference in _REFERENCES:
                 element.attrib.pop(reference, None)
         heights = [(parent, child) for parent, child in _geoms(root) if child.get("type") == "hfield"]
-        for parent, child in heights:
-            parent.remove(child)
+        for number, (parent, child) in enumerate(heights):
+            self._draft.leave("height fields", _called(child, number))
+            self._remove_geom(parent, child)
 
     def _meshes(self, root: Element) -> None:
         """Load meshes of the folder; remove others and their shapes."""
@@ -205,10 +206,20 @@ class Source:
                 self.assets[known] = file.read_bytes()
                 self._files[known] = file.relative_to(self._draft.folder.resolve()).as_posix()
         for parent, child in [pair for pair in _geoms(root) if pair[1].get("mesh") in lost]:
-            parent.remove(child)
+            self._remove_geom(parent, child)
+        for section in root.findall("contact"):
+            for pair in section.findall("pair"):
+                ends = [pair.get(word) or "" for word in ("geom1", "geom2")]
+                if self._gone.intersection(ends):
+                    self._draft.leave("contacts between", " and ".join(ends))
+                    section.remove(pair)
         for element in root.iter():  # whatever else names a file
             if element.get("file") not in self.assets:
                 element.attrib.pop("file", None)
+
+    def _remove_geom(self, parent: Element, geom: Element) -> None:
+        parent.remove(geom)
+        self._gone.add(geom.get("name", ""))
 
     def _check_formula(self, mesh: Element) -> None:
         """Limit of the size of a mesh from a formula."""

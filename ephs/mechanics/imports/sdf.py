@@ -7,8 +7,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
-from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
+from ephs.mechanics.imports.draft import UNLIMITED, WORLD, Draft, along, pose, turned_tensor
+from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, draw, named, tensor
+from ephs.mechanics.imports.sdf_contacts import ground_surfaces, link_surfaces, solids
 from ephs.mechanics.imports.sdf_frames import MODEL, Frames, read_pose
 from ephs.mechanics.imports.xml import numbers
 from ephs.mechanics.scene.errors import fault
@@ -40,9 +41,10 @@ _PASSED_BY = {
 
 def read_sdf(root: Element, draft: Draft) -> None:
     """Links and joints of the only model of a file; unattached links move freely by a joint ``root_joint``."""
-    model = _model(root, draft)
-    if model is None:
+    models = _models(root, draft)
+    if not models:
         return
+    model, *grounds = models
     draft.name = model.get("name") or draft.name
     for inner in model.findall("model") + model.findall("include"):
         found = inner.get("name") or inner.findtext("uri") or inner.tag
@@ -59,18 +61,14 @@ def read_sdf(root: Element, draft: Draft) -> None:
     if draft.faults:
         return
     frames = Frames({**placed, **every, **links}, draft.faults)
-    place = read_pose(model, "model.pose", draft.faults)
-    if frame := model.get("placement_frame"):
-        place = SE3.compose(place, SE3.inverse(frames.at(frame, "model.placement_frame")))
-    if (base := _relative(model)) not in ("", "world"):
-        hint = "place it relative to the world"
-        draft.faults.append(
-            fault("not supported", "model.pose", f'"{base}"', what="other frames than its own", hint=hint)
-        )
+    place = _place(model, frames, draft)
     for name, link in links.items():
         _link(name, link, SE3.compose(place, frames.at(name, f"links.{name}.pose")), draft)
     if not draft.faults:
-        _hold(links, ends, (model.findtext("static") or "").strip() in ("true", "1"), place, frames, draft)
+        _hold(links, ends, _is(model, "static"), place, frames, draft)
+        link_surfaces(model, links, draft)
+        for other in grounds:
+            _ground(other, draft)
     version = tuple(int(word) for word in (root.get("version") or "1.6").split(".")[:2] if word.isdigit())
     for name, joint in joints.items():
         _joint(name, joint, ends[name], place, frames, version, draft)
@@ -79,19 +77,51 @@ def read_sdf(root: Element, draft: Draft) -> None:
             draft.leave(_PASSED_BY[element.tag], element.get("name") or element.tag)
 
 
-def _model(root: Element, draft: Draft) -> Element | None:
+def _models(root: Element, draft: Draft) -> list[Element]:
+    """The only model, or the only one that moves and then the static ones; none where there is a fault."""
     worlds = root.findall("world")
     models = root.findall("model") + [model for world in worlds for model in world.findall("model")]
-    if len(models) != 1:
+    models.sort(key=lambda model: _is(model, "static"))
+    if not models or (len(models) > 1 and not (_is(models[1], "static") and not _is(models[0], "static"))):
         names = ", ".join(model.get("name") or "?" for model in models)
         draft.faults.append(fault("one model", "model", f"{len(models)}: {names}" if models else "none"))
-        return None
+        return []
     for world in worlds:
         if gravity := world.findtext("gravity"):
             draft.gravity = numbers(gravity, 3, "world.gravity", draft.faults)
         for include in world.findall("include"):
             draft.leave("other models of the world", include.findtext("uri") or "?")
-    return models[0]
+    return models
+
+
+def _is(element: Element, word: str) -> bool:
+    return (element.findtext(word) or "").strip() in ("true", "1")
+
+
+def _place(model: Element, frames: Frames, draft: Draft) -> np.ndarray:
+    """The pose (7,) of a model in the world."""
+    place = read_pose(model, "model.pose", draft.faults)
+    if frame := model.get("placement_frame"):
+        place = SE3.compose(place, SE3.inverse(frames.at(frame, "model.placement_frame")))
+    if (base := _relative(model)) not in ("", "world"):
+        hint = "place it relative to the world"
+        draft.faults.append(
+            fault("not supported", "model.pose", f'"{base}"', what="other frames than its own", hint=hint)
+        )
+    return place
+
+
+def _ground(model: Element, draft: Draft) -> None:
+    """Surfaces of a static model, on the ground."""
+    name = model.get("name") or "static"
+    links, joints, placed = (named(model, tag, draft.faults) for tag in ("link", "joint", "frame"))
+    frames = Frames({**placed, **joints, **links}, draft.faults)
+    place = _place(model, frames, draft)
+    if model.find("link/visual") is not None:
+        draft.leave("pictures of static models", name)
+    if model.find("model") is not None or model.find("include") is not None:
+        draft.leave("models within static models", name)
+    ground_surfaces(name, {link: SE3.compose(place, frames.at(link, f"{name}.{link}")) for link in links}, links, draft)
 
 
 def _relative(element: Element) -> str:
@@ -169,32 +199,11 @@ def _link(name: str, link: Element, place: np.ndarray, draft: Draft) -> None:
 
         rows = tensor(entry)
         draft.body(name, mass, turned_tensor(own[:4], rows), own[4:], place)
-    if link.find("collision") is not None:
-        draft.leave("contacts of", name)
     if (link.findtext("gravity") or "").strip() in ("false", "0"):
         draft.leave("absence of gravity on", name)
     for number, visual in enumerate(link.findall("visual")):
-        _visual(name, visual, f"links.{name}.visual[{number}]", draft)
-
-
-def _visual(link: str, visual: Element, key: str, draft: Draft) -> None:
-    geometry, faults = visual.find("geometry"), draft.faults
-    place = read_pose(visual, f"{key}.pose", faults)
-    for solid in () if geometry is None else geometry:
-        at = f"{key}.{solid.tag}"
-        match solid.tag:
-            case "box":
-                draft.shape(link, "box", numbers(solid.findtext("size"), 3, f"{at}.size", faults), place)
-            case "sphere":
-                draft.shape(link, "sphere", numbers(solid.findtext("radius"), 1, f"{at}.radius", faults)[0], place)
-            case "cylinder":
-                size = [numbers(solid.findtext(word), 1, f"{at}.{word}", faults)[0] for word in ("radius", "length")]
-                draft.shape(link, "cylinder", size, place)
-            case "mesh":
-                scale = numbers(solid.findtext("scale"), 3, f"{at}.scale", faults, (1.0, 1.0, 1.0))
-                draft.mesh(link, (solid.findtext("uri") or "").strip(), place, scale)
-            case other:
-                draft.leave("shapes", f"{other} of {link}")
+        for solid in solids(visual, f"links.{name}.visual[{number}]", draft):
+            draw(draft, name, *solid)
 
 
 def _joint(
@@ -225,6 +234,7 @@ def _joint(
         entries["pitch"] = _pitch(joint, key, draft)
     at1, at2 = (_inside(end, framed, place, frames) for end in ends)
     draft.joint(name, kind, *ends, at1, at2, entries)
+    _limits(name, joint, kind, count, draft)
     if joint.find("sensor") is not None:
         draft.leave("sensors", name)
 
@@ -266,8 +276,6 @@ def _dynamics(name: str, joint: Element, kind: str, count: int, draft: Draft) ->
                 what = "a number not below 0"
                 draft.faults.append(fault("range", f"{key}.dynamics.{word}", f"{value:g}", what=what))
             rows[entry].append(value)
-        if axis is not None and axis.find("limit") is not None and kind != "fixed":
-            draft.leave("limits of", name)
         if axis is not None and axis.find("mimic") is not None:
             draft.leave("mimicry of", name)
     if kind == "fixed":
@@ -276,6 +284,30 @@ def _dynamics(name: str, joint: Element, kind: str, count: int, draft: Draft) ->
     if kind == "spherical":
         return {"friction": rows["friction"][0]}
     return dict(rows) if count > 1 else {entry: values[0] for entry, values in rows.items()} | dry
+
+
+def _limits(name: str, joint: Element, kind: str, count: int, draft: Draft) -> None:
+    """Stops of a joint of one degree of freedom, as far as its limits are finite, or a note of them."""
+    for tag in ("axis", "axis2"):
+        limit = joint.find(f"{tag}/limit")
+        if limit is None or kind == "fixed":
+            continue
+        given = {word: limit.findtext(word) for word in ("lower", "upper")}
+        sides = [_bound(given[word], f"joints.{name}.{tag}.limit.{word}", draft) for word in given]
+        if count != 1:
+            draft.leave("limits of", name)
+        elif joint.get("type") != "continuous":
+            draft.limit(name, -sides[0] if given["lower"] is None else sides[0], sides[1])
+        for word in limit:
+            if word.tag not in given and 0.0 <= _bound(word.text, f"joints.{name}.{word.tag}", draft) < UNLIMITED:
+                draft.leave(f"{word.tag} of limits of", name)
+
+
+def _bound(text: str | None, key: str, draft: Draft) -> float:
+    """A limit, infinite where there is none."""
+    if text is None or text.strip().lstrip("+-").lower() in ("inf", "infinity"):
+        return -math.inf if (text or "").strip().startswith("-") else math.inf
+    return numbers(text, 1, key, draft.faults)[0]
 
 
 def _pitch(joint: Element, key: str, draft: Draft) -> float:

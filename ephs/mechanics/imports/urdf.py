@@ -1,12 +1,14 @@
 """URDF: a tree of links. Source: the URDF specification (wiki.ros.org/urdf/XML); spherical joints as in PyBullet."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from ephs.mechanics.imports.collisions import collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
-from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, named, tensor
+from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, draw, named, tensor
 from ephs.mechanics.imports.xml import numbers, vector
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.geometry import coupling
@@ -23,6 +25,9 @@ KINDS = {
 }
 AXIAL = ("revolute", "prismatic", "planar")
 ROOT = "root_joint"
+_BULLET = {"lateral_friction": "friction", "stiffness": "stiffness"}
+"""Elements of Bullet's ``<contact>`` in a link -> keys of surfaces."""
+_LINK = ("inertial", "visual", "collision", "contact")
 _PASSED_BY = {"gazebo": "simulator tags", "sensor": "sensors"}
 
 
@@ -40,6 +45,11 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         return
     for link in links:
         _link(link, links[link], draft)
+    law = default_law(draft) | {"group": draft.name}
+    for name, link in links.items():
+        _collisions(name, link, law, draft)
+    if draft.contact and root.find("link/collision") is not None:
+        draft.leave("contacts between the links of", draft.name)
     free = base == "free"
     draft.joint(ROOT, "free" if free else "fixed", WORLD, order[0], pose(), pose(), {})
     of_child = {child: name for name, (_, child) in ends.items()}
@@ -50,6 +60,13 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         _mimic(name, joint, joints, draft)
     for number, element in enumerate(root.findall("transmission")):
         _transmission(element, element.get("name") or f"transmission_{number + 1}", joints, draft)
+    for name, joint in joints.items():
+        effort = _attribute(joint.find("limit"), "effort", f"joints.{name}.limit", draft, 0.0)
+        if effort and KINDS[str(joint.get("type"))] in ("revolute", "prismatic") and not draft.driven(name):
+            draft.leave("limits of effort of", name)
+        for tag in ("safety_controller", "calibration"):
+            if joint.find(tag) is not None:
+                draft.leave(f"{tag} of", name)
     for element in root:
         if element.tag in _PASSED_BY:
             draft.leave(_PASSED_BY[element.tag], element.get("name") or element.get("reference") or element.tag)
@@ -112,30 +129,55 @@ def _link(name: str, link: Element, draft: Draft) -> None:
             lambda entry: _attribute(entries, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
         )
         draft.body(name, mass, turned_tensor(place[:4], rows), place[4:])
-    if link.find("collision") is not None:
-        draft.leave("contacts of", name)
+    for other in link:
+        if other.tag not in _LINK:
+            draft.leave("elements of links", f"{other.tag} of {name}")
     for number, visual in enumerate(link.findall("visual")):
-        _visual(name, visual, f"links.{name}.visual[{number}]", draft)
+        for solid in _solids(visual, f"links.{name}.visual[{number}]", draft):
+            draw(draft, name, *solid)
 
 
-def _visual(link: str, visual: Element, key: str, draft: Draft) -> None:
-    geometry = visual.find("geometry")
-    place = _origin(visual, key, draft)
+def _solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any, np.ndarray]]:
+    """Kind, sizes and pose of the solids of a visual or collision element; a mesh has a file and a scale."""
+    geometry, faults = element.find("geometry"), draft.faults
+    place = _origin(element, key, draft)
     for solid in () if geometry is None else geometry:
         at = f"{key}.{solid.tag}"
+        value: Any = None
         match solid.tag:
             case "box":
-                draft.shape(link, "box", vector(solid, "size", at, draft.faults, ()), place)
+                value = vector(solid, "size", at, faults, ())
             case "sphere":
-                draft.shape(link, "sphere", _attribute(solid, "radius", at, draft), place)
-            case "cylinder":
-                size = [_attribute(solid, word, at, draft) for word in ("radius", "length")]
-                draft.shape(link, "cylinder", size, place)
+                value = _attribute(solid, "radius", at, draft)
+            case "cylinder" | "capsule":
+                value = [_attribute(solid, word, at, draft) for word in ("radius", "length")]
             case "mesh":
-                scale = vector(solid, "scale", at, draft.faults, (1.0, 1.0, 1.0))
-                draft.mesh(link, solid.get("filename", ""), place, scale)
-            case other:
-                draft.leave("shapes", f"{other} of {link}")
+                value = solid.get("filename", ""), vector(solid, "scale", at, faults, (1.0, 1.0, 1.0))
+            case _:
+                pass
+        yield solid.tag, value, place
+
+
+def _collisions(name: str, link: Element, law: Mapping[str, Any], draft: Draft) -> None:
+    """Surfaces of a link, or a note of its contacts."""
+    found = link.findall("collision")
+    if found and not draft.contact:
+        draft.leave("contacts of", name)
+        return
+    bullet: dict[str, float] = {}
+    for element in link.findall("contact/*"):
+        value = _attribute(element, "value", f"links.{name}.contact.{element.tag}", draft, 0.0)
+        if element.tag in _BULLET:
+            bullet[_BULLET[element.tag]] = value
+        elif value:
+            draft.leave("contact parameters", f"{element.tag} of {name}")
+    for number, collision in enumerate(found):
+        own = collision.get("name") or (f"{name}_{number + 1}" if len(found) > 1 else name)
+        for solid in _solids(collision, f"links.{name}.collision[{number}]", draft):
+            collide(draft, name, own, *solid, {**law, **bullet})
+        for other in collision:
+            if other.tag not in ("origin", "geometry", "material"):
+                draft.leave("elements of collisions", f"{other.tag} of {name}")
 
 
 def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> None:
@@ -165,6 +207,8 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
     if limit is not None and kind in ("revolute", "prismatic") and joint.get("type") != "continuous":
         lower, upper = (_attribute(limit, side, f"{key}.limit", draft, 0.0) for side in ("lower", "upper"))
         draft.limit(name, lower, upper)
+        if _attribute(limit, "velocity", f"{key}.limit", draft, 0.0):
+            draft.leave("limits of velocity of", name)
     elif d and limit is not None:
         draft.leave("limits of", name)
 

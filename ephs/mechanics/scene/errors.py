@@ -137,7 +137,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "no scale": ("a stiffness, since the scene gives no time scale for a default", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
     "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),
-    "surface shape": ("one of sphere, capsule, cylinder, box, plane = {{}}, mesh", "a surface has exactly one shape"),
+    "solid points": ("points of a body with volume", "take a plane or a thin box for what is flat"),
+    "surface shape": (
+        "one of sphere, capsule, cylinder, box, plane = {{}}, mesh, points",
+        "a surface has exactly one shape",
+    ),
     "surface pair": ("one plane at most", "list the pairs in contacts, or use other shapes"),
     "two exponents": ("one exponent", "give both surfaces the same exponent, or one to the contact"),
     "no stiffness": (

@@ -1,4 +1,4 @@
-"""Convex meshes from STL files: their vertices, after a check of convexity."""
+"""Convex meshes: vertices of STL files, after a check of convexity, and of the convex hulls of points."""
 
 from pathlib import Path
 
@@ -11,6 +11,8 @@ MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""
 FLAT = 1e-5
 """Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes."""
+BLOCK = 2**22
+"""Numbers that are in memory at a time for the depth of vertices."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 HEAD = 84
 """Bytes before the triangles of a binary file: 80 of text, and their number."""
@@ -24,7 +26,7 @@ def vertices_of(file: Path) -> Array:
     ValueError
         Fault of the file: it cannot be read, bounds no body, is not convex, or has too many vertices.
     """
-    triangles = _triangles(file)
+    triangles = triangles_of(file)
     if not len(triangles) or not np.all(np.isfinite(triangles)):
         raise ValueError("a file without triangles")
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
@@ -32,8 +34,7 @@ def vertices_of(file: Path) -> Array:
     if hull is None:
         raise ValueError("a mesh without volume")
     corners, faces, volume = hull
-    deepest = faces[:, :3] @ triangles.reshape(-1, 3).T + faces[:, 3:]
-    inside = -float(deepest.max(axis=0).min())
+    inside = _inside(faces, triangles.reshape(-1, 3))
     if inside > FLAT * size:
         raise ValueError(f"a mesh that is not convex: a vertex lies {inside:.3g} m inside its convex hull")
     centre = corners.mean(axis=0)
@@ -43,6 +44,60 @@ def vertices_of(file: Path) -> Array:
     if len(corners) > MOST_VERTICES:
         raise ValueError(f"a mesh of {len(corners)} vertices, more than {MOST_VERTICES}")
     return corners
+
+
+def corners_of(points: Array) -> Array:
+    """(n, 3) vertices of the convex hull of points (m, 3).
+
+    Raises
+    ------
+    ValueError
+        Points in a plane.
+    """
+    hull = _hull(points)
+    if hull is None:
+        raise ValueError("points in a plane")
+    return hull[0]
+
+
+def depth_inside(points: Array) -> float:
+    """Greatest depth in m of points (m, 3) inside their convex hull; 0 for corners of a convex body, or a flat one."""
+    hull = _hull(points)
+    found = 0.0 if hull is None else _inside(hull[1], points)
+    return found if found > FLAT * float(np.ptp(points, axis=0).max()) else 0.0
+
+
+def _inside(faces: Array, points: Array) -> float:
+    """Greatest depth of points (n, 3) below the nearest of faces (m, 4), in blocks of moderate memory."""
+    each = np.unique(points, axis=0)
+    blocks = np.array_split(each, 1 + len(each) * len(faces) // BLOCK)
+    return max(-float((faces[:, :3] @ block.T + faces[:, 3:]).max(axis=0).min()) for block in blocks)
+
+
+def largest_hull(points: Array) -> tuple[Array, float]:
+    """At most `MOST_VERTICES` of the vertices (n, 3) of the convex hull of points (m, 3), and the distance in m of the
+    farthest point outside of their hull. Those farthest outside are taken first.
+
+    Raises
+    ------
+    ValueError
+        Points in a plane.
+    """
+    from scipy.spatial import ConvexHull
+
+    corners = corners_of(points)
+    if len(corners) <= MOST_VERTICES:
+        return corners, 0.0
+    taken = ConvexHull(corners, qhull_options="Qt TA4").vertices
+    while True:
+        faces = ConvexHull(corners[taken]).equations
+        heights = faces[:, :3] @ corners.T + faces[:, 3:]
+        outside = heights.max(axis=1)
+        if len(taken) == MOST_VERTICES:
+            return corners[taken], float(outside.max())
+        new = np.unique(heights[outside > 0.5 * outside.max()].argmax(axis=1))
+        order = np.argsort(-heights.max(axis=0)[new], kind="stable")
+        taken = np.append(taken, new[order][: MOST_VERTICES - len(taken)])
 
 
 def _spans(triangles: Array) -> tuple[Array, Array]:
@@ -60,8 +115,14 @@ def _hull(points: Array) -> tuple[Array, Array, float] | None:
     return hull.points[hull.vertices], hull.equations, float(hull.volume)
 
 
-def _triangles(file: Path) -> Array:
-    """(n, 3, 3) of an STL file."""
+def triangles_of(file: Path) -> Array:
+    """(n, 3, 3) corners of the triangles of an STL file, text or binary.
+
+    Raises
+    ------
+    ValueError
+        A file that cannot be read.
+    """
     if not file.is_file() or file.stat().st_size > MOST_BYTES:
         raise ValueError(f"no file of at most {MOST_BYTES // 1_000_000} MB")
     data = file.read_bytes()

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from ephs.mechanics.scene.polytope import MOST_VERTICES
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import (
     Entry,
@@ -20,7 +21,7 @@ from ephs.mechanics.scene.schema_numbers import (
 
 
 class SurfaceShapeEntry(Entry):
-    """``shape`` of a surface: one of six."""
+    """``shape`` of a surface: one of seven."""
 
     sphere: Positive | None = key("radius, m", None)
     capsule: Sizes | None = key("radius, and length of its axis along z, m", None)
@@ -28,6 +29,9 @@ class SurfaceShapeEntry(Entry):
     box: Extents | None = key("edge lengths, m", None)
     plane: Annotated[dict[str, Number], Field(max_length=0)] | None = key("the plane z = 0, solid below", None)
     mesh: Text | None = key("STL file of a convex body; m", None)
+    points: Annotated[list[Vector], Field(min_length=4, max_length=MOST_VERTICES)] | None = key(
+        "points of which the body is the convex hull, m", None
+    )
 
 
 class ContactLawEntry(Entry):
@@ -53,9 +57,10 @@ class SurfaceEntry(ContactLawEntry):
     """``[surfaces.NAME]``"""
 
     body: Text = key('the body that has it, or "ground"')
-    shape: SurfaceShapeEntry = key("sphere, capsule, cylinder, box, plane or mesh")
+    shape: SurfaceShapeEntry = key("sphere, capsule, cylinder, box, plane, mesh or points")
     position: Vector | None = key("origin in the centre-of-mass frame (ground: world), m", None)
     rotation: Rotation | None = key("orientation there, [w, x, y, z] or a table", None)
+    group: Text | None = key("surfaces of one group of a file are a contact only where [contacts] names them", None)
 
 
 class ContactEntry(ContactLawEntry):

@@ -16,7 +16,7 @@ from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, fault, unknown
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
-from ephs.mechanics.scene.polytope import vertices_of
+from ephs.mechanics.scene.polytope import corners_of, vertices_of
 from ephs.mechanics.scene.resolve import Names, mesh_file
 from ephs.mechanics.scene.schema import JointEntry
 from ephs.mechanics.scene.schema_touching import ContactEntry, ContactLawEntry, SurfaceEntry
@@ -73,6 +73,12 @@ def _shape(table: Checked[SurfaceEntry], key: str, folder: Path, faults: list[Fa
             return {"mesh": vertices_of(file).tolist()}
         except (ValueError, OSError) as error:
             faults.append(fault("convex mesh", f"{key}.shape.mesh", f"{file.name}, {error}"))
+            return None
+    if "points" in given:
+        try:
+            return {"mesh": corners_of(np.array(given["points"])).tolist()}
+        except ValueError as error:
+            faults.append(fault("solid points", f"{key}.shape.points", str(error)))
             return None
     return given
 
@@ -175,7 +181,8 @@ def resolve_contacts(
             one, other = (surfaces[each] for each in table.entry.surfaces)
             _add(found, name, key, one, other, (table.entry, laws[one.name], laws[other.name]), faults)
     if not tables:
-        for one, other in _meeting(scene, surfaces):
+        groups = {n: t.entry.group for n, t in document.sections["surfaces"].items() if t.entry.group is not None}
+        for one, other in _meeting(scene, surfaces, groups):
             name = f"{one.name}_{other.name}".replace(".", "_")
             key = f"surfaces.{one.name} and surfaces.{other.name}"
             _add(found, name, key, one, other, (laws[one.name], laws[other.name]), faults)
@@ -254,9 +261,11 @@ def _hard(laws: tuple[ContactLawEntry, ...]) -> Impact | None:
     return Impact(min(given("restitution")), min(given("friction"), default=0.0), tangential)
 
 
-def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Surface, Surface]]:
-    """Pairs of surfaces on different bodies without a common joint, and not of the same part; of a beam's pieces
-    those further apart along it than half a circle of its radius: nearer ones cannot touch."""
+def _meeting(
+    scene: Scene, surfaces: Mapping[str, Surface], groups: Mapping[str, str]
+) -> Iterator[tuple[Surface, Surface]]:
+    """Pairs of surfaces on different bodies without a common joint but a free one, and not of the same group or part;
+    of a beam's pieces those further apart along it than half a circle of its radius: nearer ones cannot touch."""
     for beam in scene.beams.values():
         pieces = [surfaces[node] for node in beam.nodes if node in surfaces]
         sizes = np.array([piece.shape["capsule"] for piece in pieces]).reshape(-1, 2)
@@ -264,10 +273,11 @@ def _meeting(scene: Scene, surfaces: Mapping[str, Surface]) -> Iterator[tuple[Su
         for i, j in combinations(range(len(pieces)), 2):
             if upto[j] - upto[i + 1] > np.pi * sizes[i, 0]:
                 yield pieces[i], pieces[j]
-    joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints()}
+    joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints() if j.kind != "free"}
     level = [[each] for name, each in surfaces.items() if "." not in name]
     level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
     for some, others in combinations(level, 2):
         for one, other in product(some, others):
-            if one.body != other.body and frozenset((one.body, other.body)) not in joined:
+            apart = one.body != other.body and frozenset((one.body, other.body)) not in joined
+            if apart and (one.name not in groups or groups[one.name] != groups.get(other.name)):
                 yield one, other

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import ephs
-from ephs.mechanics.scene.polytope import vertices_of
+from ephs.mechanics.scene.polytope import MOST_VERTICES, largest_hull, vertices_of
 
 SCENE = """
 format = 1
@@ -82,6 +82,47 @@ def test_a_mesh_of_a_box_moves_as_the_box(law, tmp_path):
     assert other == pytest.approx(one, abs=1e-8)
     assert runs[1].heat[-1] == pytest.approx(runs[0].heat[-1], abs=1e-8)
     assert runs[0].heat[-1] > 1e-3
+
+
+def test_points_are_the_corners_of_a_mesh(tmp_path):
+    (tmp_path / "cube.stl").write_bytes(binary_stl(cube()))
+    inner = [*np.unique(cube().reshape(-1, 3), axis=0).tolist(), [0.0, 0.01, 0.02]]
+    mesh, points = (
+        scene_of(tmp_path, shape).surfaces["block"].shape for shape in ('mesh = "cube.stl"', f"points = {inner}")
+    )
+    assert points == mesh
+
+
+def test_points_in_a_plane_are_refused(tmp_path):
+    with pytest.raises(ephs.SceneError, match=r"surfaces\.block\.shape\.points: found points in a plane"):
+        scene_of(tmp_path, "points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]")
+
+
+def test_the_largest_hull_says_how_far_points_are_outside():
+    """Corners of a prism on a circle: a chord over k steps of angle h leaves the sagitta 1 − cos(k h / 2) outside."""
+    count = 2 * MOST_VERTICES
+    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (-1.0, 1.0)]
+    corners, depth = largest_hull(np.concatenate(ends))
+    assert len(corners) == MOST_VERTICES
+    steps = np.arccos(1.0 - depth) / (np.pi / count)
+    assert steps == pytest.approx(round(steps), abs=1e-6) and 4 <= round(steps) <= 8
+    assert largest_hull(corners)[1] == 0.0
+
+
+@pytest.mark.parametrize("first", ["", 'group = "it"'])
+@pytest.mark.parametrize("second", ["", 'group = "it"'])
+def test_surfaces_of_a_group_do_not_meet_each_other(first, second, tmp_path):
+    """A free joint to the ground does not keep a surface from meeting it."""
+    text = SCENE.format(shape="sphere = 0.1", law="stiffness = 1e5").replace(
+        'body = "ground"', f'body = "ground"\n{first}'
+    )
+    text = text.replace("shape = { sphere", f"{second}\nshape = {{ sphere")
+    text += (
+        '[joints.root]\ntype = "free"\nbodies = ["ground", "block"]\nat = [0.0, 0.0, 0.27]\naxis = [0.0, 0.0, 1.0]\n'
+    )
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    assert len(ephs.load(tmp_path / "scene.toml").contacts) == (0 if first and second else 1)
 
 
 @pytest.mark.parametrize(
