@@ -43,7 +43,7 @@ def act(
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
-    on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: near.when(tables.acting[i], acting.edge)))
+    on.loop(tables.acting.size, lambda i: acting.unless_refused(lambda: near.when(i, tables.acting[i], acting.edge)))
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
 
@@ -62,7 +62,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
             acting.store(edge, out)
 
         edge = tables.acting[i]
-        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: near.when(edge, store)))
+        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: near.when(i, edge, store)))
 
     on.loop(tables.acting.size, one)
     return acting.status.value
