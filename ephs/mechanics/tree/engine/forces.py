@@ -50,7 +50,7 @@ def act(
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
 
     def edge(i: Integer) -> None:
-        acting.unless_refused(lambda: near.when(tables.acting[i], lambda edge: acting.edge(edge, i)))
+        acting.unless_refused(lambda: near.when(i, tables.acting[i], lambda edge: acting.edge(edge, i)))
 
     on.loop(tables.acting.size, edge)
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
@@ -71,7 +71,7 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
             acting.store(edge, out)
 
         edge = tables.acting[i]
-        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: near.when(edge, store)))
+        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: near.when(i, edge, store)))
 
     on.loop(tables.acting.size, one)
     return acting.status.value

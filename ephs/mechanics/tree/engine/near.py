@@ -28,6 +28,8 @@ class Near:
         Links in the world.
     first, second, pair
         Links of the last edge that was tested, and the second one in the first.
+    next
+        Number of the edge after the points of a contact of which none acts.
     """
 
     on: Evaluator
@@ -35,15 +37,29 @@ class Near:
     first: Variable[Integer]
     second: Variable[Integer]
     pair: Relative
+    next: Variable[Integer]
 
     @staticmethod
     def of(on: Evaluator, places: Matrix) -> "Near":
         """Return tests that have met no edge."""
         pair = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
-        return Near(on, places, on.counter(-2), on.counter(-2), pair)
+        return Near(on, places, on.counter(-2), on.counter(-2), pair, on.counter(0))
 
-    def when(self, edge: Acting, body: Callable[[Acting], None]) -> None:
-        """Call body(edge) unless its frames are so far apart that nothing acts."""
+    def when(self, number: Integer, edge: Acting, body: Callable[[Acting], None]) -> None:
+        """Call body(edge) of an edge and its number, unless its frames are so far apart that nothing acts."""
+        on, following = self.on, self.next
+
+        def look() -> None:
+            self._meet(edge)
+            middles = [edge.middles[k] for k in range(6)]
+            way = sub(add(apply(self.pair.turn, middles[3:]), self.pair.at), middles[:3])
+            away = dot(way, way) > edge.spread * edge.spread
+            following.value = on.select(away, number + edge.points, following.value)
+
+        on.when(edge.points > 0, look)
+        on.when(number >= following.value, lambda: self._alone(edge, body))
+
+    def _alone(self, edge: Acting, body: Callable[[Acting], None]) -> None:
         on, near = self.on, self.on.counter(1)
 
         def look() -> None:

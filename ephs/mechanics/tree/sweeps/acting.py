@@ -144,6 +144,11 @@ class Acting(Record):
         Its first frame in the first link's, its second in the second's.
     left
         (BᵀB)⁻¹Bᵀ in its first ``dim`` rows.
+    points
+        Of the first of consecutive edges between the same links, all with supports from `BEYOND` on: how many there
+        are; else 0.
+    middles, spread
+        Of all these: points of the first and of the second link, and their distance beyond which none of them acts.
     """
 
     kind = integer()
@@ -158,6 +163,7 @@ class Acting(Record):
     spring = integer()
     friction = integer()
     heat = integer()
+    points = integer()
     inner_at = reals(3)
     outer_at = reals(3)
     reach = real()
@@ -167,6 +173,8 @@ class Acting(Record):
     halves = reals(6)
     parallel = real()
     left = reals(6, 6)
+    middles = reals(6)
+    spread = real()
 
 
 class Body(Record):

@@ -1,4 +1,4 @@
-"""Where nothing acts between segments: never where their gap is negative, and wherever a plane is between them."""
+"""Where nothing acts: never where gaps of segments or points of a contact act, and wherever a plane is between."""
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 
 from ephs.mechanics.shapes.gap import edges, segments
 from ephs.mechanics.tree.engine.near import segments_apart
+from ephs.mechanics.tree.engine.tables import contacts
+from ephs.mechanics.tree.sweeps.acting import ABOVE, APART, ON_BODIES
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import PLAIN
 
@@ -71,3 +73,21 @@ def test_edges_beyond_the_angle_of_parallel_are_closed():
     pose = pose_of([np.cos(half), np.sin(half), 0.0, 0.0], (0.0, 0.0, 0.0))
     assert gap.distance(pose) < 0.0
     assert not found(pose, gap)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(2, 12), st.floats(0.0, 0.3), st.integers(0, 10_000), st.sampled_from([0.9, 0.999999, 1.000001, 1.5]))
+def test_no_contact_is_left_out_of_which_a_point_acts(count, reach, seed, share):
+    """One point is about as far as it acts; the edges before and after are a plane's, and one of other links."""
+    rng = np.random.default_rng(seed)
+    inner, outer = rng.normal(size=(2, count, 3))
+    edge = np.array([[ON_BODIES, 0, 1, ABOVE], *[[ON_BODIES, 0, 1, APART]] * count, [ON_BODIES, 0, 2, APART]])
+    ends = [np.concatenate([rng.normal(size=(1, 3)), each, rng.normal(size=(1, 3))]) for each in (inner, outer)]
+    points, around = contacts(edge, *ends, np.full(count + 2, reach))
+    assert points.ravel().tolist() == [0, count, *[0] * count]
+    turn = quaternion_to_matrix(pose_of(rng.normal(size=4), (0.0, 0.0, 0.0))[:4])
+    point, way = rng.integers(count), rng.normal(size=3)
+    place = inner[point] - turn @ outer[point] + share * reach * way / np.linalg.norm(way)
+    away = np.linalg.norm(turn @ around[1, 3:6] + place - around[1, :3]) > around[1, 6]
+    nearest = np.linalg.norm(inner - (outer @ turn.T + place), axis=1).min()
+    assert not away or nearest > reach
