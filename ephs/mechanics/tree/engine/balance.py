@@ -32,6 +32,8 @@ ROUNDS = 8
 """Iterations that move positions."""
 RIGID = 1e-24
 """Part of the kinetic energy below which what rigid motions leave of it is rounding."""
+REFUSED = 2.0
+"""Error of a step whose missing energy is not found in all rounds."""
 FARTHEST = 0.5
 """Part of its direction by which a state is moved at most."""
 
@@ -283,7 +285,8 @@ class Correction(Missing):
 
         def go() -> None:
             on.repeat(once)
-            self.account.size = size(on.absolute(gone.value))
+            far = size(on.absolute(gone.value))
+            self.account.size = on.select(self.close, far, on.maximum(far, REFUSED) / WORTH)
             self.account.moved = first.value - self.short
 
         def stay() -> None:
