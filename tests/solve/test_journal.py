@@ -20,28 +20,10 @@ from ephs.solve import journal
 from ephs.solve.errors import Outcome
 from ephs.solve.journal import read_journal
 from examples.failures import runs
+from tests.mechanics.ball import BALL
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ephs.load(ROOT / "scenes/slider-crank.toml")
-BALL = """
-format = 1
-name = "ball"
-[bodies.ball]
-mass = 1.0
-inertia = [4e-3, 4e-3, 4e-3]
-position = [0.0, 0.0, 0.3]
-velocity = [1.0, 0.0, 0.0]
-[surfaces.ball]
-body = "ball"
-shape = { sphere = 0.1 }
-stiffness = 1e5
-loss = 0.2
-friction = 0.5
-slip = 1e-4
-[surfaces.floor]
-body = "ground"
-shape = { plane = {} }
-"""
 TIMES = np.linspace(0.0, 0.2, 23)
 LOOSE = {"rtol": 1e-4, "atol": 1e-6}
 RUNS = {
@@ -129,7 +111,7 @@ def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp
 
 def test_a_run_that_goes_from_method_to_method_goes_on_too(copies, tmp_path):
     file = tmp_path / "ball.toml"
-    file.write_text(BALL, encoding="utf-8")
+    file.write_text(BALL.format(slip=1e-4), encoding="utf-8")
     model, options = ephs.load(file), {"until": 0.8, "rtol": 1e-4}
     whole = simulate(model, options)
     assert [switch["to"] for switch in whole.stats["switches"]][:3] == ["radau", "rk54", "radau"]

@@ -215,7 +215,8 @@ def rim(size: float, radius: float) -> Feature:
         way, length = softly(times(-1.0, across(body.normal(moved(centre, size, way)), axis)))
         return [(moved(centre, size, way), -size * UPRIGHT**2 / length)]
 
-    return Feature("rim", spots, radius, (size, size, UPRIGHT * size), (("size", size), ("radius", radius)))
+    wide = size * float(np.hypot(1.0, UPRIGHT))  # upright points of the ellipsoid are this far from the axis
+    return Feature("rim", spots, radius, (wide, wide, UPRIGHT * size), (("size", size), ("radius", radius)))
 
 
 def side(size: float, half: float, radius: float) -> Feature:

@@ -8,6 +8,7 @@ from ephs.mechanics.methods import auto
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
 from ephs.mechanics.methods.stages import Kept
+from tests.mechanics.ball import BALL
 
 SCENE = """
 format = 1
@@ -52,25 +53,6 @@ heat = "housing"
 [surfaces.floor]
 body = "ground"
 shape = { plane = {} }
-"""
-BALL = """
-format = 1
-name = "ball"
-[bodies.ball]
-mass = 1.0
-inertia = [4e-3, 4e-3, 4e-3]
-position = [0.0, 0.0, 0.3]
-velocity = [1.0, 0.0, 0.0]
-[surfaces.ball]
-body = "ball"
-shape = {{ sphere = 0.1 }}
-stiffness = 1e5
-loss = 0.2
-friction = 0.5
-slip = {slip}
-[surfaces.floor]
-body = "ground"
-shape = {{ plane = {{}} }}
 """
 ASKED = {"method": "radau", "audit": "off"}
 TIMES = np.linspace(0.0, 0.6, 13)

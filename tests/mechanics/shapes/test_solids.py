@@ -101,7 +101,8 @@ def test_the_least_gap_is_the_distance(pair, seed):
     rounded, size = radius1 + radius2, max(size1, size2)
     below = BOUND + (UPRIGHT * size if "cylinder" in pair else 0.0)
     above = BOUND + (rounded / 36.0 if "cylinder" not in pair else UPRIGHT * size)
-    above += 0.01 * size if pair == ("cylinder", "cylinder") else 0.0
+    # What a fixed number of steps leaves, see docs/contact.md.
+    above += {("capsule", "cylinder"): 3e-3, ("cylinder", "cylinder"): 1.2e-2}.get(pair, 0.0) * size
     assert expected - below <= min(found) <= expected + above
 
 
