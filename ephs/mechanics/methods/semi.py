@@ -11,7 +11,7 @@ import numpy as np
 
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.tree.engine.drags import frictions, memory_of
+from ephs.mechanics.tree.engine.drags import chains, frictions, memory_of
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.roles import strikes
@@ -21,6 +21,10 @@ from ephs.semantics.derive.relations import onsager
 from ephs.solve.control import Control
 from ephs.solve.stepping import Attempt, Leg, Span
 
+FREEDOMS: Final = 1000
+"""Degrees of freedom up to which the memory of a matrix is little."""
+WORK: Final = 2000.0
+"""Squared width of rows of the mass matrix up to which its factors cost less than some evaluations."""
 ALPHA: Final = (9.0 - 57.0**0.5) / 6.0
 """Diagonal of the implicit coefficients, which makes them L-stable."""
 _LAST = 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0
@@ -81,8 +85,11 @@ class Semi(ReducedMethod):
 
 
 def serves(equations: Equations) -> bool:
-    """Whether the losses of a tree are known, and act by forces."""
-    return None not in _relations(equations).values() and strikes(equations.problem.descriptor.components) is None
+    """Whether the losses of a tree are known, and act by forces, and its masses are factorised in little time."""
+    reach = chains(links_of(equations.reduced).parts)["reach"]
+    narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
+    known = None not in _relations(equations).values()
+    return bool(narrow) and known and strikes(equations.problem.descriptor.components) is None
 
 
 def _relations(equations: Equations) -> dict[int, Irreversible | None]:

@@ -190,8 +190,8 @@ def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str
     return {**tables, "component": component}
 
 
-def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Array]:
-    """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
+def chains(parts: Sequence[Part]) -> dict[str, Array]:
+    """``order``, ``above``, ``owner``, ``tip`` and ``reach`` of a tree's links."""
     n = sum(part.joint.dim for part in parts)
     above, owner, reach = np.full((3, n), -1)
     tip, order = np.full(len(parts), -1), list[int]()
@@ -202,10 +202,15 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
             reach[j] = j if above[j] < 0 else min(j, reach[above[j]])
             order.append(j)
         tip[i] = last
-    losses = len(frictions(tables))
-    whole = {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach, "first": reach}
-    whole |= {"counts": np.zeros(2)}
-    whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses), "chain": np.zeros(n)}
+    return {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach}
+
+
+def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Array]:
+    """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
+    whole, losses = chains(parts), len(frictions(tables))
+    n = whole["reach"].size
+    whole |= {"first": whole["reach"], "counts": np.zeros(2), "chain": np.zeros(n)}
+    whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
         **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
