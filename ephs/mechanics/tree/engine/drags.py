@@ -15,7 +15,6 @@ from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.pack import Part
-from ephs.semantics.bundle import Array
 from ephs.semantics.linear.dense import clear
 from ephs.semantics.spaces import se3
 from ephs.semantics.spaces.vectors import add, apply, product, sub
@@ -190,7 +189,7 @@ def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str
     return {**tables, "component": component}
 
 
-def chains(parts: Sequence[Part]) -> dict[str, Array]:
+def chains(parts: Sequence[Part]) -> dict[str, Any]:
     """``order``, ``above``, ``owner``, ``tip`` and ``reach`` of a tree's links."""
     n = sum(part.joint.dim for part in parts)
     above, owner, reach = np.full((3, n), -1)
@@ -205,7 +204,7 @@ def chains(parts: Sequence[Part]) -> dict[str, Array]:
     return {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach}
 
 
-def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Array]:
+def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Any]:
     """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
     whole, losses = chains(parts), len(frictions(tables))
     n = whole["reach"].size
