@@ -10,17 +10,9 @@ import ephs
 __all__ = ["table"]
 
 HEAD = (
-    "model",
-    "bodies",
-    "DoF",
-    "actuators",
-    "dry friction",
-    "armatures",
-    "ratios",
-    "surfaces",
-    "contacts",
+    "model", "bodies", "DoF", "actuators", "dry friction", "armatures", "ratios", "surfaces", "contacts",
     "not modelled",
-)
+)  # fmt: skip
 LOST = "not modelled: "
 
 
@@ -52,10 +44,12 @@ def row(path: Path) -> tuple[str, ...]:
         sum(j.armature > 0.0 for j in joints), len(scene.gears), len(scene.surfaces),
         len(scene.contacts),
     )  # fmt: skip
-    told = ", ".join(
-        f"{line.count(',') + 1} {line.partition(':')[0].partition(' that ')[0].removesuffix(' of')}" for line in lost
-    )
+    told = ", ".join(f"{line.count(',') + 1} {_kind(line)}" for line in lost)
     return path.name, *(str(count or "") for count in counts), told
+
+
+def _kind(line: str) -> str:
+    return line.partition(":")[0].partition(" that ")[0].removesuffix(" of")
 
 
 def table() -> str:

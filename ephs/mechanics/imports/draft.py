@@ -112,9 +112,11 @@ class Draft:
     def limit(self, name: str, lower: float, upper: float) -> None:
         """Add stops to a joint of one degree of freedom, or a note of its limits."""
         sides = [float(value) if abs(value) < UNLIMITED else np.nan for value in (lower, upper)]
+        if np.all(np.isnan(sides)):
+            return
         if not self.contact or lower >= upper:
             self.leave("limits of", name)
-        elif not np.all(np.isnan(sides)):
+        else:
             self._joints[self._joint_names[name]]["limits"] = sides
 
     def surface(self, link: str, name: str, kind: str, value: Any, place: Array, **law: Any) -> str:

@@ -294,10 +294,10 @@ def _limits(name: str, joint: Element, kind: str, count: int, draft: Draft) -> N
             continue
         given = {word: limit.findtext(word) for word in ("lower", "upper")}
         sides = [_bound(given[word], f"joints.{name}.{tag}.limit.{word}", draft) for word in given]
-        if count != 1:
-            draft.leave("limits of", name)
-        elif joint.get("type") != "continuous":
+        if count == 1 and joint.get("type") != "continuous":
             draft.limit(name, -sides[0] if given["lower"] is None else sides[0], sides[1])
+        elif any(abs(side) < UNLIMITED for side in sides):
+            draft.leave("limits of", name)
         for word in limit:
             if word.tag not in given and 0.0 <= _bound(word.text, f"joints.{name}.{word.tag}", draft) < UNLIMITED:
                 draft.leave(f"{word.tag} of limits of", name)

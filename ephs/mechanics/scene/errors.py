@@ -134,6 +134,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "dry static": ("a number ≥ coulomb = {coulomb:g}", "static friction is at least as large as sliding friction"),
     "limited joint": ("a joint with one degree of freedom and no prescribed motion", "remove limits"),
     "beyond stop": ("an initial coordinate between the hard stops", "move the joint, or remove limit_restitution"),
+    "beyond soft stop": (
+        "less than {most:.3g} beyond the stops at the start",
+        "the stops' energy is part of the initial energy; set the joint's coordinate between them",
+    ),
     "no scale": ("a stiffness, since the scene gives no time scale for a default", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
     "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),

@@ -36,7 +36,7 @@ LOSS = 0.1
 SOFT = ("stiffness", "exponent", "loss", "slip", "rolling", "spinning")
 """Keys of elastic surfaces that hard ones do not have."""
 DEEP = 1e-2
-"""Least reported overlap at the start, as a fraction of the mechanism's length."""
+"""Least reported overlap at the start, as a fraction of the mechanism's length, or of a radian."""
 OVERLAP = 1e-9
 """Likewise for hard surfaces, for which it is refused."""
 
@@ -120,23 +120,31 @@ def _stiffness(scene: Scene, joint: Joint) -> float:
     """Default stiffness of a joint's stops, N m/rad or N/m; 0 where the scene has no rate of its own."""
     scale = Snapshot.of(scene).scale(scene.world.gravity)
     mass = sum(body.mass for _, body in scene.all_bodies())
-    turning = bool(np.any(coupling_of(joint).basis(joint.coordinate)[:3]))
-    return float(STIFF * mass * scale.rate**2 * (scale.length**2 if turning else 1.0))
+    return float(STIFF * mass * scale.rate**2 * (scale.length**2 if _turns(joint) else 1.0))
+
+
+def _turns(joint: Joint) -> bool:
+    """Whether the coordinate of a joint with one degree of freedom is an angle."""
+    return bool(np.any(coupling_of(joint).basis(joint.coordinate)[:3]))
 
 
 def overlaps(scene: Scene, faults: list[Fault]) -> list[Fault]:
-    """Surfaces that overlap at the start by more than a part of the scene's length; hard ones, and joints beyond hard
-    stops, are faults."""
+    """Surfaces that overlap at the start by more than a part of the scene's length, and joints beyond their stops by
+    more than this part of a radian or of the length; hard ones are faults."""
+    touched = bool(scene.contacts) or any(joint.limits is not None for _, joint in scene.all_joints())
+    length = Snapshot.of(scene).scale(scene.world.gravity).length if touched else 1.0
+    found: list[Fault] = []
     for name, joint in scene.all_joints():
-        if isinstance(joint.stop, Impact) and joint.limits is not None:
-            at, (lower, upper) = float(joint.coordinate[0]), joint.limits.tolist()
-            beyond = float(np.nanmax([lower - at, at - upper]))
-            if beyond > OVERLAP:
-                faults.append(fault("beyond stop", f"joints.{name}.limits", f"a start {beyond:.3g} beyond them"))
+        if joint.limits is None:
+            continue
+        at, (lower, upper) = float(joint.coordinate[0]), joint.limits.tolist()
+        beyond, key = float(np.nanmax([lower - at, at - upper])), f"joints.{name}.limits"
+        if isinstance(joint.stop, Impact) and beyond > OVERLAP:
+            faults.append(fault("beyond stop", key, f"a start {beyond:.3g} beyond them"))
+        elif beyond > (most := DEEP * (1.0 if _turns(joint) else length)):
+            found.append(fault("beyond soft stop", key, f"a start {beyond:.3g} beyond them", most=most))
     surfaces = dict(scene.all_surfaces())
     poses = {GROUND: IDENTITY_POSE} | {name: body.pose for name, body in scene.all_bodies()}
-    length = Snapshot.of(scene).scale(scene.world.gravity).length if scene.contacts else 1.0
-    found: list[Fault] = []
     for name, contact in scene.contacts.items():
         one, other = (surfaces[each] for each in contact.surfaces)
         touching, swapped = touches(one.shape, one.frame, other.shape, other.frame)

@@ -186,8 +186,9 @@ def test_limits_of_an_sdf(kind, limit, found, tmp_path):
         f'<joint name="j" type="{kind}"><parent>world</parent><child>body</child>'
         f"<axis><xyz>0 1 0</xyz><limit>{limit}</limit></axis></joint>"
     )
-    scene, _ = loaded(SDF.format(**GIVEN | {"model": joint}), tmp_path, "sdf")
+    scene, said = loaded(SDF.format(**GIVEN | {"model": joint}), tmp_path, "sdf")
     limits = scene.joint("j").limits
+    assert ("limits of: j" in said) == (kind == "continuous")
     assert limits is None if found is None else limits == pytest.approx(found, nan_ok=True)
 
 

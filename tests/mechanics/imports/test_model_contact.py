@@ -120,3 +120,14 @@ def test_limits_of_a_urdf(kind, limit, found, tmp_path):
     file.write_text(URDF.format(kind=kind, limit=limit), encoding="utf-8")
     limits = loaded(file, contact=True)[0].joint("hinge").limits
     assert limits is None if found is None else limits == pytest.approx(found)
+
+
+@pytest.mark.parametrize(("lower", "beyond"), [(0.25, 0.25), (0.005, None), (-1.0, None)])
+def test_a_start_beyond_a_limit_is_said_by_name(lower, beyond, tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(URDF.format(kind="revolute", limit=f'lower="{lower}" upper="1"'), encoding="utf-8")
+    _, said = loaded(file, contact=True)
+    if beyond is None:
+        assert "beyond them" not in said
+    else:
+        assert f"joints.hinge.limits: found a start {beyond} beyond them" in said
