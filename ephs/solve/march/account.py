@@ -68,8 +68,8 @@ def stretch(on: Evaluator, share: Real) -> Real:
     return share / (1.0 + on.sqrt(on.maximum(1.0 + share, 0.0)))
 
 
-def worth(on: Evaluator, account: Account) -> Real:
-    """Return the error of the last tried step by its correction, less the remainder of earlier ones."""
+def worth(on: Evaluator, account: Account, share: float = WORTH) -> Real:
+    """Return the error of the last tried step by a share of its correction, less the remainder of earlier ones."""
     short = account.moved + account.rest
     own = on.maximum(on.absolute(short - account.left) - account.noise, 0.0) / on.maximum(on.absolute(short), TINY)
-    return on.select(account.size > 0.0, WORTH * account.size * on.minimum(own, 1.0), 0.0)
+    return on.select(account.size > 0.0, share * account.size * on.minimum(own, 1.0), 0.0)
