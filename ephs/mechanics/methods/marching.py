@@ -156,9 +156,7 @@ class March:
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
-        a.alone = int(
-            not (kept is None and lagged is None) and span.policy is None
-        )  # constant implicit steps may not resolve fast modes
+        a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
         if lagged is not None:
             self.march = eq.engine.lagged(lagged.onsager, *given, lagged.memory, 0)

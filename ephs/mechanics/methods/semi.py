@@ -76,8 +76,14 @@ class Semi(ReducedMethod):
         self.memory: dict[str, Any] = memory | {"scheme": SCHEME, "again": AGAIN}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """There are no single steps."""
-        raise NotImplementedError
+        """Refuse: many steps in one call are all that there is.
+
+        Raises
+        ------
+        NotImplementedError
+            Always.
+        """
+        raise NotImplementedError("single steps")
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Many steps in one compiled call."""

@@ -141,21 +141,9 @@ class _Run:
         on, motion, m, c = self.on, self.motion, self.memory, self.control
         self.accepted.value = 0
         self.status.value = attempt(
-            on,
-            motion,
-            self.tableau,
-            c,
-            m.q,
-            m.y,
-            self.sign * h,
-            m.k,
-            m.errors,
-            m.last,
-            m.y1,
-            m.q1,
-            self.stiff,
+            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1, self.stiff,
             self.lagged,
-        )
+        )  # fmt: skip
 
         def look() -> None:
             allow(on, motion, m.errors, m.y, m.y1)
@@ -292,21 +280,9 @@ class _Run:
             copy(on, m.k.row(0), m.k2.row(0))
             part = self.sign * (wanted - c.time)
             self.status.value = attempt(
-                on,
-                motion,
-                self.tableau,
-                c,
-                m.q,
-                m.y,
-                part,
-                m.k2,
-                m.errors,
-                m.last,
-                m.y2,
-                m.q2,
-                self.stiff,
+                on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff,
                 self.lagged,
-            )
+            )  # fmt: skip
 
             # Near a change of rank a part may be wrong and the whole right: closing removes transverse components.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))

@@ -115,7 +115,8 @@ def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
         on.loop(i + 1, entry, start=drags.first[i])
 
     on.loop(drags.mass.rows, row)
-    return on.select(skyline_cholesky(on, drags.mass, drags.first) > 0, int(Status.STILL), 0)
+    # Masses alone are definite, as the sweeps have found: what fails are numbers out of range.
+    return on.select(skyline_cholesky(on, drags.mass, drags.first) > 0, int(Status.UNSETTLED), 0)
 
 
 @staged

@@ -154,8 +154,6 @@ class Equations:
         if self.steady:
             status, evaluations, before = self.engine.stages(scheme, state.q, y0, h, k, y1, tolerances, chosen=chosen)
             self.evaluations += evaluations
-            if status == Status.UNSETTLED:
-                raise SolveError(Outcome.DIVERGED, "", "the stages of a step")
             if status != Status.DEPENDENT:
                 self.refuse(status, self.engine.failed)
                 return before
@@ -181,6 +179,8 @@ class Equations:
         """Raise the error that a compiled function reported, if any."""
         if status == Status.STILL and not np.all(np.isfinite(self.engine.array("work"))):
             raise SolveError(Outcome.RANGE, "", "the rates of the joints")
+        if status == Status.UNSETTLED:
+            raise SolveError(Outcome.DIVERGED, "", "the stages of a step")
         if status == Status.STILL:
             raise unmoved(self.reduced, int(component))
         if status == Status.LAWLESS:
