@@ -15,6 +15,7 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, group, real, vector
 from ephs.solve.control import Control, Tolerance
 from ephs.testing.mechanisms import mechanisms
+from tests.mechanics.ball import BALL
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
 IMPLICIT = SCHEME[1:, 1:]
@@ -232,3 +233,21 @@ shape = {{ plane = {{}} }}
     assert sol.heat[-1] == pytest.approx(0.5 * 2.0 / 7.0, abs=1.4 * speed * allowed)
     assert np.abs(sol.energy_error).max() <= 1e-11
     assert sol.stats["least_production"] >= 0.0
+
+
+def test_an_ensemble_equals_its_single_runs(tmp_path):
+    text, times, members = BALL.format(slip=1e-3), np.linspace(0.0, 0.6, 13), [0.1, 0.3, 0.5]
+
+    def run(friction):
+        file = tmp_path / f"{friction}.toml"
+        file.write_text(text.replace("friction = 0.5", f"friction = {friction}"), encoding="utf-8")
+        sol = ephs.simulate(ephs.load(file), 0.6, rtol=1e-2, save_at=times)
+        assert sol.stats["method"] == "semi"
+        return sol.heat
+
+    singles = [run(friction) for friction in members]
+    table = ephs.sweep(
+        ephs.load(tmp_path / "0.5.toml"), {"contacts.ball_floor.friction": members}, 0.6, save_at=times,
+        outputs=["heat"], rtol=1e-2,
+    )  # fmt: skip
+    assert np.array_equal(table["heat"], singles)
