@@ -143,7 +143,7 @@ def drawn(eq: Equations, seed: int) -> dict[str, Any]:
     out |= {"size": links, "memory": out["work"], "wrench": out["pushed"], "places": out["place"], "worst": np.zeros(1)}
     out |= {"motions": out["relative"], "numbers": out["cut_numbers"], "chart": given["chart"].arrays[0].copy()}
     out |= {"base": eq._paper.initial()[0], "v": rng.standard_normal(eq.nv), "out": np.zeros(eq.nv)}
-    out |= {"target": out["kept"]}
+    out |= {"target": out["kept"], "columns": np.zeros((n, 6))}
     return out | {"q": out["base"].copy(), "r": np.ones(n), "x": np.ones(n), "rate": np.zeros(n)}
 
 
