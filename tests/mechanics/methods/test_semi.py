@@ -104,6 +104,17 @@ position = [5.15, 1.0, 0.08]
 mass = 0.5
 inertia = [1e-3, 2e-3, 1e-3]
 position = [5.15, 1.15, 0.1]
+[bodies.finger]
+mass = 0.1
+inertia = [1e-4, 2e-4, 1e-4]
+position = [5.25, 1.15, 0.4]
+[joints.knuckle]
+type = "revolute"
+bodies = ["hand", "finger"]
+at = [5.2, 1.15, 0.4]
+axis = [0.0, 0.0, 1.0]
+armature = 0.02
+friction = 0.03
 [joints.shoulder]
 type = "spherical"
 bodies = ["arm", "trunk"]
@@ -177,7 +188,7 @@ def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
 def test_so_do_those_of_contacts_within_a_mechanism(hug, seed):
     stage = Stage(hug, seed)
     check(stage, seed)
-    assert list(stage.memory["counts"]) == [5, 3]  # shoulder, elbow, and three contacts
+    assert list(stage.memory["counts"]) == [6, 3]  # three joints and three contacts
 
 
 def test_steps_converge_with_order_three(tmp_path):
