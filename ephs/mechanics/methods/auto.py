@@ -10,10 +10,11 @@ Contacts are stiff for a while: compiled steps of radau end where explicit ones 
 from typing import TYPE_CHECKING, Any, final
 
 from ephs.mechanics.methods.explicit import Explicit, tableau
-from ephs.mechanics.methods.marching import Rival
+from ephs.mechanics.methods.marching import March, Rival
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.semi import Semi, serves
+from ephs.mechanics.methods.semi import ARRAYS, EXPONENT, NAME, Semi, serves
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.loop import FINAL
@@ -64,18 +65,20 @@ class Auto(ReducedMethod):
         self._held = self._free = self._failures = 0
         self._trial: int | None = None
         self._semi: Semi | None = None
+        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
         if name == "rk54" and _touches(equations):
             if control.rtol.value > COARSE and serves(equations):
-                self._semi = Semi(equations, control)
-                self.name = self.counts["chosen"] = self._semi.name
-                self.exponent, self.share = self._semi.exponent, self._semi.share
+                self._semi = Semi(equations)
+                self.name = self.counts["chosen"] = NAME
+                self.exponent, self.share = EXPONENT, 0.0
             elif equations.n <= FREEDOMS:
                 self._begin()
 
     def _begin(self) -> None:
-        """Begin as tolerances ask for, where surfaces may touch."""
+        """Begin without semi-implicit steps, as tolerances ask for where surfaces may touch."""
+        self._semi = None
         self.exponent, self.share = self._explicit.exponent, self._explicit.share
         self.name, self._trial = self._explicit.name, TRIAL
         if self.control.rtol.value > LOOSE:
@@ -87,7 +90,6 @@ class Auto(ReducedMethod):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
         if self._semi is not None:  # which steps in compiled code alone
-            self._semi = None
             self._begin()
         if self._implicit is not None:
             return self._implicit.step(state, h)
@@ -113,9 +115,8 @@ class Auto(ReducedMethod):
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
         if self._semi is not None and span.until >= span.t0:
-            return self._semi.many(span)
+            return March(self, ARRAYS, span, lagged=self._semi)
         if self._semi is not None:  # losses gain energy backward in time, which implicit steps do not see
-            self._semi = None
             self._begin()
         if self._implicit is not None:
             if self._trial is None or not isinstance(self._explicit, Explicit):
@@ -161,7 +162,6 @@ class Auto(ReducedMethod):
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
         if self._semi is not None and not own["semi"]:
-            self._semi = None
             self._begin()
         self._explicit.take(own["explicit"], state)
         if own["implicit"] is not None:

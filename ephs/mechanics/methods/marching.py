@@ -28,7 +28,7 @@ after so many without one."""
 
 
 class Lagging(Protocol):
-    """What semi-implicit steps need, see `ephs.mechanics.methods.semi.Semi`."""
+    """Memory of semi-implicit steps, see `ephs.mechanics.methods.semi.Semi`."""
 
     onsager: dict[int, int]
     memory: dict[str, Any]

@@ -9,18 +9,16 @@ from typing import Any, Final, final
 
 import numpy as np
 
-from ephs.mechanics.methods.marching import March
-from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.engine.drags import chains, frictions, memory_of
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.roles import strikes
-from ephs.semantics.bundle import Array
 from ephs.semantics.derive.irreversible import Irreversible
 from ephs.semantics.derive.relations import onsager
-from ephs.solve.control import Control
-from ephs.solve.stepping import Attempt, Leg, Span
 
+NAME: Final = "semi"
+EXPONENT: Final = 3.0
+"""The power of the step with which the estimate falls."""
 FREEDOMS: Final = 1000
 """Degrees of freedom up to which the memory of a matrix is little."""
 WORK: Final = 2000.0
@@ -53,8 +51,8 @@ AGAIN: Final = np.array([0, 0, 1, 0, 0])
 
 
 @final
-class Semi(ReducedMethod):
-    """The method on one tree.
+class Semi:
+    """Memory of semi-implicit steps of one tree.
 
     Attributes
     ----------
@@ -64,30 +62,11 @@ class Semi(ReducedMethod):
         Of the stages, by the names of `ephs.mechanics.tree.engine.drags.Drags`.
     """
 
-    name = "semi"
-    exponent = 3.0
-
-    def __init__(self, equations: Equations, control: Control) -> None:
-        super().__init__(equations, control)
-        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
+    def __init__(self, equations: Equations) -> None:
         engine, found = equations.engine, _relations(equations)
         self.onsager = {number: onsager(one).compiled()["value"].address for number, one in found.items() if one}
         memory = memory_of(engine.tables, links_of(equations.reduced).parts, engine.sizes[1])
         self.memory: dict[str, Any] = memory | {"scheme": SCHEME, "again": AGAIN}
-
-    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """Refuse: many steps in one call are all that there is.
-
-        Raises
-        ------
-        NotImplementedError
-            Always.
-        """
-        raise NotImplementedError("single steps")
-
-    def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
-        """Many steps in one compiled call."""
-        return March(self, ARRAYS, span, lagged=self)
 
 
 def serves(equations: Equations) -> bool:

@@ -46,8 +46,13 @@ def subtract(on: Evaluator, factor: Real, y: Vector, x: Vector) -> None:
     on.loop(x.size, one)
 
 
-def cholesky(on: Evaluator, a: Matrix, factor: Matrix) -> Integer:
-    """Factorise A = L Lᵀ by rows, L into the lower triangle of ``factor``.
+def cholesky(on: Evaluator, a: Matrix, factor: Matrix, first: Integers | None = None) -> Integer:
+    """Factorise A = L Lᵀ by rows, L into the lower triangle of ``factor``, which may be A.
+
+    Parameters
+    ----------
+    first
+        (n,): where each row begins, if not with its first entry; what is before is not read.
 
     Returns
     -------
@@ -60,20 +65,22 @@ def cholesky(on: Evaluator, a: Matrix, factor: Matrix) -> Integer:
 
     def row() -> Truth:
         i = at.value
+        own = 0 if first is None else first[i]
 
         def entry(j: Integer) -> None:
+            other = 0 if first is None else first[j]
             rest.value = a[i, j]
 
             def less(k: Integer) -> None:
                 rest.value = rest.value - factor[i, k] * factor[j, k]
 
-            on.loop(j, less)
+            on.loop(j, less, start=0 if first is None else on.select(own > other, own, other))
 
         def left(j: Integer) -> None:
             entry(j)
             factor[i, j] = rest.value / factor[j, j]
 
-        on.loop(i, left)
+        on.loop(i, left, start=own)
         entry(i)
 
         def pivot() -> None:

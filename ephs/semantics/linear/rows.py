@@ -229,6 +229,10 @@ def solve(on: Evaluator, factor: Matrix, x: Vector) -> None:
     backward(on, factor, x)
 
 
+def _whole(on: Evaluator, a: Matrix, factor: Matrix) -> Integer:
+    return cholesky(on, a, factor)
+
+
 @cache
 def row_program() -> Program:
     """Return the program of these functions; rows are handed over as the fields of `Rows`, in order."""
@@ -242,7 +246,7 @@ def row_program() -> Program:
 
     return Program(
         "constraint_rows",
-        cholesky=Entry(cholesky, a=matrix(), factor=matrix()),
+        cholesky=Entry(_whole, a=matrix(), factor=matrix()),
         solve=Entry(solve, factor=matrix(), x=vector()),
         orthonormalise=entry(orthonormalise, count=integer()),
         correct=entry(correct, rank=integer(), target=vector(), step=vector(), out=vector()),

@@ -13,7 +13,6 @@ from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, group, real, vector
-from ephs.solve.control import Control, Tolerance
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 
@@ -71,8 +70,7 @@ class Stage:
         self.y = eq.vector(self.state)
         self.rates = slice(eq.nv, eq.nv + eq.n)
         self.y[self.rates] += np.random.default_rng(seed).normal(size=eq.n)
-        tolerance = Tolerance.of("rtol", 1e-3, 1e-3)
-        semi = Semi(eq, Control(tolerance, tolerance, None, 0.0, np.inf, None))
+        semi = Semi(eq)
         call = PROBE.compiled()["probe"]
         coordinates, size = eq.engine.sizes
         self.out, self.known, self.memory = np.zeros(size), np.zeros(eq.n), semi.memory
@@ -213,28 +211,8 @@ def test_steps_converge_with_order_three(tmp_path):
 def test_stiff_friction_does_not_shorten_steps(slip, tmp_path):
     """A ball that slides until it rolls: its speed 5/7, and heat 2/7 of its energy, whatever the slip."""
     file = tmp_path / "ball.toml"
-    file.write_text(
-        f"""
-format = 1
-name = "ball"
-[bodies.ball]
-mass = 1.0
-inertia = [4e-3, 4e-3, 4e-3]
-position = [0.0, 0.0, 0.0999]
-velocity = [1.0, 0.0, 0.0]
-[surfaces.ball]
-body = "ball"
-shape = {{ sphere = 0.1 }}
-stiffness = 1e5
-loss = 1.0
-friction = 0.5
-slip = {slip}
-[surfaces.floor]
-body = "ground"
-shape = {{ plane = {{}} }}
-""",
-        encoding="utf-8",
-    )
+    text = BALL.format(slip=slip).replace("0.3]", "0.0999]").replace("loss = 0.2", "loss = 1.0")
+    file.write_text(text, encoding="utf-8")
     scene = ephs.load(file)
     rtol, speed = 1e-3, 5.0 / 7.0
     sol = ephs.simulate(scene, 0.5, rtol=rtol, audit="off")

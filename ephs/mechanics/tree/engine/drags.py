@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist
+from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.pack import Part
@@ -24,7 +25,6 @@ from ephs.semantics.stage import (
     Integers,
     Matrix,
     Real,
-    Table,
     Truth,
     Vector,
     indices,
@@ -32,7 +32,6 @@ from ephs.semantics.stage import (
     staged,
     vector,
 )
-from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.records import Motion
 
@@ -182,8 +181,7 @@ def frictions(tables: Mapping[str, Any]) -> list[int]:
 
 def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str, Any]:
     """Tables with the addresses of the programs of M/θ₀ of the components of friction, by their numbers."""
-    rows: Any = tables["component"]
-    component: Any = Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
+    component: Any = copied(tables["component"])
     for number, address in onsager.items():
         component[number].onsager = address
     return {**tables, "component": component}

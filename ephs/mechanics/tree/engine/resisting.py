@@ -10,8 +10,8 @@ from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_TREE
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.records import Link
-from ephs.semantics.linear.dense import copy
-from ephs.semantics.linear.skyline import skyline_cholesky, skyline_solve, skyline_times
+from ephs.semantics.linear.dense import cholesky, copy
+from ephs.semantics.linear.skyline import skyline_solve, skyline_times
 from ephs.semantics.spaces import vectors
 from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Vector, staged
@@ -116,7 +116,8 @@ def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
 
     on.loop(drags.mass.rows, row)
     # Masses alone are definite, as the sweeps have found: what fails are numbers out of range.
-    return on.select(skyline_cholesky(on, drags.mass, drags.first) > 0, int(Status.UNSETTLED), 0)
+    found = cholesky(on, drags.mass, drags.mass, drags.first)
+    return on.select(found > 0, int(Status.UNSETTLED), 0)
 
 
 @staged

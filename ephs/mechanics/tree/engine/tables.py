@@ -73,3 +73,8 @@ def table_of(record: type[Record], integers: Index, reals: Array | None = None) 
     size, numbers = len(integers), np.zeros(0) if reals is None else np.ascontiguousarray(reals).ravel()
     whole = np.ascontiguousarray(integers, dtype=np.int64).ravel()
     return Table(record, ArrayIntegers(whole), ArrayReals(numbers), size)
+
+
+def copied(rows: Table[Any]) -> Table[Any]:
+    """Return a table with integers of its own, and the same numbers."""
+    return Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)

@@ -15,6 +15,7 @@ from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.shutting import close
+from ephs.mechanics.tree.engine.tables import copied
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import (
     Entry,
@@ -32,7 +33,6 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
-from ephs.semantics.stage.memory import ArrayIntegers
 from ephs.solve.heats import PLAIN
 from ephs.solve.march import TABLEAU, Account, Control, Tableau
 from ephs.solve.march.steps import attempt
@@ -247,7 +247,7 @@ def reaching(
     def address(program: Program, entry: str) -> int:
         return variant(program).compiled()[entry].address
 
-    own, component = _copied(engine.tables["own"]), _copied(engine.tables["component"])
+    own, component = copied(engine.tables["own"]), copied(engine.tables["component"])
     for name, (program, entry) in engine.reached.items():
         setattr(own[0], name, address(program, entry))
     for number in evaluated(engine.tables):
@@ -256,10 +256,6 @@ def reaching(
     for place, number in laws_in(net):
         net[place] = address(*relation(number))
     return {"own": own, "component": component, "net": net}
-
-
-def _copied(rows: Table[Any]) -> Table[Any]:
-    return Table(rows.record, ArrayIntegers(rows.arrays[0].copy()), rows.reals, rows.size)
 
 
 def evaluated(tables: Mapping[str, Any]) -> Sequence[int]:
