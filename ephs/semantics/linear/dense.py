@@ -78,7 +78,7 @@ def cholesky(on: Evaluator, a: Matrix, factor: Matrix, first: Integers | None = 
 
         def left(j: Integer) -> None:
             entry(j)
-            factor[i, j] = rest.value / factor[j, j]
+            factor[i, j] = rest.value * (1.0 / factor[j, j])  # the division does not wait for the sum
 
         on.loop(i, left, start=own)
         entry(i)

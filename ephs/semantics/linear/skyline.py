@@ -14,10 +14,10 @@ def skyline_solve(on: Evaluator, factor: Matrix, first: Integers, x: Vector) -> 
     def down(i: Integer) -> None:
         begin = first[i]
         known = dot(on, factor.row(i).part(begin, i - begin), x.part(begin, i - begin))
-        x[i] = (x[i] - known) / factor[i, i]
+        x[i] = (x[i] - known) * (1.0 / factor[i, i])
 
     def up(i: Integer) -> None:
-        value = x[i] = x[i] / factor[i, i]
+        value = x[i] = x[i] * (1.0 / factor[i, i])
 
         def less(k: Integer) -> None:
             x[k] = x[k] - factor[i, k] * value

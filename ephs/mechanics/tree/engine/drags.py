@@ -1,7 +1,8 @@
 """Resistances of a tree's losses.
 
 A loss pulls with −μ u on the relative twist u of two links, or on a joint's rates; so D = Σ Jᵀ μ J with the rows J of
-u on the rates. All twists are about one point, the place of the first link, and along the ground's axes.
+u on the rates. All twists are about one point, the place of the first link, and along the ground's axes. Rows of M and D
+are rates in an order with children first, each subtree in one piece: factors have no entries but those of M and D.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,36 +44,39 @@ class Drags(Lagged):
 
     Attributes
     ----------
-    order, above, owner
-        (n,): rates, those of parents first; the rate before each in its chain, −1: none; its link.
+    rate, row_of
+        (n,): the rate of a row; the row of a rate.
+    above, owner
+        (n,): the row of the rate before that of a row in its chain, −1: none; its link.
     tip
-        (links,): the last rate that moves a link, −1: none.
+        (links,): the row of the last rate that moves a link, −1: none.
     reach, first
-        (n,): the least number in the chain of a rate; where its row of M and D begins.
+        (n,): the first row of what a row's rate moves; where the row begins in M and D.
     counts
         (2,): see `EDGES`.
     edge, pair, chain
-        (losses,) edges of the losses; (losses, 2) links between which they act; (n,) rates that move one against the
-        other.
+        (losses,) edges of the losses; (losses, 2) links between which they act; (n,) rows of rates that move one
+        against the other.
     resistance, row
         (losses, 36): μ (d, d), and T (d, 6) with u = T (V₂ − V₁) for the links' twists V.
     joined
         (losses, 36): Σ Tᵀ μ T of a pair.
-    column, moved
-        (n, 6): twists by units of the rates; memory.
+    axes, column, moved
+        (n, 6): twists by units of the rates about the ground's origin; those of rows; memory.
     body
         (links, 10): mass, moment and inertia of a link and what it carries.
     mass, drag
         (n, n): M, then the factor of M + w D; D: lower triangles, see `ephs.semantics.linear.skyline`.
-    part, sign
-        (n,): memory.
+    speed, part, sign
+        (n,): rates that are reached, by rows; memory.
     """
 
     scheme: Matrix
     again: Integers
     seen: Vector
     reached: Vector
-    order: Integers
+    rate: Integers
+    row_of: Integers
     above: Integers
     owner: Integers
     tip: Integers
@@ -85,11 +89,13 @@ class Drags(Lagged):
     resistance: Matrix
     row: Matrix
     joined: Matrix
+    axes: Matrix
     column: Matrix
     moved: Matrix
     body: Matrix
     mass: Matrix
     drag: Matrix
+    speed: Vector
     part: Vector
     sign: Vector
 
@@ -101,7 +107,7 @@ class Drags(Lagged):
         status, component = motion.rates(on, base, y, q, self.seen, self)
 
         def place() -> None:
-            on.reach(motion.tables.own[0].axes, *motion.swept, q, self.column)
+            on.reach(motion.tables.own[0].axes, *motion.swept, q, self.axes)
 
         on.when(on.both(on.same(status, 0), self.counts[EDGES] > 0), place)
         return status, component
@@ -188,18 +194,22 @@ def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str
 
 
 def chains(parts: Sequence[Part]) -> dict[str, Any]:
-    """``order``, ``above``, ``owner``, ``tip`` and ``reach`` of a tree's links."""
+    """``rate``, ``row_of``, ``above``, ``owner``, ``tip`` and ``reach`` of a tree's links."""
+    size = [part.joint.dim for part in parts]  # rates of a link and of what it carries
+    for i, part in reversed(list(enumerate(parts))):
+        if part.parent >= 0:
+            size[part.parent] += size[i]
     n = sum(part.joint.dim for part in parts)
-    above, owner, reach = np.full((3, n), -1)
-    tip, order = np.full(len(parts), -1), list[int]()
+    rate, above, owner, reach = np.full((4, n), -1)
+    tip, end = {-1: -1}, {-1: n}  # of the ground too; where rows end that are still free below a link
     for i, part in enumerate(parts):
-        last = int(tip[part.parent]) if part.parent >= 0 else -1
-        for j in range(part.r_at, part.r_at + part.joint.dim):
-            above[j], owner[j], last = last, i, j
-            reach[j] = j if above[j] < 0 else min(j, reach[above[j]])
-            order.append(j)
-        tip[i] = last
-    return {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach}
+        top, tip[i] = end[part.parent], tip[part.parent]
+        end[part.parent], end[i] = top - size[i], top - part.joint.dim
+        for row, j in zip(range(top - 1, end[i] - 1, -1), range(part.r_at, n), strict=False):
+            rate[row], above[row], owner[row], reach[row] = j, tip[i], i, top - size[i]
+            tip[i] = row
+    tips = np.array([tip[i] for i in range(len(parts))])
+    return {"rate": rate, "row_of": np.argsort(rate), "above": above, "owner": owner, "tip": tips, "reach": reach}
 
 
 def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Any]:
@@ -209,8 +219,9 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
     whole |= {"first": whole["reach"], "counts": np.zeros(2), "chain": np.zeros(n)}
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses)}
     shapes = {
-        **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
-        **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
+        **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)),
+        **dict.fromkeys(("axes", "column", "moved"), (n, 6)), **dict.fromkeys(("mass", "drag"), (n, n)),
+        **dict.fromkeys(("speed", "part", "sign", "reached"), (n,)),
         "body": (len(parts), 10), "seen": (size,),
     }  # fmt: skip
     return {name: array.astype(np.int64) for name, array in whole.items()} | {
@@ -219,9 +230,10 @@ def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> di
 
 
 DRAGS: Final[dict[str, Any]] = {
-    "scheme": matrix(), "again": indices(), "seen": vector(), "reached": vector(), "order": indices(),
-    "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(),
-    "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(), "resistance": matrix(36),
-    "row": matrix(36), "joined": matrix(36), "column": matrix(6), "moved": matrix(6), "body": matrix(10),
-    "mass": matrix(), "drag": matrix(), "part": vector(), "sign": vector(),
+    "scheme": matrix(), "again": indices(), "seen": vector(), "reached": vector(), "rate": indices(),
+    "row_of": indices(), "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(),
+    "first": indices(), "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(),
+    "resistance": matrix(36), "row": matrix(36), "joined": matrix(36), "axes": matrix(6), "column": matrix(6),
+    "moved": matrix(6), "body": matrix(10), "mass": matrix(), "drag": matrix(), "speed": vector(), "part": vector(),
+    "sign": vector(),
 }  # fmt: skip

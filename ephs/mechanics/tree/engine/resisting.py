@@ -49,11 +49,12 @@ def resist(
         on.when(on.same(status.value, 0), change)
 
     def change() -> None:
-        def move(i: Integer) -> None:
-            rate[i], z[i] = rate[i] - part[i], z[i] - weight * part[i]
+        def move(p: Integer) -> None:
+            i, change = drags.rate[p], part[p]
+            rate[i], z[i] = rate[i] - change, z[i] - weight * change
+            drags.speed[p] = z[i]
 
-        skyline_times(on, drags.drag, drags.first, z, part)
-        skyline_solve(on, drags.mass, drags.first, part)
+        _pull(on, drags, z)
         on.loop(n, move)
         _heat(on, drags, motion, out)
 
@@ -63,8 +64,19 @@ def resist(
     return status.value
 
 
+def _pull(on: Evaluator, drags: "Drags", z: Vector) -> None:
+    """Write (M + w D)⁻¹ D z, by rows, to the memory, and z by rows."""
+
+    def gather(p: Integer) -> None:
+        drags.speed[p] = z[drags.rate[p]]
+
+    on.loop(z.size, gather)
+    skyline_times(on, drags.drag, drags.first, drags.speed, drags.part)
+    skyline_solve(on, drags.mass, drags.first, drags.part)
+
+
 def _walk(on: Evaluator, drags: "Drags", link: Integer, body: Callable[[Integer], None]) -> None:
-    """Call body(rate) for the rates that move a link, the last one first."""
+    """Call body(row) for the rates that move a link, the last one first."""
     at = on.counter(on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)]))
 
     def step() -> Truth:
@@ -82,7 +94,7 @@ def _begin(on: Evaluator, drags: "Drags") -> None:
         drags.first[i] = drags.reach[i]
 
     def join(p: Integer) -> None:
-        low, links = on.counter(drags.order.size), (drags.pair[2 * p], drags.pair[2 * p + 1])
+        low, links = on.counter(drags.rate.size), (drags.pair[2 * p], drags.pair[2 * p + 1])
 
         def find(i: Integer) -> None:
             low.value = on.select(drags.first[i] < low.value, drags.first[i], low.value)
@@ -100,9 +112,9 @@ def _begin(on: Evaluator, drags: "Drags") -> None:
 
         on.loop(i + 1, entry, start=drags.first[i])
 
-    on.loop(drags.order.size, lone)
+    on.loop(drags.rate.size, lone)
     on.loop(drags.counts[PAIRS], join)
-    on.loop(drags.order.size, empty)
+    on.loop(drags.rate.size, empty)
 
 
 def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
@@ -143,17 +155,16 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
 
         on.when(parent < links, grow)
 
-    def column(j: Integer) -> None:
-        here = drags.column.row(j)
-        for k, x in enumerate(cross([here[0], here[1], here[2]], origin)):
-            here[3 + k] = here[3 + k] + x
+    def column(p: Integer) -> None:
+        here, axis = drags.column.row(p), drags.axes.row(drags.rate[p])
+        for k, x in enumerate(cross([axis[0], axis[1], axis[2]], origin)):
+            here[k], here[3 + k] = axis[k], axis[3 + k] + x
 
     def row(j: Integer) -> None:
         load = _momentum([drags.body[drags.owner[j], k] for k in range(10)], [drags.column[j, k] for k in range(6)])
 
         def entry(i: Integer) -> None:
-            low, high = on.select(i < j, i, j), on.select(i < j, j, i)
-            drags.mass[high, low] = vectors.dot([drags.column[i, k] for k in range(6)], load)
+            drags.mass[i, j] = vectors.dot([drags.column[i, k] for k in range(6)], load)
 
         at = on.counter(j)
 
@@ -171,11 +182,11 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
 
         on.when(link_of(i).armature > 0.0, grow)
 
-    n = drags.order.size
+    n = drags.rate.size
     on.loop(links, one)
     on.loop(links, carry, down=True)
     on.loop(n, column)
-    on.loop(n, lambda k: row(drags.order[k]))
+    on.loop(n, row)
     on.loop(links, armature)
 
 
@@ -208,7 +219,7 @@ def _losses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
 
         def row(i: Integer) -> None:
             def entry(j: Integer) -> None:
-                a, b = edge.r_at + i, edge.r_at + j
+                a, b = drags.row_of[edge.r_at + j], drags.row_of[edge.r_at + i]
                 drags.drag[a, b] = drags.drag[a, b] + drags.resistance[c, edge.dim * i + j]
 
             on.loop(i + 1, entry)
@@ -269,7 +280,7 @@ def _heat(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None
     s_rate, made, power = out.part(at, ns), out.part(at + (ns + 2), out.size - (at + ns + 2)), on.variable(0.0)
 
     def move(j: Integer) -> None:
-        above, rate = drags.above[j], z[j]
+        above, rate = drags.above[j], drags.speed[j]
         before = on.select(above < 0, 0, above)
         for k in range(6):
             drags.moved[j, k] = on.select(above < 0, 0.0, drags.moved[before, k]) + drags.column[j, k] * rate
@@ -303,6 +314,6 @@ def _heat(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None
         s_rate[edge.heat] = s_rate[edge.heat] + entropy
         made[tables.component[edge.friction].made] = entropy
 
-    on.loop(drags.order.size, lambda k: move(drags.order[k]))
+    on.loop(drags.rate.size, move, down=True)
     on.loop(drags.counts[EDGES], one)
     out[at + ns] = out[at + ns] + power.value
