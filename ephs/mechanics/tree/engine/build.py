@@ -139,6 +139,7 @@ def _plan(
     sizes = reduced.coordinates, rates + freedoms + entropies + 2 + len(reduced.made)
     booked = entropies, entropies + 2 + len(reduced.made)
     shapes = _shapes(program.width, (len(found.parts), len(bases)), freedoms, rates, len(cut), booked, eliminated)
+    shapes["located"] = tables["middle"].size, 6
     return _Plan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
 
 
@@ -180,6 +181,7 @@ def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
     tables["component"] = forces.component
     booked = len(reduced.entropies), len(reduced.entropies) + 2 + len(reduced.made)
     shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[sorted(joints)].sum()), len(cut), booked, whole)
+    shapes["located"] = tables["middle"].size, 6
     shapes |= {"value": (len(ends), 4), "covector": (size, 6), "e": (64,), "jac": (1024,), "scratch": (4096,)}
     return Whole(
         found.bodies, found.ground, records, _kinds(charts, cut), usual, forces.body_frame, tables, shapes

@@ -1,8 +1,8 @@
 """Resistances of a tree's losses.
 
 A loss pulls with −μ u on the relative twist u of two links, or on a joint's rates; so D = Σ Jᵀ μ J with the rows J of
-u on the rates. All twists are about one point, the place of the first link, and along the ground's axes. Rows of M and D
-are rates in an order with children first, each subtree in one piece: factors have no entries but those of M and D.
+u on the rates. All twists are about one point, the place of the first link, and along the ground's axes. Rows of M and
+D are rates in an order with children first, each subtree in one piece: factors have no entries but those of M and D.
 """
 
 from collections.abc import Mapping, Sequence

@@ -42,17 +42,13 @@ def act(
     drags
         Receives resistances in place of friction, which then does not act.
     """
-    near = Near.of(on, work.place)
     acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read, drags)
     totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
 
-    def edge(i: Integer) -> None:
-        acting.unless_refused(lambda: near.when(i, tables.acting[i], lambda edge: acting.edge(edge, i)))
-
-    on.loop(tables.acting.size, edge)
+    Near.of(on, tables, work).each(lambda edge, i: acting.unless_refused(lambda: acting.edge(edge, i)))
     on.loop(tables.conduction.size, lambda i: acting.unless_refused(lambda: acting.conduct(tables.conduction[i])))
     return acting.status.value
 
@@ -63,17 +59,12 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
     Places of links in the memory are those at q where springs act between bodies.
     """
-    near = Near.of(on, work.place)
     acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, None)
 
-    def one(i: Integer) -> None:
-        def store(edge: Acting) -> None:
-            acting.store(edge, out)
+    def one(edge: Acting, _: Integer) -> None:
+        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.store(edge, out)))
 
-        edge = tables.acting[i]
-        on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: near.when(i, edge, store)))
-
-    on.loop(tables.acting.size, one)
+    Near.of(on, tables, work).each(one)
     return acting.status.value
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 
-from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Acting
+from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Acting, Group, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import Relative, place_of
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.semantics.spaces.vectors import Rows, add, apply, apply_transposed, dot, product, sub, transposed
@@ -20,44 +20,62 @@ PARALLEL: Final = 1e-12
 @final
 @dataclass(frozen=True, slots=True)
 class Near:
-    """Tests of one evaluation, which meets the points of a contact one after the other.
+    """Tests of one evaluation, which meets the edges of a group one after the other.
 
     Attributes
     ----------
-    places
-        Links in the world.
+    tables, places, located
+        Of the mechanism; its links in the world, and memory for the points of groups there.
     first, second, pair
         Links of the last edge that was tested, and the second one in the first.
-    next
-        Number of the edge after the points of a contact of which none acts.
     """
 
     on: Evaluator
+    tables: Tables
     places: Matrix
+    located: Matrix
     first: Variable[Integer]
     second: Variable[Integer]
     pair: Relative
-    next: Variable[Integer]
 
     @staticmethod
-    def of(on: Evaluator, places: Matrix) -> "Near":
+    def of(on: Evaluator, tables: Tables, work: Work) -> "Near":
         """Return tests that have met no edge."""
         pair = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
-        return Near(on, places, on.counter(-2), on.counter(-2), pair, on.counter(0))
+        return Near(on, tables, work.place, work.located, on.counter(-2), on.counter(-2), pair)
 
-    def when(self, number: Integer, edge: Acting, body: Callable[[Acting], None]) -> None:
-        """Call body(edge) of an edge and its number, unless its frames are so far apart that nothing acts."""
-        on, following = self.on, self.next
+    def each(self, body: Callable[[Acting, Integer], None]) -> None:
+        """Call body(edge, number) of the edges, but those whose frames are so far apart that nothing acts."""
+        on, tables = self.on, self.tables
 
-        def look() -> None:
-            self._meet(edge)
-            middles = [edge.middles[k] for k in range(6)]
-            way = sub(add(apply(self.pair.turn, middles[3:]), self.pair.at), middles[:3])
-            away = dot(way, way) > edge.spread * edge.spread
-            following.value = on.select(away, number + edge.points, following.value)
+        def one(g: Integer) -> None:
+            group, near = tables.group[g], on.counter(1)
 
-        on.when(edge.points > 0, look)
-        on.when(number >= following.value, lambda: self._alone(edge, body))
+            def look() -> None:
+                near.value = on.select(self._far(group), 0, 1)
+
+            def edge(i: Integer) -> None:
+                self._alone(tables.acting[i], lambda edge: body(edge, i))
+
+            on.when(group.support > 0, look)
+            on.when(on.same(near.value, 1), lambda: on.loop(group.end, edge, start=group.start))
+
+        on.loop(tables.middle.size, self._place)
+        on.loop(tables.group.size, one)
+
+    def _place(self, k: Integer) -> None:
+        middle = self.tables.middle[k]
+        link = place_of(self.on, self.places, middle.link)
+        for i, x in enumerate([*add(apply(link.turn, middle.at), link.at), *apply(link.turn, middle.axis)]):
+            self.located[k, i] = x
+
+    def _far(self, group: Group) -> Truth:
+        """Whether the points of a group are so far from each other that none of its edges acts."""
+        on, one, two = self.on, self.located.row(group.one), self.located.row(group.two)
+        way = [two[k] - one[k] for k in range(3)]
+        above = on.both(on.same(group.support, ABOVE), dot([one[3 + k] for k in range(3)], way) > group.spread)
+        beyond = on.both(on.same(group.support, BEYOND), dot(way, way) > group.spread * group.spread)
+        return on.either(above, beyond)
 
     def _alone(self, edge: Acting, body: Callable[[Acting], None]) -> None:
         on, near = self.on, self.on.counter(1)

@@ -40,7 +40,7 @@ from ephs.semantics.stage import (
 
 ACTIVE: Final = (
     "work", "place", "relative", "value", "covector", "force", "pushed", "attached", "pulled", "temperature", "entropy",
-    "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",
+    "located", "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",
 )  # fmt: skip
 """Arguments that have derivatives, beside those that only one of the functions has."""
 MOVING: Final[dict[str, Any]] = {**TABLES, **WORK}

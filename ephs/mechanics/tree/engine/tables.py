@@ -1,11 +1,22 @@
 """Forces on a mechanism as arrays: from the tables of a reduced scene to the records of the engine."""
 
-from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps.acting import BEYOND, Acting, Body, Component, Conduction, Node, Port, Sink
+from ephs.mechanics.tree.sweeps.acting import (
+    ABOVE,
+    BEYOND,
+    Acting,
+    Body,
+    Component,
+    Conduction,
+    Group,
+    Middle,
+    Node,
+    Port,
+    Sink,
+)
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Record, Table
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
@@ -36,13 +47,16 @@ class Forces(NamedTuple):
     def tables(self) -> dict[str, Any]:
         """Return the records of the engine, by name."""
         inner, inner_at, outer, outer_at = np.split(self.frame, [9, 12, 21], axis=1)
-        points, around = contacts(np.hstack([self.edge[:, :3], self.part[:, 3:]]), inner_at, outer_at, self.reach[:, 0])
+        ends = np.hstack([self.edge[:, :3], self.part[:, 3:]])
+        group, middle = groups_of(ends, inner.reshape(-1, 3, 3)[:, :, 2], inner_at, outer_at, self.reach[:, 0])
         return {
             "acting": table_of(
                 Acting,
-                np.hstack([self.edge[:, :1], self.part[:, 3:], self.edge[:, 1:], self.part[:, :3], points]),
-                np.hstack([inner_at, outer_at, self.reach[:, :2], inner, outer, self.reach[:, 2:], self.left, around]),
+                np.hstack([self.edge[:, :1], self.part[:, 3:], self.edge[:, 1:], self.part[:, :3]]),
+                np.hstack([inner_at, outer_at, self.reach[:, :2], inner, outer, self.reach[:, 2:], self.left]),
             ),
+            "group": group,
+            "middle": middle,
             "body": table_of(Body, self.body[:, None], self.body_frame),
             "node": self.node,
             "conduction": table_of(Conduction, self.conduction),
@@ -53,19 +67,33 @@ class Forces(NamedTuple):
         }
 
 
-def contacts(edge: Index, inner: Array, outer: Array, reach: Array) -> tuple[Index, Array]:
-    """``points`` (edges, 1), and ``middles`` and ``spread`` (edges, 7), of `Acting`, by kind, links and support."""
-    points, around = np.zeros((len(edge), 1), dtype=np.int64), np.zeros((len(edge), 7))
-    key = np.hstack([edge[:, :3], edge[:, 3:] >= BEYOND])
-    starts = np.flatnonzero(np.any(np.diff(key, axis=0, prepend=-2), axis=1)).tolist()
-    for start, end in pairwise([*starts, len(edge)]):
-        if edge[start, 3] >= BEYOND and end - start > 1:
-            ends = inner[start:end], outer[start:end]
-            middles = [0.5 * (each.min(axis=0) + each.max(axis=0)) for each in ends]
-            far = [np.linalg.norm(each - middle, axis=1) for each, middle in zip(ends, middles, strict=True)]
-            spread = (1.0 + ROUNDING) * (far[0] + far[1] + reach[start:end]).max()
-            points[start], around[start] = end - start, [*middles[0], *middles[1], spread]
-    return points, around
+def groups_of(edge: Index, axis: Array, inner: Array, outer: Array, reach: Array) -> tuple[Table[Group], Table[Middle]]:
+    """Groups of consecutive edges, with their points, each point once.
+
+    Parameters
+    ----------
+    edge
+        (edges, 4): kind, links and support of `Acting`.
+    axis, inner, outer
+        (edges, 3): z axis and place of the first frame in the first link, place of the second one in the second.
+    reach
+        (edges,), of `Acting`.
+    """
+    count, support = len(edge), np.minimum(edge[:, 3], BEYOND)
+    bounded, plane = support[:, None] > 0, support[:, None] == ABOVE
+    upwards = np.where(plane, axis, 0.0)
+    key = np.hstack([support[:, None], np.where(bounded, edge[:, :3], 0), upwards, np.where(plane, inner, 0.0)])
+    starts = np.flatnonzero(np.any(np.diff(key, axis=0, prepend=np.nan) != 0.0, axis=1))
+    ends = np.append(starts[1:], count)[: starts.size]
+    far, rows = np.asarray(reach, dtype=float).copy(), list[Array]()
+    for link, at, along in ((edge[:, 1:2], inner, upwards), (edge[:, 2:3], outer, np.zeros((count, 3)))):
+        middles = 0.5 * (np.minimum.reduceat(at, starts) + np.maximum.reduceat(at, starts)) if count else at
+        far += np.linalg.norm(at - np.repeat(middles, ends - starts, axis=0), axis=1)
+        rows.append(np.where(bounded[starts], np.hstack([link[starts], middles, along[starts]]), 0.0) + 0.0)
+    spread = (1.0 + ROUNDING) * (np.maximum.reduceat(far, starts) if count else far)
+    found, which = np.unique(np.concatenate(rows), axis=0, return_inverse=True)
+    numbers = np.column_stack([support[starts], starts, ends, *np.split(which.ravel(), 2)])
+    return table_of(Group, numbers, spread), table_of(Middle, found[:, :1].astype(np.int64), found[:, 1:])
 
 
 def table_of(record: type[Record], integers: Index, reals: Array | None = None) -> Table[Any]:

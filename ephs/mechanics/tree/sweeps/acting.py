@@ -144,11 +144,6 @@ class Acting(Record):
         Its first frame in the first link's, its second in the second's.
     left
         (BᵀB)⁻¹Bᵀ in its first ``dim`` rows.
-    points
-        Of the first of consecutive edges between the same links, all with supports from `BEYOND` on: how many there
-        are; else 0.
-    middles, spread
-        Of all these: points of the first and of the second link, and their distance beyond which none of them acts.
     """
 
     kind = integer()
@@ -163,7 +158,6 @@ class Acting(Record):
     spring = integer()
     friction = integer()
     heat = integer()
-    points = integer()
     inner_at = reals(3)
     outer_at = reals(3)
     reach = real()
@@ -173,7 +167,34 @@ class Acting(Record):
     halves = reals(6)
     parallel = real()
     left = reals(6, 6)
-    middles = reals(6)
+
+
+class Middle(Record):
+    """A point of a link, −1: the ground, and a direction there, along which planes are above."""
+
+    link = integer()
+    at = reals(3)
+    axis = reals(3)
+
+
+class Group(Record):
+    """Consecutive edges between the same links, of which none acts where two points are far from each other.
+
+    Attributes
+    ----------
+    support, spread
+        `ABOVE` or `BEYOND`: where the second point is higher above the first, or farther from it, none acts; else 0.
+    start, end
+        Numbers of the edges.
+    one, two
+        The points, of the first and of the second link.
+    """
+
+    support = integer()
+    start = integer()
+    end = integer()
+    one = integer()
+    two = integer()
     spread = real()
 
 
@@ -262,6 +283,8 @@ class Tables:
     flat: Integers
     end: Integers
     acting: Table[Acting]
+    group: Table[Group]
+    middle: Table[Middle]
     body: Table[Body]
     node: Table[Node]
     conduction: Table[Conduction]
@@ -293,10 +316,10 @@ class Tables:
 TABLES: Final[dict[str, Any]] = {
     "own": table(Own), "integers": indices(), "reals": vector(), "gravity": vector(3), "chart": table(Chart),
     "cut": indices(), "cut_numbers": vector(), "at": indices(), "slot": indices(), "row": indices(), "flat": indices(),
-    "end": indices(), "acting": table(Acting), "body": table(Body), "node": table(Node),
-    "conduction": table(Conduction), "sink": table(Sink), "component": table(Component), "parameters": vector(),
-    "island": indices(), "bases": vector(), "port": table(Port), "net": indices(), "numbers": vector(),
-    "drive": vector(), "wrench": matrix(6), "scal": vector(3), "supply": vector(),
+    "end": indices(), "acting": table(Acting), "group": table(Group), "middle": table(Middle), "body": table(Body),
+    "node": table(Node), "conduction": table(Conduction), "sink": table(Sink), "component": table(Component),
+    "parameters": vector(), "island": indices(), "bases": vector(), "port": table(Port), "net": indices(),
+    "numbers": vector(), "drive": vector(), "wrench": matrix(6), "scal": vector(3), "supply": vector(),
     "lead": vector(),
 }  # fmt: skip
 
@@ -314,6 +337,8 @@ class Work:
         Wrenches (links, 6) on links, in their frames; forces on the tree's rates; zeros.
     attached, pulled
         Forces on the degrees of freedom of all joints: of what is attached, and all but the constraints'.
+    located
+        (points, 6): points of groups, and directions there, in the world.
     relative
         (cut joints, width): see `ephs.mechanics.tree.sweeps.cuts.Relative`.
     value, entry, covector, along, largest
@@ -346,6 +371,7 @@ class Work:
     zero: Vector
     attached: Vector
     pulled: Vector
+    located: Matrix
     relative: Matrix
     value: Matrix
     entry: Vector
@@ -382,10 +408,11 @@ class Work:
 
 WORK: Final[dict[str, Any]] = {
     "work": vector(), "place": matrix(Place.real_width), "change": matrix(6), "pushed": matrix(6), "force": vector(),
-    "zero": vector(), "attached": vector(), "pulled": vector(), "relative": matrix(Relative.real_width),
-    "value": matrix(4), "entry": vector(), "covector": matrix(6), "along": matrix(12), "largest": vector(),
-    "temperature": vector(), "entropy": vector(), "x": vector(), "v": vector(), "e": vector(), "lam": vector(),
-    "f": vector(), "c": vector(), "jac": vector(), "scratch": vector(), "alter": vector(), "moved": vector(),
+    "zero": vector(), "attached": vector(), "pulled": vector(), "located": matrix(6),
+    "relative": matrix(Relative.real_width), "value": matrix(4), "entry": vector(), "covector": matrix(6),
+    "along": matrix(12), "largest": vector(), "temperature": vector(), "entropy": vector(), "x": vector(),
+    "v": vector(), "e": vector(), "lam": vector(), "f": vector(), "c": vector(), "jac": vector(),
+    "scratch": vector(), "alter": vector(), "moved": vector(),
     "momenta": matrix(6), "spin": vector(), "direction": vector(), "descent": vector(), "kept": vector(),
     "released": vector(), "found": vector(), "torque": vector(), "sums": matrix(SUMS), "still": vector(),
     "idle": vector(), "spare": vector(), "answer": vector(1), "fault": indices(1),

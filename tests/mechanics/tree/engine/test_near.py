@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from ephs.mechanics.shapes.gap import edges, segments
 from ephs.mechanics.tree.engine.near import segments_apart
-from ephs.mechanics.tree.engine.tables import contacts
-from ephs.mechanics.tree.sweeps.acting import ABOVE, APART, ON_BODIES
+from ephs.mechanics.tree.engine.tables import groups_of
+from ephs.mechanics.tree.sweeps.acting import ABOVE, APART, BEYOND, ON_BODIES, ON_TREE
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import PLAIN
 
@@ -75,19 +75,54 @@ def test_edges_beyond_the_angle_of_parallel_are_closed():
     assert not found(pose, gap)
 
 
-@settings(max_examples=200, deadline=None)
-@given(st.integers(2, 12), st.floats(0.0, 0.3), st.integers(0, 10_000), st.sampled_from([0.9, 0.999999, 1.000001, 1.5]))
-def test_no_contact_is_left_out_of_which_a_point_acts(count, reach, seed, share):
-    """One point is about as far as it acts; the edges before and after are a plane's, and one of other links."""
-    rng = np.random.default_rng(seed)
-    inner, outer = rng.normal(size=(2, count, 3))
-    edge = np.array([[ON_BODIES, 0, 1, ABOVE], *[[ON_BODIES, 0, 1, APART]] * count, [ON_BODIES, 0, 2, APART]])
-    ends = [np.concatenate([rng.normal(size=(1, 3)), each, rng.normal(size=(1, 3))]) for each in (inner, outer)]
-    points, around = contacts(edge, *ends, np.full(count + 2, reach))
-    assert points.ravel().tolist() == [0, count, *[0] * count]
+def pose_between(rng, inner, outer, way):
+    """Of the second link in the first, where ``outer`` of that is at inner + way of this."""
     turn = quaternion_to_matrix(pose_of(rng.normal(size=4), (0.0, 0.0, 0.0))[:4])
-    point, way = rng.integers(count), rng.normal(size=3)
-    place = inner[point] - turn @ outer[point] + share * reach * way / np.linalg.norm(way)
-    away = np.linalg.norm(turn @ around[1, 3:6] + place - around[1, :3]) > around[1, 6]
-    nearest = np.linalg.norm(inner - (outer @ turn.T + place), axis=1).min()
-    assert not away or nearest > reach
+    return turn, inner + way - turn @ outer
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(1, 12), st.floats(0.0, 0.3), st.integers(0, 10_000), st.sampled_from([0.9, 0.999999, 1.000001, 1.5]))
+def test_no_group_is_left_out_of_which_an_edge_acts(count, reach, seed, share):
+    """One edge is about as far as it acts; before are joints and points of a plane, behind an edge of other links."""
+    rng = np.random.default_rng(seed)
+    inner, outer = rng.normal(size=(2, 2 * count + 3, 3))
+    inner[2 : 2 + count], axis = inner[2], np.tile(rng.normal(size=3), (2 * count + 3, 1))
+    axis /= np.linalg.norm(axis[0])
+    rows = [
+        *[[ON_TREE, i, i + 1, 0] for i in range(2)], *[[ON_BODIES, 0, 1, ABOVE]] * count,
+        *[[ON_BODIES, 0, 1, APART]] * count, [ON_BODIES, 0, 2, APART],
+    ]  # fmt: skip
+    group, middle = groups_of(np.array(rows), axis, inner, outer, np.full(len(rows), reach))
+    found = [(group[g].support, group[g].start, group[g].end) for g in range(4)]
+    assert group.size == 4
+    assert found == [
+        (0, 0, 2),
+        (ABOVE, 2, 2 + count),
+        (BEYOND, 2 + count, 2 + 2 * count),
+        (BEYOND, len(rows) - 1, len(rows)),
+    ]
+    plane, points = (slice(group[g].start, group[g].end) for g in (1, 2))
+    for g, edges_of in ((1, plane), (2, points)):
+        nearest = rng.integers(edges_of.start, edges_of.stop)
+        way = rng.normal(size=3) if g == 2 else axis[0]
+        turn, place = pose_between(rng, inner[nearest], outer[nearest], share * reach * way / np.linalg.norm(way))
+        one, other = middle[group[g].one], middle[group[g].two]
+        between = turn @ [other.at[k] for k in range(3)] + place - [one.at[k] for k in range(3)]
+        away = outer[edges_of] @ turn.T + place - inner[edges_of]
+        if g == 1:
+            far = between @ [one.axis[k] for k in range(3)] > group[g].spread
+            least = (away @ axis[0]).min()
+        else:
+            far, least = np.linalg.norm(between) > group[g].spread, np.linalg.norm(away, axis=1).min()
+        assert not far or least > reach
+        assert (one.link, other.link) == (0, 1)
+
+
+def test_points_that_are_shared_stand_once():
+    """Balls that all meet a floor and each other."""
+    pairs = [(i, j) for i in range(-1, 5) for j in range(i + 1, 5)]
+    edge = np.array([[ON_BODIES, i, j, ABOVE if i < 0 else BEYOND] for i, j in pairs])
+    zero = np.zeros((len(pairs), 3))
+    group, middle = groups_of(edge, np.tile([0.0, 0.0, 1.0], (len(pairs), 1)), zero, zero, np.ones(len(pairs)))
+    assert (group.size, middle.size) == (len(pairs), 6)
