@@ -1,10 +1,11 @@
 """Robots of gymnasium that fall onto a floor, and scenes of contact: time, balance of energy and overlap, by all.
 
 All read the same models. Contact laws differ, so that motions are not compared digit by digit: each is held against a
-refined run of its own, in the places of bodies at the end. Errors in contact depend on where in a step surfaces meet,
-so they are medians over runs under slightly different gravity. Beside that stand processor time, the share of the
-energy that has no place in the balance, and how deep bodies sink. MuJoCo runs at the step of the file. The time of
-steps is that of the calls of compiled code, with the set-up of derivatives; all else of a run is its start.
+refined run of its own, in the places of bodies at twenty times: what rests at the end may have moved wrongly before.
+Errors in contact depend on where in a step surfaces meet, so they are medians over runs under slightly different
+gravity. Beside that stand processor time, the share of the energy that has no place in the balance, and how deep bodies
+sink. MuJoCo runs at the step of the file. The time of steps is that of the calls of compiled code, with the set-up of
+derivatives; all else of a run is its start.
 """
 
 import tempfile
@@ -36,6 +37,8 @@ REFINED = 1e-7
 """Tolerance of the refined run."""
 FINER = 64
 """Part of MuJoCo's step that its refined run takes."""
+TIMES = 20
+"""Number of times of a run at which places are compared."""
 GRAVITIES = (0.98, 0.99, 1.0, 1.01, 1.02)
 """Factors of gravity of the runs whose median error counts."""
 REPEATS = 3
@@ -73,11 +76,11 @@ def report() -> Report:
 
 
 def _beside(name: str, scene: Any, mjcf: str, until: float) -> list[dict[str, Any]]:
-    other = _mujoco(mjcf, until)
-    rows = [{"model": name, **row, "ratio": row["seconds"] / other["seconds"]} for row in _ours(scene, until)]
+    other, times = _mujoco(mjcf, until)
+    rows = [{"model": name, **row, "ratio": row["seconds"] / other["seconds"]} for row in _ours(scene, until, times)]
     rows += [
         {"model": name, **row, "ratio": row["seconds"] / other["seconds"]}
-        for row in contact_drake.beside(name, mjcf, until, REPEATS)
+        for row in contact_drake.beside(name, mjcf, times, REPEATS)
     ]
     return [*rows, {"model": name, **other, "ratio": 1.0}]
 
@@ -115,12 +118,11 @@ def _advancing() -> Iterator[list[float]]:
         March.advance = advance
 
 
-def _ours(scene: Any, until: float) -> list[dict[str, Any]]:
+def _ours(scene: Any, until: float, times: Any) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
-    weight, fine = scene.world.gravity[2], {"rtol": REFINED, "atol": 1e-2 * REFINED, "audit": "off"}
+    weight, fine = scene.world.gravity[2], {"rtol": REFINED, "atol": 1e-2 * REFINED}
     several = [varied(scene, {"world.gravity[2]": factor * weight}) for factor in GRAVITIES]
-    end = np.array([until])
-    exact = [_places(one, ephs.simulate(one, until, save_at=end, **fine)) for one in several]
+    exact = [_places(one, times, fine) for one in several]
     for rtol, atol in TOLERANCES:
         options: dict[str, Any] = {"rtol": rtol, "atol": atol, "audit": "off"}
         sol = ephs.simulate(scene, until, **options)  # compiles
@@ -129,31 +131,33 @@ def _ours(scene: Any, until: float) -> list[dict[str, Any]]:
         def run(options: dict[str, Any] = options, runs: list[tuple[float, float]] = runs) -> None:
             begin = time.process_time()
             with _advancing() as found:
-                ephs.simulate(scene, until, save_at=end, **options)
+                ephs.simulate(scene, until, save_at=np.array([until]), **options)
             runs.append((sum(found), time.process_time() - begin - sum(found)))
 
         _times(run)
-        ends = [_places(one, ephs.simulate(one, until, save_at=end, **options)) for one in several]
+        places = [_places(one, times, options) for one in several]
         deepest = max(0.0, *(-float(sol.contact(each).gap.min()) for each, _ in scene.all_contacts()))
         rows.append({
             "by": f"{sol.stats['method']}, {rtol:g}, {atol:g}", "steps": int(sol.stats["steps"]),
             "start": min(other for _, other in runs), "seconds": min(steps for steps, _ in runs),
-            "error": _median(ends, exact), "lost": float(np.abs(sol.energy_error).max()), "overlap": deepest,
+            "error": _median(places, exact), "lost": float(np.abs(sol.energy_error).max()), "overlap": deepest,
         })  # fmt: skip
     return rows
 
 
-def _median(ends: list[Any], exact: list[Any]) -> float:
+def _places(scene: Any, times: Any, options: dict[str, Any]) -> Any:
+    """(bodies, times, 3)."""
+    sol = ephs.simulate(scene, times[-1], save_at=times, **{**options, "audit": "off"})
+    return np.array([sol.body(name).position for name, _ in scene.all_bodies()])
+
+
+def _median(runs: list[Any], exact: list[Any]) -> float:
     """Over runs, of the largest error of a body's place."""
-    return float(np.median([np.linalg.norm(one - other, axis=1).max() for one, other in zip(ends, exact, strict=True)]))
+    return float(np.median([np.linalg.norm(one - other, axis=2).max() for one, other in zip(runs, exact, strict=True)]))
 
 
-def _places(scene: Any, sol: Any) -> Any:
-    """(bodies, 3) at the end."""
-    return np.array([sol.body(name).position[-1] for name, _ in scene.all_bodies()])
-
-
-def _mujoco(text: str, until: float) -> dict[str, Any]:
+def _mujoco(text: str, until: float) -> tuple[dict[str, Any], Any]:
+    """A row of the table, and the times in s, of whole steps, at which places are compared."""
     mujoco: Any = import_module("mujoco")
     mujoco.set_mju_user_warning(silent)  # else it writes a log file into the working folder
 
@@ -190,16 +194,21 @@ def _mujoco(text: str, until: float) -> dict[str, Any]:
         deepest = max(deepest, -float(data.contact.dist.min(initial=0.0)))
     step, weight = model.opt.timestep, model.opt.gravity.copy()
 
+    kept = np.unique(np.round(np.linspace(0, steps, TIMES + 1)).astype(int)[1:])
+
     def places(factor: float, finer: int) -> Any:
         model.opt.gravity[:], model.opt.timestep = factor * weight, step / finer
         again(model, data)
-        for _ in range(finer * steps):
-            mujoco.mj_step(model, data)
-        return np.array(data.xpos)
+        found: list[Any] = []
+        for after in np.diff(kept, prepend=0):
+            for _ in range(finer * after):
+                mujoco.mj_step(model, data)
+            found.append(np.array(data.xpos))
+        return np.array(found)
 
-    ends, exact = ([places(factor, finer) for factor in GRAVITIES] for finer in (1, FINER))
+    runs, exact = ([places(factor, finer) for factor in GRAVITIES] for finer in (1, FINER))
     gross = max(abs(energy - first) for energy in energies) + abs(first)
     return {
         "by": "MuJoCo", "steps": steps, "start": _least(made), "seconds": min(seconds),
-        "error": _median(ends, exact), "lost": abs(first - energies[-1]) / gross, "overlap": deepest,
-    }  # fmt: skip
+        "error": _median(runs, exact), "lost": abs(first - energies[-1]) / gross, "overlap": deepest,
+    }, np.append(step * kept[:-1], until)  # fmt: skip
