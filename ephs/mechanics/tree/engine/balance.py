@@ -259,7 +259,7 @@ class Correction(Missing):
         slope, first = on.variable(0.0), on.variable(self.short)
         self._weigh(w.descent, slope)
         whole = on.variable(twice + self.h * self.h * slope.value)
-        rounds, gone = on.counter(0), on.variable(0.0)
+        rounds, gone, ended = on.counter(0), on.variable(0.0), on.counter(0)
 
         def once() -> Truth:
             short, part = self.short, self.short / whole.value
@@ -267,16 +267,24 @@ class Correction(Missing):
             self._shift(part)
             # turning about rates that are not small bends the energy: by how much it grew says the slope
             grown = short - self.short
-            likely = on.both(grown > 0.25 * short, grown < 4.0 * short)
-            likely = on.either(likely, on.both(grown < 0.25 * short, grown > 4.0 * short))
+            likely = on.either(
+                on.both(grown > 0.25 * short, grown < 4.0 * short), on.both(grown < 0.25 * short, grown > 4.0 * short)
+            )
+            learns = on.both(self.floating, likely)
 
             def learn() -> None:
                 whole.value = whole.value * (grown / short)
 
-            on.when(on.both(self.floating, likely), learn)
+            def back() -> None:
+                gone.value, ended.value = gone.value - part, 1
+                self._shift(-part)
+
+            worse = on.negate(on.absolute(self.short) <= on.absolute(short))
+            on.when(learns, learn, lambda: on.when(worse, back))
             rounds.value = rounds.value + 1
             unsound = on.negate(on.same(self.status.value, 0))
-            return on.either(on.either(unsound, self.close), rounds.value >= ROUNDS)
+            over = on.either(on.same(ended.value, 1), rounds.value >= ROUNDS)
+            return on.either(on.either(unsound, self.close), over)
 
         def size(far: Real) -> Real:
             here = far * self._size(w.direction, self.r.size)
