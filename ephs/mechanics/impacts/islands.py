@@ -64,7 +64,7 @@ def shared(taken: Array) -> Array:
     return losing * (total / whole if whole > 0.0 else 0.0)
 
 
-def struck(mobility: Array, before: Array, laws: Sequence[Impact], touching: float, quiet: float) -> Blow:
+def struck(mobility: Array, before: Array, laws: Sequence[Impact], touching: float, quiet: Array) -> Blow:
     """The impact at one instant.
 
     Parameters
@@ -72,7 +72,8 @@ def struck(mobility: Array, before: Array, laws: Sequence[Impact], touching: flo
     mobility, before
         G (3m, 3m), and velocities γ (3m,) before it.
     touching, quiet
-        Speeds in m/s below which a contact does not approach, and below which an island does not bounce.
+        Speeds in m/s below which a contact does not approach, and (m,) below which it does not bounce: an island
+        bounces where one of its contacts does.
 
     Raises
     ------
@@ -82,11 +83,11 @@ def struck(mobility: Array, before: Array, laws: Sequence[Impact], touching: flo
     m = len(laws)
     impulse, heat = np.zeros(3 * m), np.zeros(m)
     for island in islands_of(mobility):
-        speed = -float(before[3 * island].min())
-        if speed <= touching:
+        speed = -before[3 * island]
+        if speed.max() <= touching:
             continue
         own = [laws[i] for i in island]
-        bouncing = speed > quiet
+        bouncing = bool(np.any(speed > quiet[island]))
         restitution = min(law.restitution for law in own) if bouncing else 0.0
         slipping = min(law.slip_restitution for law in own) if bouncing else 0.0
         at = (3 * island[:, None] + np.arange(3)).ravel()

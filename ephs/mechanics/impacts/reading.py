@@ -78,8 +78,8 @@ def pressing_at(equations: Equations, touching: Touching, state: ReducedState, a
     """
     eq, none = equations, np.zeros(0, dtype=np.int64)
     length = eq.problem.length
+    speed = touching.speed(state.q, state.r, accelerations)
     gaps, rates = touching.motion(state.q, state.r)
-    speed = max(float(np.sqrt(np.linalg.norm(eq.gravity) * length)), float(np.abs(rates).max(initial=0.0)))
     held = np.flatnonzero((np.abs(gaps) <= CLOSED * length) & (np.abs(rates) <= CLOSED * speed))
     if not held.size:
         return Pressing(none, none, np.zeros((0, 3)), np.zeros(eq.n), np.zeros((0, 3, 0)))

@@ -80,19 +80,21 @@ class Impacts(ReducedMethod):
         self._inputs = eq.constant, eq.held, eq.steady
         self._alone = eq.problem.constant and not (eq.drive.any() or eq.wrench.any() or eq.given.supply.any())
         self._alone = self._alone and not eq.driven.size
-        length = eq.problem.length
-        self._closed = CLOSED * length
-        self._speed = float(np.sqrt(np.linalg.norm(eq.gravity) * length))
+        self._closed = CLOSED * eq.problem.length
+        self._speed = 0.0
         self.counts: dict[str, Any] = inner.counts
         self.counts |= {"parts": 0}
         self._modes = np.zeros(len(self._touching))
+        self._left = np.full(len(self._touching), -np.inf)
         self._happened: list[tuple[float, str, ReducedState]] = []
 
     def start(self, t: float, h: float) -> ReducedState:
         """The initial state; speeds count by the mechanism's own, a fall's or that of the start."""
         state = self.equations.accounts.opened(self._inner.start(t, h))
-        gaps, rates = self._touching.motion(state.q, state.r)
-        self._speed = max(self._speed, float(np.abs(rates).max(initial=0.0)))
+        eq = self.equations
+        accelerations = eq.rates(state.t, state.q, eq.vector(state))[eq.nv : eq.nv + eq.n]
+        self._speed = self._touching.speed(state.q, state.r, accelerations)
+        gaps = self._touching.gaps(state.q, state.r)
         deep = int(np.argmin(gaps))
         if gaps[deep] < -self._closed:
             path = str(self._touching.paths[deep])
@@ -106,6 +108,7 @@ class Impacts(ReducedMethod):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds, in as many parts as needed."""
         here, left, error = self.equations.accounts.opened(state), h, 0.0
+        self._left[:] = -np.inf
         self._happened, modes = [], state.memory[0] if state.memory else None
         self.name, self.exponent, self.share = self._inner.name, self._inner.exponent, self._inner.share
         for _ in range(PARTS):
@@ -126,7 +129,10 @@ class Impacts(ReducedMethod):
     # ---- impacts -----------------------------------------------------------------------------------------------
 
     def _struck(self, state: ReducedState) -> ReducedState:
-        """The state after the impact of its closed gaps, if these close."""
+        """The state after the impact of its closed gaps, if these close.
+
+        Contacts whose flight since the last impact of this step was lower than what can be located do not bounce.
+        """
         gaps, rates = self._touching.motion(state.q, state.r)
         closed = np.flatnonzero(gaps <= self._closed)
         if not closed.size or not np.any(rates[closed] < -PARTING * self._speed):
@@ -136,14 +142,17 @@ class Impacts(ReducedMethod):
         by = answer(eq, state, rows)
         before = rows @ state.r
         laws = [self._touching.laws[i] for i in closed]
+        low = 0.25 * (state.t - self._left[closed]) * np.abs(before[::3]) <= LOCATED * self._closed
+        quiet = np.where(low, np.inf, QUIET * self._speed)
         try:
-            blow = struck(rows @ by, before, laws, PARTING * self._speed, QUIET * self._speed)
+            blow = struck(rows @ by, before, laws, PARTING * self._speed, quiet)
         except Unlawful as failed:
             path = str(self._touching.paths[closed[failed.contact]])
             raise SolveError(Outcome.LAWLESS, path, failed.reason) from None
         change = by @ blow.impulse
         mass = eq.mass(state.q, state.r)
         gained = float(change @ (mass @ (state.r + 0.5 * change)))
+        self._left[closed] = state.t
         end = replace(state, q=state.q.copy(), r=state.r + change, memory=())
         work = gained + float(blow.heat.sum()) if eq.driven.size else 0.0
         end = self._booked(state, end, closed, blow.heat, work)
@@ -180,6 +189,8 @@ class Impacts(ReducedMethod):
                     end, error = self._halved(state, share * h, held, gaps, end, error)
                 return end, share, error
             share *= divided
+            if share <= SLIVER:  # a gap that jumps
+                break
         path = self._touching.paths[int(held[0]) if held.size else int(np.argmin(gaps))]
         raise SolveError(Outcome.DIVERGED, str(path), "an impact, or forces of closed contacts")
 

@@ -133,6 +133,14 @@ class Touching:
             rates[group] = sum(w * u for w, u in zip(wrench, moving, strict=True))
         return gaps, rates
 
+    def speed(self, q: Array, r: Array, accelerations: Array) -> float:
+        """The mechanism's own speed in m/s: that of a gap, or of a fall through its length by weight or by the
+        accelerations (n,) of the tree's rates; one length a second where all vanish."""
+        length = self._eq.problem.length
+        _, pulls = self.motion(q, accelerations)
+        pull = max(float(np.linalg.norm(self._eq.gravity)), float(np.abs(pulls).max(initial=0.0)))
+        return max(float(np.sqrt(pull * length)), float(np.abs(self.motion(q, r)[1]).max(initial=0.0))) or length
+
     def rows(self, q: Array, r: Array, which: Index, axes: Index | None = None) -> tuple[Array, Index]:
         """(3k, n) of some points and stops: the velocity with which they part, and two along the surfaces.
 

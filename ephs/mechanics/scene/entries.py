@@ -59,6 +59,7 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
     "rotation": lambda ctx: ("range", FORMS),
     "rotation_type": lambda ctx: ("type", f"a unit quaternion [w, x, y, z], or a table with {FORMS}"),
+    "points_length": lambda ctx: ("length", f"4 to {ctx['most']} points"),
     "too_short": lambda ctx: ("length", f"{ctx['min_length']} entries"),
     "too_long": lambda ctx: ("length", f"{ctx['max_length']} entries"),
     "greater_than": lambda ctx: ("range", f"a number above {ctx['gt']:g}"),
@@ -148,7 +149,7 @@ def shown(value: Any) -> str:
         return "nan" if math.isnan(value) else repr(value)
     if isinstance(value, list):
         text = "[" + ", ".join(shown(entry) for entry in value) + "]"
-        return text if len(text) <= 60 else f"{text[:57]}…]"
+        return text if len(text) <= 60 else f"{text[:57]}…] of {len(value)} entries"
     return str(value)
 
 

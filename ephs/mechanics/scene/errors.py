@@ -146,6 +146,9 @@ TEXTS: dict[str, tuple[str, str]] = {
         "one of sphere, capsule, cylinder, box, plane = {{}}, mesh, points",
         "a surface has exactly one shape",
     ),
+    "contact bodies": ("surfaces of two different bodies", "name surfaces of two bodies, or of a body and the ground"),
+    "contact still": ("surfaces that can move relative to each other", "remove this contact"),
+    "contact twice": ("a pair of surfaces without another contact", "remove one of the two contacts"),
     "surface pair": ("one plane at most", "list the pairs in contacts, or use other shapes"),
     "two exponents": ("one exponent", "give both surfaces the same exponent, or one to the contact"),
     "no stiffness": (

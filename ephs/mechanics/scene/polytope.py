@@ -10,7 +10,8 @@ MOST_BYTES = 20_000_000
 MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""
 FLAT = 1e-5
-"""Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes."""
+"""Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes. Bodies that are
+thinner count as flat."""
 BLOCK = 2**22
 """Numbers that are in memory at a time for the depth of vertices."""
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
@@ -27,8 +28,10 @@ def vertices_of(file: Path) -> Array:
         Fault of the file: it cannot be read, bounds no body, is not convex, or has too many vertices.
     """
     triangles = triangles_of(file)
-    if not len(triangles) or not np.all(np.isfinite(triangles)):
+    if not len(triangles):
         raise ValueError("a file without triangles")
+    if not np.all(np.isfinite(triangles)):
+        raise ValueError("a mesh with numbers that are not finite")
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     hull = _hull(triangles.reshape(-1, 3))
     if hull is None:
@@ -52,11 +55,11 @@ def corners_of(points: Array) -> Array:
     Raises
     ------
     ValueError
-        Points in a plane.
+        Points in a plane, or nearly.
     """
     hull = _hull(points)
     if hull is None:
-        raise ValueError("points in a plane")
+        raise ValueError("points in a plane, or nearly")
     return hull[0]
 
 
@@ -112,6 +115,8 @@ def _hull(points: Array) -> tuple[Array, Array, float] | None:
         hull = ConvexHull(np.unique(points, axis=0))
     except (QhullError, ValueError):
         return None
+    if hull.volume <= FLAT * hull.area * float(np.ptp(points, axis=0).max()):
+        return None
     return hull.points[hull.vertices], hull.equations, float(hull.volume)
 
 
@@ -123,8 +128,10 @@ def triangles_of(file: Path) -> Array:
     ValueError
         A file that cannot be read.
     """
-    if not file.is_file() or file.stat().st_size > MOST_BYTES:
-        raise ValueError(f"no file of at most {MOST_BYTES // 1_000_000} MB")
+    if not file.is_file():
+        raise ValueError("no file")
+    if file.stat().st_size > MOST_BYTES:
+        raise ValueError(f"a file of more than {MOST_BYTES // 1_000_000} MB")
     data = file.read_bytes()
     count = int.from_bytes(data[80:HEAD], "little")
     if len(data) == HEAD + count * RECORD.itemsize:

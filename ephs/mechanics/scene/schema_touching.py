@@ -1,8 +1,9 @@
 """Tables of surfaces and contacts in scene files."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from ephs.mechanics.scene.polytope import MOST_VERTICES
 from ephs.mechanics.scene.rotations import Rotation
@@ -20,6 +21,12 @@ from ephs.mechanics.scene.schema_numbers import (
 )
 
 
+def _points(value: Any) -> Any:
+    if isinstance(value, list) and not 4 <= len(value) <= MOST_VERTICES:
+        raise PydanticCustomError("points_length", "4 to {most} points", {"most": MOST_VERTICES})
+    return value
+
+
 class SurfaceShapeEntry(Entry):
     """``shape`` of a surface: one of seven."""
 
@@ -29,8 +36,8 @@ class SurfaceShapeEntry(Entry):
     box: Extents | None = key("edge lengths, m", None)
     plane: Annotated[dict[str, Number], Field(max_length=0)] | None = key("the plane z = 0, solid below", None)
     mesh: Text | None = key("STL file of a convex body; m", None)
-    points: Annotated[list[Vector], Field(min_length=4, max_length=MOST_VERTICES)] | None = key(
-        "points of which the body is the convex hull, m", None
+    points: Annotated[list[Vector], BeforeValidator(_points), Field(min_length=4, max_length=MOST_VERTICES)] | None = (
+        key("points of which the body is the convex hull, m", None)
     )
 
 

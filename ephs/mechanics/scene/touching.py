@@ -25,6 +25,7 @@ from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import PAIRS, touches
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.spaces import SE3
 
 Laws = Mapping[str, ContactLawEntry]
@@ -34,7 +35,8 @@ stop by 1/70 rad, or of its length."""
 LOSS = 0.1
 """Loss of stops by default, s/rad or s/m."""
 SOFT = ("stiffness", "exponent", "loss", "slip", "rolling", "spinning")
-"""Keys of elastic surfaces that hard ones do not have."""
+HARD = ("restitution", "tangential")
+"""Keys of elastic surfaces that hard ones do not have, and of hard ones."""
 DEEP = 1e-2
 """Least reported overlap at the start, as a fraction of the mechanism's length, or of a radian."""
 OVERLAP = 1e-9
@@ -51,10 +53,18 @@ def resolve_surfaces(document: Document, names: Names, folder: Path, faults: lis
         if table.sound("heat") and entry.heat is not None:
             names.check(entry.heat, f"{key}.heat", "thermal", faults)
         pose = values.pose(entry.position, entry.rotation, key, faults)
+        _unmixed(entry, key, faults)
         shape = _shape(table, key, folder, faults)
         if shape is not None:
             found[name] = Surface(name, entry.body, shape, frozen(pose))
     return found
+
+
+def _unmixed(entry: ContactLawEntry, key: str, faults: list[Fault]) -> None:
+    """Append the fault of a table with keys of both elastic and hard surfaces."""
+    hard, soft = ([name for name in names if getattr(entry, name) is not None] for names in (HARD, SOFT))
+    if hard and soft:
+        faults.append(fault("hard and soft", key, f"{hard[0]} and {soft[0]}", soft=soft[0]))
 
 
 def _shape(table: Checked[SurfaceEntry], key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
@@ -180,29 +190,51 @@ def resolve_contacts(
     laws |= {f"{part}.{name}": law for part, inner in below.items() for name, law in inner.items()}
     surfaces = dict(scene.all_surfaces())
     found: dict[str, Contact] = {}
+    rigid, pairs = _rigid(scene), dict[frozenset[str], str]()
     tables = document.sections["contacts"]
     for name, table in tables.items():
         key = f"contacts.{name}"
         if table.sound("heat") and table.entry.heat is not None:
             names.check(table.entry.heat, f"{key}.heat", "thermal", faults)
-        if table.sound("surfaces") and _known(table, key, surfaces, faults):
+        _unmixed(table.entry, key, faults)
+        if table.sound("surfaces") and _paired(table, name, surfaces, rigid, pairs, faults):
             one, other = (surfaces[each] for each in table.entry.surfaces)
             _add(found, name, key, one, other, (table.entry, laws[one.name], laws[other.name]), faults)
     if not tables:
         groups = {n: t.entry.group for n, t in document.sections["surfaces"].items() if t.entry.group is not None}
-        for one, other in _meeting(scene, surfaces, groups):
+        for one, other in _meeting(scene, surfaces, groups, rigid):
             name = f"{one.name}_{other.name}".replace(".", "_")
             key = f"surfaces.{one.name} and surfaces.{other.name}"
             _add(found, name, key, one, other, (laws[one.name], laws[other.name]), faults)
     return found, laws
 
 
-def _known(table: Checked[ContactEntry], key: str, surfaces: Mapping[str, Surface], faults: list[Fault]) -> bool:
-    for i, name in enumerate(table.entry.surfaces):
-        if name not in surfaces:
-            faults.append(unknown("surface", f"{key}.surfaces[{i}]", name, surfaces))
+def _paired(
+    table: Checked[ContactEntry],
+    name: str,
+    surfaces: Mapping[str, Surface],
+    rigid: DisjointSets[str],
+    pairs: dict[frozenset[str], str],
+    faults: list[Fault],
+) -> bool:
+    """Whether a contact has surfaces of two bodies that can move, and is the first of this pair."""
+    key, given = f"contacts.{name}.surfaces", table.entry.surfaces
+    for i, surface in enumerate(given):
+        if surface not in surfaces:
+            faults.append(unknown("surface", f"{key}[{i}]", surface, surfaces))
             return False
-    return True
+    one, other = (surfaces[surface].body for surface in given)
+    if len(pair := frozenset(given)) < 2:
+        faults.append(fault("contact bodies", key, f'"{given[0]}" twice'))
+    elif one == other:
+        faults.append(fault("contact bodies", key, f'two surfaces of "{one}"'))
+    elif rigid.leader(one) == rigid.leader(other):
+        faults.append(fault("contact still", key, f'surfaces of "{one}" and "{other}", which fixed joints connect'))
+    elif (first := pairs.setdefault(pair, name)) != name:
+        faults.append(fault("contact twice", key, f"the surfaces of contacts.{first}"))
+    else:
+        return True
+    return False
 
 
 def _add(
@@ -216,9 +248,7 @@ def _add(
 ) -> None:
     """Add a contact, or the fault of its pair."""
     kinds = next(iter(one.shape)), next(iter(other.shape))
-    if one.body == other.body:
-        faults.append(fault("same body", key, f'two surfaces of "{one.body}"'))
-    elif kinds not in PAIRS and kinds[::-1] not in PAIRS:
+    if kinds not in PAIRS and kinds[::-1] not in PAIRS:
         faults.append(fault("surface pair", key, f"a {kinds[0]} and a {kinds[1]}"))
     elif (law := _law(laws, key, faults)) is not None:
         sinks = [each.heat for each in laws if each.heat is not None]
@@ -229,10 +259,6 @@ def _law(laws: tuple[ContactLawEntry, ...], key: str, faults: list[Fault]) -> La
     """The law of a pair: the contact's values, else stiffness of both surfaces in series, the smaller friction, the
     larger of other numbers, and one exponent. A surface with restitution is hard if the other has no stiffness."""
     *own, first, second = laws
-    for each in laws:
-        if each.restitution is not None and (soft := [name for name in SOFT if getattr(each, name) is not None]):
-            faults.append(fault("hard and soft", key, f"restitution and {soft[0]}", soft=soft[0]))
-            return None
     if (hard := _hard(laws)) is not None:
         return hard
     both = first, second
@@ -269,11 +295,21 @@ def _hard(laws: tuple[ContactLawEntry, ...]) -> Impact | None:
     return Impact(min(given("restitution")), min(given("friction"), default=0.0), tangential)
 
 
+def _rigid(scene: Scene) -> DisjointSets[str]:
+    """Bodies, and the ground, in sets that fixed joints connect."""
+    sets = DisjointSets[str]()
+    for _, joint in scene.all_joints():
+        if joint.kind == "fixed":
+            sets.join(joint.body1, joint.body2)
+    return sets
+
+
 def _meeting(
-    scene: Scene, surfaces: Mapping[str, Surface], groups: Mapping[str, str]
+    scene: Scene, surfaces: Mapping[str, Surface], groups: Mapping[str, str], rigid: DisjointSets[str]
 ) -> Iterator[tuple[Surface, Surface]]:
-    """Pairs of surfaces on different bodies without a common joint but a free one, and not of the same group or part;
-    of a beam's pieces those further apart along it than half a circle of its radius: nearer ones cannot touch."""
+    """Pairs of surfaces on different bodies without a common joint but a free one, which fixed joints do not connect,
+    and not of the same group or part; of a beam's pieces those further apart along it than half a circle of its radius:
+    nearer ones cannot touch."""
     for beam in scene.beams.values():
         pieces = [surfaces[node] for node in beam.nodes if node in surfaces]
         sizes = np.array([piece.shape["capsule"] for piece in pieces]).reshape(-1, 2)
@@ -286,6 +322,7 @@ def _meeting(
     level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
     for some, others in combinations(level, 2):
         for one, other in product(some, others):
-            apart = one.body != other.body and frozenset((one.body, other.body)) not in joined
+            apart = rigid.leader(one.body) != rigid.leader(other.body)
+            apart = apart and frozenset((one.body, other.body)) not in joined
             if apart and (one.name not in groups or groups[one.name] != groups.get(other.name)):
                 yield one, other

@@ -271,30 +271,6 @@ def test_contacts_survive_files(tmp_path):
         assert [c.law for _, c in again.all_contacts()] == [c.law for _, c in scene.all_contacts()]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "fault"),
-    [
-        ('body = "ball"', 'body = "bal"', "unknown|bal"),
-        ("sphere = 0.1", "sphere = -0.1", "a number above 0"),
-        ("sphere = 0.1", "sphere = 0.1, box = [1.0, 1.0, 1.0]", "sphere and box"),
-        ("sphere = 0.1", "plane = {}", "a plane and a plane, expected one plane at most"),
-        ("stiffness = 100000.0", "stiffness = -1.0", "a number above 0"),
-        ("stiffness = 100000.0", "", "two surfaces without stiffness"),
-        ("exponent = 1.0", "exponent = 0.5", "not below 1"),
-        ("shape = { plane = {} }", "shape = { plane = {} }\nexponent = 1.5", "1 and 1.5"),
-        ("slip = 0.001", "slip = 0.0", "a number above 0"),
-        ("shape = { plane = {} }", "shape = { plane = {} }\n[contacts.one]\nsurfaces = [\"ball\", \"flor\"]", "flor"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_is_named(old, new, fault, tmp_path):
-    text = (HEAD + BALL).format(**USUAL)
-    assert old in text
-    file = tmp_path / "wrong.toml"
-    file.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(ephs.SceneError, match=fault):
-        ephs.load(file)
-
-
 THROWN = """
 [bodies.thing]
 mass = 1.0
@@ -345,11 +321,6 @@ def test_limits_ascend(limits, tmp_path):
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ephs.SceneError, match="lower < upper"):
         ephs.load(file)
-
-
-def test_an_overlap_at_the_start_is_told(tmp_path):
-    with pytest.warns(ephs.SceneWarning, match=r"contacts\.ball_floor: found ball and floor 0\.03 m deep"):
-        scene_of(tmp_path, BALL, height=0.07)
 
 
 PLATE = """

@@ -196,24 +196,6 @@ def test_impacts_do_not_run_backward(tmp_path):
         ephs.simulate(scene_of(tmp_path, body("ball", **BALL)), -0.1)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "fault"),
-    [
-        ("0.0, 0.0, 0.3", "0.0, 0.0, 0.07", r"contacts\.ball_floor: found ball and floor 0\.03 m deep"),
-        ("restitution = 0.5", "restitution = 1.5", "not above 1"),
-        ("restitution = 0.5", "restitution = -0.5", "restitution"),
-        ("restitution = 0.5", "restitution = 0.5\nstiffness = 1e5", "restitution and stiffness"),
-        ("restitution = 0.5", "restitution = 0.5\nslip = 1e-3", "restitution and slip"),
-        ("restitution = 0.5", "restitution = 0.5\ntangential = 2.0", "tangential"),
-    ],
-)
-def test_what_is_wrong_of_hard_surfaces_is_named(old, new, fault, tmp_path):
-    text = body("ball", **BALL)
-    assert old in text
-    with pytest.raises(ephs.SceneError, match=fault):
-        scene_of(tmp_path, text.replace(old, new))
-
-
 def test_a_hard_surface_meets_an_elastic_one_elastically(tmp_path):
     soft = body("ball", **BALL).replace("restitution = 0.5", "stiffness = 1e5")
     scene = scene_of(tmp_path, soft)
