@@ -16,13 +16,11 @@ import numpy as np
 
 from ephs.mechanics.imports.collisions import LOSS, SINKING, SLIP, hull, many
 from ephs.mechanics.imports.draft import Draft, pose
+from ephs.mechanics.imports.mjcf_keys import Keys, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
 from ephs.semantics.bundle import Array
-
-SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
-"""MuJoCo's default impedance."""
 
 
 @final
@@ -35,11 +33,9 @@ class Parameters:
     condim: int
 
 
-def contacts(model: Any, names: Names, draft: Draft) -> None:
+def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
     """Surfaces and contacts of a model, or a note of its contacts."""
-    mujoco: Any = import_module("mujoco")
-    off = model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    pairs = {} if off else _pairs(model, names, draft)
+    pairs = {} if disabled(model, "CONTACT", "CONSTRAINT") else _pairs(model, names, draft)
     if not draft.contact:
         for b in sorted({int(model.geom_bodyid[g]) for pair in pairs for g in pair}):
             draft.leave("contacts of", names.bodies[b] or "the world")
@@ -60,7 +56,16 @@ def contacts(model: Any, names: Names, draft: Draft) -> None:
             draft.leave("contacts between shapes with many edges", told)
         elif surfaces[one][0] and surfaces[other][0]:
             draft.touch((surfaces[one][0], surfaces[other][0]), _law(parameters, mass))
-    _softened(model, names, {g for pair in pairs for g in pair}, draft)
+    for g in sorted({g for pair in pairs for g in pair}):
+        keys.note("geoms", g, _named(model, names, g))
+    for p in range(model.npair) if pairs else ():
+        ends = " and ".join(_named(model, names, int(g[p])) for g in (model.pair_geom1, model.pair_geom2))
+        keys.note("pairs", p, ends)
+        if np.any(model.pair_friction[p, [0, 3]] != model.pair_friction[p, [1, 4]]):
+            draft.leave("friction that depends on the direction, of", ends)
+    overridden = import_module("mujoco").mjtEnableBit.mjENBL_OVERRIDE
+    if pairs and model.opt.enableflags & int(overridden):
+        draft.leave("options", "override")
 
 
 def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, int]:
@@ -70,32 +75,6 @@ def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Dr
     if shape[0] == "mesh":
         return hull(draft, body, name, shape[1], place, {})
     return draft.surface(body, name, *shape, place), 0
-
-
-def _softened(model: Any, names: Names, touching: set[int], draft: Draft) -> None:
-    """Notes of parameters of contacts without a counterpart."""
-    moved = {
-        "margins of contacts of": np.column_stack([model.geom_margin, model.geom_gap]),
-        "impedance (solimp) of contacts of": model.geom_solimp - SOLIMP,
-        "adhesion of": model.geom_adhesion,
-        "surface velocities of": model.geom_surfacevel,
-    }
-    for what, values in moved.items():
-        for g in sorted(touching):
-            if np.any(values[g]):
-                draft.leave(what, _named(model, names, g))
-    pairs = {
-        "margins of contacts of": np.column_stack([model.pair_margin, model.pair_gap]),
-        "impedance (solimp) of contacts of": model.pair_solimp - SOLIMP,
-        "adhesion of": model.pair_adhesion,
-        "friction that depends on the direction, of": model.pair_friction[:, [0, 3]] - model.pair_friction[:, [1, 4]],
-        "softness of friction (solreffriction) of": model.pair_solreffriction,
-    }
-    for what, values in pairs.items():
-        for p in range(model.npair):
-            if np.any(values[p]):
-                ends = (_named(model, names, int(g[p])) for g in (model.pair_geom1, model.pair_geom2))
-                draft.leave(what, " and ".join(ends))
 
 
 def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Parameters]:
@@ -127,8 +106,7 @@ def _mixed(model: Any, one: int, other: int) -> Parameters:
 
 
 def _meeting(model: Any) -> Iterator[tuple[int, int]]:
-    mujoco: Any = import_module("mujoco")
-    loose = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    loose = disabled(model, "FILTERPARENT")
     excluded = {(int(s) >> 16, int(s) & 0xFFFF) for s in model.exclude_signature}
     for one, other in combinations(range(model.ngeom), 2):
         if not (

@@ -151,19 +151,19 @@ def ring(count, height=0.1):
 
 NOTES = {
     "ellipsoid": ('<geom name="x" type="ellipsoid" size="1 2 3"/>', "", "contacts between: floor and x"),
-    "margin": ('<geom name="x" size="1" margin="0.1"/>', "", "margins of contacts of: x"),
-    "gap": ('<geom name="x" size="1" gap="0.1"/>', "", "margins of contacts of: x"),
-    "impedance": ('<geom name="x" size="1" solimp="0.8 0.9 0.01"/>', "", r"impedance \(solimp\) of contacts of: x"),
+    "margin": ('<geom name="x" size="1" margin="0.1"/>', "", "margin of geoms: x"),
+    "gap": ('<geom name="x" size="1" gap="0.1"/>', "", "gap of geoms: x"),
+    "impedance": ('<geom name="x" size="1" solimp="0.8 0.9 0.01"/>', "", "solimp of geoms: x"),
     "directed": (
         '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" friction="1 2 0 0 0"/>',
         "friction that depends on the direction, of: ",
     ),
     "soft friction": (
         '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" solreffriction="0.1 1"/>',
-        r"softness of friction \(solreffriction\) of: ",
+        "solreffriction of pairs: ",
     ),
     "pair margin": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" margin="0.1"/>', "margins of contacts of: ",
+        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" margin="0.1"/>', "margin of pairs: ",
     ),
     "height field": ('<geom name="x" type="hfield" hfield="h"/><geom size="1"/>', "", "height fields: x"),
     "pair of a height field": (
@@ -179,7 +179,7 @@ NOTES = {
     ),
     "stop": (
         '<joint name="j" type="hinge" range="-1 1" limited="true" solreflimit="0.05 1"/><geom size="1"/>', "",
-        "softness and margins of limits of: j",
+        "solreflimit of joints: j",
     ),
 }  # fmt: skip
 
