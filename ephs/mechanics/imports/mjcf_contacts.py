@@ -14,13 +14,15 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.imports.collisions import LOSS, SINKING, SLIP, hull, many
+from ephs.mechanics.imports.collisions import LOSS, MOST_FACETS, NO_CORNERS, SINKING, SLIP, hull, many, too_fine
 from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_keys import Keys, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
 from ephs.semantics.bundle import Array
+
+FINE = f"contacts but those with planes, of meshes with more than {MOST_FACETS} faces and edges"
 
 
 @final
@@ -41,7 +43,7 @@ def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
             draft.leave("contacts of", names.bodies[b] or "the world")
         return
     shapes = {g: _shape(model, g) for pair in pairs for g in pair}
-    surfaces: dict[int, tuple[str, int]] = {}
+    surfaces: dict[int, tuple[str, Array]] = {}
     mass = float(np.sum(model.body_mass[1:]))
     for (one, other), parameters in pairs.items():
         kinds = (shapes[one] or ("",))[0], (shapes[other] or ("",))[0]
@@ -52,7 +54,11 @@ def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
         for g in (one, other):
             if g not in surfaces:
                 surfaces[g] = _surface(model, g, shapes[g] or ("", ()), names, draft)
-        if many(kinds, [surfaces[g][1] for g in (one, other)]):
+        fine = [g for g, kind in zip((one, other), kinds, strict=True) if too_fine(kind, surfaces[g][1])]
+        if fine and "plane" not in kinds:
+            for g in fine:
+                draft.leave(FINE, _named(model, names, g))
+        elif many(kinds, [surfaces[g][1] for g in (one, other)]):
             draft.leave("contacts between shapes with many edges", told)
         elif surfaces[one][0] and surfaces[other][0]:
             draft.touch((surfaces[one][0], surfaces[other][0]), _law(parameters, mass))
@@ -68,13 +74,13 @@ def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
         draft.leave("options", "override")
 
 
-def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, int]:
-    """The name of a geom's surface, and its number of corners if it is a mesh."""
+def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, Array]:
+    """The name of a geom's surface, and its corners (n, 3) if it is a mesh."""
     place = pose(model.geom_pos[g], model.geom_quat[g])
     body, name = names.bodies[int(model.geom_bodyid[g])], _named(model, names, g)
     if shape[0] == "mesh":
         return hull(draft, body, name, shape[1], place, {})
-    return draft.surface(body, name, *shape, place), 0
+    return draft.surface(body, name, *shape, place), NO_CORNERS
 
 
 def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Parameters]:

@@ -109,9 +109,10 @@ def load(
     scene, said, r.faults[:] = as_meant(scene)
     if r.faults:
         raise SceneError(str(path), r.faults)
-    for kind, lines in ((SceneWarning, [*r.odd, *filter(None, [said])]), (ModelWarning, r.left)):
-        if lines:
-            warnings.warn("\n  ".join([str(path) + ":", *map(str, lines)]), kind, stacklevel=2)
+    if odd := [*r.odd, *filter(None, [said])]:
+        warnings.warn("\n  ".join([f"{path}:", *map(str, odd)]), SceneWarning, stacklevel=2)
+    if r.left:
+        warnings.warn(ModelWarning(f"{path}:", r.left), stacklevel=2)
     return scene
 
 

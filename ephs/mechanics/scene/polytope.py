@@ -1,14 +1,18 @@
 """Convex meshes: vertices of STL files, after a check of convexity, and of the convex hulls of points."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ephs.mechanics.shapes.hull import hull_of
 from ephs.semantics.bundle import Array
 
 MOST_BYTES = 20_000_000
 MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""
+MOST_FACES = 128
+"""Faces and edges that a mesh may have to meet others than planes: all of them are in one compiled function."""
 FLAT = 1e-5
 """Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes."""
 BLOCK = 2**22
@@ -58,6 +62,15 @@ def corners_of(points: Array) -> Array:
     if hull is None:
         raise ValueError("points in a plane")
     return hull[0]
+
+
+def faces_and_edges(corners: Sequence[Sequence[float]]) -> int:
+    """Number of faces and edges of the convex hull of its corners (n, 3); of many corners a lower bound."""
+    least = 2 * len(corners) + 2  # each corner has three edges or more
+    if least > MOST_FACES:
+        return least
+    hull = hull_of(corners)
+    return len(hull.faces) + len(hull.edges)
 
 
 def depth_inside(points: Array) -> float:

@@ -208,7 +208,9 @@ URDF_NOTES = {
     "dae": (robot(collision('<mesh filename="x.dae"/>')), "contacts with meshes that are neither STL nor OBJ: x.dae"),
     "broken": (robot(collision('<mesh filename="broken.stl"/>')), r"contacts with meshes that cannot be read: broken"),
     "flat": (robot(collision('<mesh filename="flat.obj"/>')), "contacts with meshes that have no volume: l0"),
-    "concave": (robot(collision('<mesh filename="dent.obj"/>')), "contacts inside of convex hulls: l0, 0.25 m deep"),
+    "concave": (
+        robot(collision('<mesh filename="dent.obj"/>')), r"contacts inside of convex hulls: l0 \(0.25 m deep\)",
+    ),
     "collision": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "verbose of collisions: l0"),
     "link": (robot("<gravity/>"), "gravity of links: l0"),
     "restitution": (

@@ -171,10 +171,14 @@ NOTES = {
         "contacts between: x and floor",
     ),
     "corners": (
-        '<geom name="x" type="mesh" mesh="wheel"/>', "", f"corners beyond {MOST_VERTICES} of convex hulls: x, ",
+        '<geom name="x" type="mesh" mesh="wheel"/>', "", f"corners beyond {MOST_VERTICES} of convex hulls: x ",
     ),
     "edges": (
         '<geom name="x" type="mesh" mesh="coin"/></body><body><freejoint/><geom name="y" type="box" size="1 1 1"/>', "",
+        "contacts but those with planes, of meshes with more than 64 faces and edges: x",
+    ),
+    "points": (
+        '<geom name="x" type="mesh" mesh="nut"/></body><body><freejoint/><geom name="y" type="mesh" mesh="bar"/>', "",
         "contacts between shapes with many edges: x and y",
     ),
     "stop": (
@@ -191,7 +195,8 @@ def test_what_is_not_imported_is_said_by_name(kind, tmp_path):
     joint = "" if "<joint" in geom else "<freejoint/>"
     text = (
         '<mujoco><asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/>'
-        f'<mesh name="wheel" vertex="{ring(200)}"/><mesh name="coin" vertex="{ring(40)}"/></asset>'
+        f'<mesh name="wheel" vertex="{ring(200)}"/><mesh name="coin" vertex="{ring(40)}"/>'
+        f'<mesh name="nut" vertex="{ring(9)}"/><mesh name="bar" vertex="{ring(9, 0.5)}"/></asset>'
         f'<worldbody><geom name="floor" type="plane" size="1 1 1"/><body pos="0 0 9">{joint}{geom}</body></worldbody>'
         f"<contact>{pair}</contact></mujoco>"
     )

@@ -8,6 +8,7 @@ import re
 
 import pytest
 
+import ephs
 from ephs.mechanics.imports.read import read_model
 
 USED, SILENT = object(), None
@@ -282,3 +283,17 @@ def test_numbers_of_an_sdf(place, path, value, found, tmp_path):
 def test_numbers_of_an_mjcf(place, row, found, tmp_path):
     pytest.importorskip("mujoco")
     check(tmp_path, "xml", MJCF, place, row, found)
+
+
+def test_a_long_list_is_short_in_the_message_and_whole_in_the_warning(tmp_path):
+    links = "".join(f'<link name="l{i}"><lamp/></link>' for i in range(30))
+    joints = "".join(
+        f'<joint name="j{i}" type="fixed"><parent link="l{i}"/><child link="l{i + 1}"/></joint>' for i in range(29)
+    )
+    file = tmp_path / "row.urdf"
+    file.write_text(f'<robot name="row">{links}{joints}</robot>', encoding="utf-8")
+    with pytest.warns(ephs.ModelWarning) as said:
+        ephs.load(file)
+    (warning,) = (each.message for each in said)
+    assert str(warning).endswith("lamp of links: l0, l1, l2, l3, l4, l5, l6, l7, l8, l9, and 20 more")
+    assert warning.lines == ("not modelled: lamp of links: " + ", ".join(f"l{i}" for i in range(30)),)

@@ -110,6 +110,27 @@ def test_the_largest_hull_says_how_far_points_are_outside():
     assert largest_hull(corners)[1] == 0.0
 
 
+@pytest.mark.parametrize("other", ["plane = {}", "sphere = 1.0"])
+def test_a_mesh_with_many_faces_meets_planes_alone(other, tmp_path):
+    angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (2.0, 3.0)]
+    prism = f"shape = {{ points = {np.concatenate(ends).tolist()} }}"
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        'format = 1\nname = "prism"\n[bodies.b]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.j]\ntype = "free"\n'
+        f'bodies = ["ground", "b"]\nframe1 = {{}}\nframe2 = {{}}\n[surfaces.b]\nbody = "b"\n{prism}\nstiffness = 1e4\n'
+        f'[surfaces.g]\nbody = "ground"\nshape = {{ {other} }}\n',
+        encoding="utf-8",
+    )
+    if "plane" in other:
+        assert len(ephs.load(file).contacts) == 1
+    else:
+        with pytest.raises(
+            ephs.SceneError, match=r"contacts\..*: found b with 258 faces and edges or more, expected at"
+        ):
+            ephs.load(file)
+
+
 @pytest.mark.parametrize("first", ["", 'group = "it"'])
 @pytest.mark.parametrize("second", ["", 'group = "it"'])
 def test_surfaces_of_a_group_do_not_meet_each_other(first, second, tmp_path):
