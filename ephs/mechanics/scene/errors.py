@@ -8,6 +8,8 @@ from typing import Any, final
 from ephs.operad.messages import legible as legible
 from ephs.operad.messages import nearest_name as nearest_name
 
+ALIKE = 3
+"""Number of faults that expect the same from which on they share a text."""
 SHOWN = 10
 """Names that the message of a warning shows of a longer list."""
 
@@ -33,6 +35,21 @@ class Fault:
     def __str__(self) -> str:
         where = f"{self.key}: " if self.key else ""
         return f"{where}found {self.found}, expected {self.expected}" + (f"; {self.advice}" if self.advice else "")
+
+
+def told(faults: Iterable[Fault]) -> list[str]:
+    """A line for each fault, but one text for many that expect the same, followed by what was found."""
+    groups: dict[tuple[str, str], list[Fault]] = {}
+    for one in faults:
+        groups.setdefault((one.expected, one.advice), []).append(one)
+    lines: list[str] = []
+    for (expected, advice), alike in groups.items():
+        if len(alike) < ALIKE:
+            lines += map(str, alike)
+        else:
+            lines.append(f"{len(alike)} times expected {expected}" + (f"; {advice}" if advice else ""))
+            lines += [f"  {one.key}: found {one.found}" for one in alike]
+    return lines
 
 
 @final
