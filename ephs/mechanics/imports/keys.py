@@ -20,7 +20,7 @@ def _unknown(element: Element, known: Known, path: str) -> Iterator[str]:
         if _differs(value, known.get(path + key, (value + "?",))):
             yield path + key
     for child in element:
-        here = f"{path}{child.tag}"
+        here = f"{path}{child.tag.rpartition('}')[2]}"  # without its namespace
         if here in known:
             if _differs(" ".join([*child.attrib.values(), child.text or ""]), known[here]):
                 yield here

@@ -33,16 +33,18 @@ _BULLET = {
     "spinning_friction": "spinning",
 }  # fmt: skip
 """Elements of Bullet's ``<contact>`` in a link -> keys of surfaces."""
-_ROBOT: Known = dict.fromkeys(("name", "version", "link", "joint", "transmission", "material", "gazebo"), ())
+_ROBOT: Known = dict.fromkeys(("name", "version", "link", "joint", "transmission", "material", "gazebo", "sensor"), ())
 _LINK: Known = {
     **dict.fromkeys(("name", "type", "inertial/origin", "inertial/mass", "inertial/inertia"), ()),
     **dict.fromkeys(("visual", "collision", *(f"contact/{word}" for word in _BULLET)), ()),
     "contact/restitution": ("0",),
 }
 _COLLISION: Known = dict.fromkeys(("name", "origin", "geometry", "material"), ())
-_FIXED: Known = dict.fromkeys(("name", "type", "parent", "child", "origin", "axis", "limit", "dynamics"), ())
+_FIXED: Known = dict.fromkeys(
+    ("name", "type", "parent", "child", "origin", "dont_collapse", "axis", "limit", "dynamics", "mimic"), ()
+)
 _JOINT: Known = {
-    **dict.fromkeys(("name", "type", "parent", "child", "origin", "axis", "mimic"), ()),
+    **dict.fromkeys(("name", "type", "parent", "child", "origin", "dont_collapse", "axis", "mimic"), ()),
     **dict.fromkeys(("dynamics/damping", "dynamics/friction", "limit/lower", "limit/upper", "limit/effort"), ()),
     "limit/velocity": ("0",),
 }
@@ -96,6 +98,8 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         effort = _attribute(joint.find("limit"), "effort", f"joints.{name}.limit", draft, 0.0)
         if effort and KINDS[str(joint.get("type"))] in ("revolute", "prismatic") and not draft.driven(name):
             draft.leave("limits of effort of", name)
+    for sensor in root.findall("sensor"):
+        draft.leave("sensors", sensor.get("name") or "sensor")
     note_unknown(root, _ROBOT, draft, "robots", draft.name)
 
 
