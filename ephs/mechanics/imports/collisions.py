@@ -28,6 +28,9 @@ CORNERS = {"capsule": 1, "cylinder": 2, "box": 8}
 """Corners of the shapes that meet meshes in pairs of edges."""
 MOST_FACETS = 64
 """Faces and edges of an imported mesh that meets others than planes: more take minutes to compile, for each mesh."""
+FEW_CORNERS, FINENESS = 64, 0.01
+"""Corners that hulls keep in any case, and the share of its extent by which others may be outside: each corner is a
+point of contact."""
 NO_CORNERS = np.zeros((0, 3))
 
 
@@ -68,12 +71,12 @@ def collide(draft: Draft, link: str, name: str, kind: str, value: Any, place: Ar
 def hull(draft: Draft, link: str, name: str, points: Array, place: Array, law: Mapping[str, Any]) -> tuple[str, Array]:
     """A surface of the convex hull of points (n, 3); its name, or none with a note, and its corners (m, 3)."""
     try:
-        corners, depth = largest_hull(points)
+        corners, depth = largest_hull(points, FEW_CORNERS, FINENESS)
     except ValueError as error:
         draft.leave("contacts with meshes that have no volume", f"{name} ({error})")
         return "", NO_CORNERS
     if depth:
-        draft.leave(f"corners beyond {MOST_VERTICES} of convex hulls", f"{name} (up to {depth:.2g} m outside)")
+        draft.leave("corners of convex hulls but the farthest", f"{name} (up to {depth:.2g} m outside)")
     return draft.surface(link, name, "points", corners, place, **law), corners
 
 

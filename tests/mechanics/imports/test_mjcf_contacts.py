@@ -12,7 +12,6 @@ import ephs
 from ephs.mechanics.imports import convert
 from ephs.mechanics.imports.collisions import SINKING
 from ephs.mechanics.imports.mjcf_contacts import LOSS
-from ephs.mechanics.scene.polytope import MOST_VERTICES
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
 
@@ -171,7 +170,7 @@ NOTES = {
         "contacts between: x and floor",
     ),
     "corners": (
-        '<geom name="x" type="mesh" mesh="wheel"/>', "", f"corners beyond {MOST_VERTICES} of convex hulls: x ",
+        '<geom name="x" type="mesh" mesh="wheel"/>', "", "corners of convex hulls but the farthest: x ",
     ),
     "edges": (
         '<geom name="x" type="mesh" mesh="coin"/></body><body><freejoint/><geom name="y" type="box" size="1 1 1"/>', "",
