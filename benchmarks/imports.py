@@ -36,7 +36,7 @@ def row(path: Path) -> tuple[str, ...]:
             scene = ephs.load(path, contact=True)
         except ephs.SceneError as error:
             return path.name, *[""] * (len(HEAD) - 2), f"refused: {str(error).splitlines()[-1].strip()}"
-    lines = [line.strip() for each in said for line in str(each.message).splitlines()]
+    lines = [line for each in said if isinstance(each.message, ephs.ModelWarning) for line in each.message.lines]
     lost = [line.removeprefix(LOST) for line in lines if line.startswith(LOST)]
     joints = [joint for _, joint in scene.all_joints()]
     counts = (

@@ -77,8 +77,8 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
     odd = [slot for slot in descriptor.junctions if is_velocity(slot.quantity)]
     dims = np.array([slot.quantity.space.dim for slot in odd], dtype=np.int64)
     conditions = _conditions(descriptor, x, prescribed, {slot.at: i for i, slot in enumerate(odd)}, dims)
-    solved, left = _solve(conditions, dims)
     rows = sum(condition.size.size for condition in conditions)
+    solved, left = _solve(_without_leaves(conditions), dims)
     rank = rows - sum(condition.size.size for condition in left) + _rank_of_loops(left, solved, dims)
     return Mobility(int(dims.sum()) - rank, rows - rank)
 
@@ -109,6 +109,38 @@ def _conditions(
             size = np.linalg.norm(whole[kept], axis=1)
             out.append(_Condition({junction: block[kept] for junction, block in blocks.items()}, size))
     return out
+
+
+def _without_leaves(conditions: list[_Condition]) -> list[_Condition]:
+    """The conditions without those that determine an effort which no other has: these restrict nothing else.
+
+    Such are the motions of two bodies relative to each other, where they may touch.
+    """
+    touching: dict[int, set[int]] = {}
+    for i, condition in enumerate(conditions):
+        for junction in condition.blocks:
+            touching.setdefault(junction, set()).add(i)
+    leaves, gone = [junction for junction, those in touching.items() if len(those) == 1], set[int]()
+    while leaves:
+        leaf = leaves.pop()
+        if len(touching[leaf]) != 1:
+            continue
+        (i,) = touching[leaf]
+        if not _sound(conditions[i], leaf):
+            continue
+        gone.add(i)
+        for junction in conditions[i].blocks:
+            touching[junction].discard(i)
+            if len(touching[junction]) == 1:
+                leaves.append(junction)
+    return [condition for i, condition in enumerate(conditions) if i not in gone]
+
+
+def _sound(condition: _Condition, junction: int) -> bool:
+    """Whether the rows determine the effort of a junction."""
+    block = condition.blocks[junction]
+    rows, columns = block.shape
+    return rows == columns and bool(np.linalg.svd(block / condition.size[:, None], compute_uv=False)[-1] >= SOUND)
 
 
 def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Condition]]:
@@ -144,12 +176,10 @@ def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Co
 def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
     """The junctions that a condition determines, one by its rows and the others free; empty if unusable."""
     unknown = [junction for junction in condition.blocks if junction not in solved.given]
-    square = [j for j in unknown if condition.blocks[j].shape[0] == condition.blocks[j].shape[1]]
-    for junction in square:
-        block = condition.blocks[junction]
-        scaled = block / condition.size[:, None]
-        if np.linalg.svd(scaled, compute_uv=False)[-1] < SOUND:
+    for junction in unknown:
+        if not _sound(condition, junction):
             continue
+        block = condition.blocks[junction]
         for free in unknown:
             if free != junction:
                 solved.given[free] = {free: np.eye(int(dims[free]))}

@@ -35,6 +35,23 @@ def test_counts_of_drawn_mechanisms_are_those_of_the_dense_matrix(scene):
     assert found == expected
 
 
+def test_surfaces_that_may_touch_restrict_no_motion(tmp_path):
+    bodies = "".join(
+        f'[bodies.{name}]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.{name}]\ntype = "{kind}"\n'
+        f'bodies = ["ground", "{name}"]\nframe1 = {{ position = [0.0, 0.0, {height}] }}\nframe2 = {{}}\n'
+        f'[surfaces.{name}]\nbody = "{name}"\nshape = {{ {shape} }}\nstiffness = 1e4\n'
+        for name, kind, height, shape in (
+            ("one", "free", 1.0, "box = [0.2, 0.2, 0.2]"),
+            ("two", "revolute", 2.0, "sphere = 0.1"),
+        )
+    )
+    floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n'
+    file = tmp_path / "boxes.toml"
+    file.write_text(f'format = 1\nname = "boxes"\n{bodies}{floor}', encoding="utf-8")
+    found, expected = both(ephs.load(file))
+    assert found == expected and (found.mobility, found.redundant) == (7, 0)
+
+
 @pytest.mark.parametrize(
     ("family", "size", "expected"),
     [

@@ -11,7 +11,14 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
-from ephs.mechanics.scene.polytope import MOST_BYTES, MOST_VERTICES, depth_inside, largest_hull, triangles_of
+from ephs.mechanics.scene.polytope import (
+    MOST_BYTES,
+    MOST_VERTICES,
+    depth_inside,
+    faces_and_edges,
+    largest_hull,
+    triangles_of,
+)
 from ephs.semantics.bundle import Array
 
 LOSS, SLIP, FRICTION, SINKING = 1.0, 1e-2, 1.0, 0.02
@@ -19,6 +26,12 @@ LOSS, SLIP, FRICTION, SINKING = 1.0, 1e-2, 1.0, 0.02
 SOLIDS = ("sphere", "box", "cylinder", "capsule", "plane")
 CORNERS = {"capsule": 1, "cylinder": 2, "box": 8}
 """Corners of the shapes that meet meshes in pairs of edges."""
+MOST_FACETS = 64
+"""Faces and edges of an imported mesh that meets others than planes: more take minutes to compile, for each mesh."""
+FEW_CORNERS, FINENESS = 64, 0.01
+"""Corners that hulls keep in any case, and the share of its extent by which others may be outside: each corner is a
+point of contact."""
+NO_CORNERS = np.zeros((0, 3))
 
 
 def default_law(draft: Draft) -> dict[str, float]:
@@ -45,7 +58,7 @@ def collide(draft: Draft, link: str, name: str, kind: str, value: Any, place: Ar
         if points is not None:
             points = points * np.asarray(scale)
             if depth := depth_inside(points):
-                draft.leave("contacts inside of convex hulls", f"{name}, {depth:.2g} m deep")
+                draft.leave("contacts inside of convex hulls", f"{name} ({depth:.2g} m deep)")
             hull(draft, link, name, points, place, law)
     elif kind not in SOLIDS:
         draft.leave("contacts with other shapes", f"{kind} of {link or 'the world'}")
@@ -55,21 +68,26 @@ def collide(draft: Draft, link: str, name: str, kind: str, value: Any, place: Ar
         draft.surface(link, name, kind, value, place, **law)
 
 
-def hull(draft: Draft, link: str, name: str, points: Array, place: Array, law: Mapping[str, Any]) -> tuple[str, int]:
-    """A surface of the convex hull of points (n, 3); its name, or none with a note, and its number of corners."""
+def hull(draft: Draft, link: str, name: str, points: Array, place: Array, law: Mapping[str, Any]) -> tuple[str, Array]:
+    """A surface of the convex hull of points (n, 3); its name, or none with a note, and its corners (m, 3)."""
     try:
-        corners, depth = largest_hull(points)
+        corners, depth = largest_hull(points, FEW_CORNERS, FINENESS)
     except ValueError as error:
         draft.leave("contacts with meshes that have no volume", f"{name} ({error})")
-        return "", 0
+        return "", NO_CORNERS
     if depth:
-        draft.leave(f"corners beyond {MOST_VERTICES} of convex hulls", f"{name}, up to {depth:.2g} m outside")
-    return draft.surface(link, name, "points", corners, place, **law), len(corners)
+        draft.leave("corners of convex hulls but the farthest", f"{name} (up to {depth:.2g} m outside)")
+    return draft.surface(link, name, "points", corners, place, **law), corners
 
 
-def many(kinds: Sequence[str], corners: Sequence[int]) -> bool:
+def too_fine(kind: str, corners: Array) -> bool:
+    """Whether a shape is a mesh with too many faces and edges to meet others than planes."""
+    return kind == "mesh" and faces_and_edges(corners.tolist()) > MOST_FACETS
+
+
+def many(kinds: Sequence[str], corners: Sequence[Array]) -> bool:
     """Whether a pair with a mesh has too many pairs of edges: corners of the mesh by those of the other shape."""
-    sizes = [count if kind == "mesh" else CORNERS.get(kind, 0) for kind, count in zip(kinds, corners, strict=True)]
+    sizes = [len(of) if kind == "mesh" else CORNERS.get(kind, 0) for kind, of in zip(kinds, corners, strict=True)]
     return "mesh" in kinds and sizes[0] * sizes[1] > MOST_VERTICES
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from ephs.mechanics.imports.draft import Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.mjcf_actuators import actuators, tendons
 from ephs.mechanics.imports.mjcf_contacts import contacts
+from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Keys, disabled
 from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
 from ephs.mechanics.imports.mjcf_names import Names, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
@@ -22,8 +23,6 @@ from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.semantics.spaces import SE3
 
 Inertias = dict[int, tuple[float, Any]]
-SOLREF = (0.02, 1.0)
-"""MuJoCo's default softness."""
 DIMENSIONS = {"free": 6, "spherical": 3, "prismatic": 1, "revolute": 1}
 READ = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
@@ -64,6 +63,7 @@ def read_mjcf(root: Any, draft: Draft) -> None:
             given = _own_inertias(spec)
             model = spec.compile()
             own: Inertias = {int(body.id): inertia for body, inertia in given}
+            keys = Keys.of(spec, draft)
     except (ValueError, RuntimeError) as error:  # MuJoCo's own errors among them
         words = " ".join(str(error).split())
         draft.faults.append(fault("not compiled", "", f"that MuJoCo says: {words}"))
@@ -78,20 +78,18 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     for text in said:
         draft.leave("what MuJoCo warns of", " ".join(text.split()))
     names = Names(model)
-    off = mujoco.mjtDisableBit
-    if not model.opt.disableflags & off.mjDSBL_GRAVITY:
-        draft.gravity = list(model.opt.gravity)
-    else:
-        draft.gravity = [0.0, 0.0, 0.0]
+    draft.gravity = [0.0, 0.0, 0.0] if disabled(model, "GRAVITY") else list(model.opt.gravity)
     threads = screws(model, names)
     for b in range(1, model.nbody):
         _body(model, b, own, names, draft)
-        _joints(model, b, names, threads, draft)
+        keys.note("bodies", b, names.bodies[b])
+        _joints(model, b, names, threads, keys, draft)
         shapes(model, b, names.bodies[b], source, draft)
-    contacts(model, names, draft)
-    actuators(model, names, tendons(model, names, draft), draft)
+    contacts(model, names, keys, draft)
+    actuators(model, names, tendons(model, names, keys, draft), keys, draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
+    keys.note_options()
 
 
 def _numbers(model: Any, own: Inertias) -> Iterator[Any]:
@@ -141,7 +139,7 @@ def _body(model: Any, b: int, own: Inertias, names: Names, draft: Draft) -> None
     draft.body(names.bodies[b], mass, turned_tensor(rotation, tensor), model.body_ipos[b])
 
 
-def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], draft: Draft) -> None:
+def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], keys: Keys, draft: Draft) -> None:
     """The chain from a body's parent to it."""
     body, before = names.bodies[b], names.bodies[int(model.body_parentid[b])]
     at = pose(model.body_pos[b], model.body_quat[b])
@@ -171,34 +169,31 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], dra
                 entries[key] += thread.pitch**2 * slide[key]
             entries |= draft.dry(names.joints[j], _dry(model, j) + abs(thread.pitch) * _dry(model, thread.slide), 1)
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
-        if kind in ("revolute", "prismatic") and _limited(model, j):
+        limited = bool(model.jnt_limited[j]) and not disabled(model, "LIMIT", "CONSTRAINT")
+        stopped = limited and kind in ("revolute", "prismatic")
+        if stopped:
             draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
-            if draft.contact and (model.jnt_margin[j] or np.any(model.jnt_solref[j] - SOLREF)):
-                draft.leave("softness and margins of limits of", names.joints[j])
-        elif model.jnt_limited[j]:
+        elif limited:
             draft.leave("limits of", names.joints[j])
+        pointless = SOFT_STOPS if not (stopped and draft.contact) else ()
+        for each in (j,) if thread is None else (thread.hinge, thread.slide):
+            keys.note("joints", each, names.joints[each], (*pointless, *(() if _dry(model, each) else SOFT_DRY)))
         before, at = after, pose()
 
 
 def _dry(model: Any, j: int) -> float:
-    return float(model.dof_frictionloss[model.jnt_dofadr[j]])
-
-
-def _limited(model: Any, j: int) -> bool:
-    mujoco: Any = import_module("mujoco")
-    return bool(model.jnt_limited[j]) and not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT
+    off = disabled(model, "FRICTIONLOSS", "CONSTRAINT")
+    return 0.0 if off else float(model.dof_frictionloss[model.jnt_dofadr[j]])
 
 
 def _passive(model: Any, j: int, kind: str) -> dict[str, Any]:
     """Damping, stiffness, rest and armature; coordinates count from the reference configuration."""
-    mujoco: Any = import_module("mujoco")
-    off, flags = mujoco.mjtDisableBit, model.opt.disableflags
     entries: dict[str, Any] = {"friction": 0.0}
     if kind in ("revolute", "prismatic"):
         entries["armature"] = float(model.dof_armature[model.jnt_dofadr[j]])
-    if not flags & off.mjDSBL_DAMPER:
+    if not disabled(model, "DAMPER"):
         entries["friction"] = float(model.dof_damping[model.jnt_dofadr[j]])
-    if not flags & off.mjDSBL_SPRING:
+    if not disabled(model, "SPRING"):
         entries["stiffness"] = float(model.jnt_stiffness[j])
         if kind in ("revolute", "prismatic") and entries["stiffness"]:
             q = int(model.jnt_qposadr[j])

@@ -11,8 +11,12 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
+from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Keys, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.imports.mjcf_routes import Route, route_of
+
+GROUPS = 31
+"""Groups of actuators that options can disable."""
 
 
 @final
@@ -25,15 +29,13 @@ class Line:
     length: float
 
 
-def tendons(model: Any, names: Names, draft: Draft) -> dict[int, str]:
+def tendons(model: Any, names: Names, keys: Keys, draft: Draft) -> dict[int, str]:
     """Springs and dampers of fixed tendons, and of those from site to site; number -> name of the scene's tendons."""
     found: dict[int, str] = {}
-    mujoco: Any = import_module("mujoco")
-    off, flags = mujoco.mjtDisableBit, model.opt.disableflags
     for t in range(model.ntendon):
         name, line, route = _named(model, t), _of_tendon(model, t), route_of(model, t)
-        stiffness = 0.0 if flags & off.mjDSBL_SPRING else float(model.tendon_stiffness[t].flat[0])
-        damping = 0.0 if flags & off.mjDSBL_DAMPER else float(model.tendon_damping[t].flat[0])
+        stiffness = 0.0 if disabled(model, "SPRING") else float(model.tendon_stiffness[t].flat[0])
+        damping = 0.0 if disabled(model, "DAMPER") else float(model.tendon_damping[t].flat[0])
         low, high = model.tendon_lengthspring[t].tolist()
         slack = route is not None and low == 0.0 < high
         taut = stiffness if low == high or slack else 0.0
@@ -49,18 +51,13 @@ def tendons(model: Any, names: Names, draft: Draft) -> dict[int, str]:
             draft.leave("stiffness that is not linear of", name)
         if np.any(model.tendon_dampingpoly[t]):
             draft.leave("damping that is not linear of", name)
-        if model.tendon_armature[t]:
-            draft.leave("armature of", name)
         if stiffness and not taut:
             draft.leave("slack of", name)
-        if model.tendon_limited[t]:
-            draft.leave("limits of", name)
-        if model.tendon_frictionloss[t]:
-            draft.leave("dry friction of", name)
+        keys.note("tendons", t, name, (*SOFT_STOPS, *SOFT_DRY))
     return found
 
 
-def actuators(model: Any, names: Names, ropes: dict[int, str], draft: Draft) -> None:
+def actuators(model: Any, names: Names, ropes: dict[int, str], keys: Keys, draft: Draft) -> None:
     """Actuators on joints with one degree of freedom and on tendons; ``ropes``: number -> name of the scene's tendons,
     to which those are added that are needed.
     """
@@ -68,6 +65,10 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], draft: Draft) -> 
     through, gains, biases, dynamics = mujoco.mjtTrn, mujoco.mjtGain, mujoco.mjtBias, mujoco.mjtDyn
     for a in range(model.nu):
         name = str(model.actuator(a).name) or f"actuator_{a + 1}"
+        group = int(model.actuator_group[a])
+        if disabled(model, "ACTUATION") or (0 <= group < GROUPS and model.opt.disableactuator >> group & 1):
+            draft.leave("disabled actuators", name)
+            continue
         kind, target, gear = int(model.actuator_trntype[a]), int(model.actuator_trnid[a, 0]), model.actuator_gear[a]
         lawful = (
             int(model.actuator_gaintype[a]) == gains.mjGAIN_FIXED
@@ -100,7 +101,8 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], draft: Draft) -> 
         if not sprung or (constant and not by_length):
             draft.leave("bias of", name)
         gain = float(model.actuator_gainprm[a, 0])
-        limits = model.actuator_ctrlrange[a].tolist() if model.actuator_ctrllimited[a] else None
+        clamped = model.actuator_ctrllimited[a] and not disabled(model, "CLAMPCTRL")
+        limits = model.actuator_ctrlrange[a].tolist() if clamped else None
         if route is not None:
             if target not in ropes:
                 ropes[target] = route.tendon(_named(model, target), names, draft)
@@ -108,8 +110,7 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], draft: Draft) -> 
         elif line is not None:
             shares = {names.joints[j]: gain * x for j, x in zip(line.joints, line.coefficients, strict=True)}
             draft.actuate(name, shares, limits)
-        if model.actuator_forcelimited[a]:
-            draft.leave("limits of the force of", name)
+        keys.note("actuators", a, name)
         if int(model.actuator_dyntype[a]) != dynamics.mjDYN_NONE:
             draft.leave("activation of", name)
 

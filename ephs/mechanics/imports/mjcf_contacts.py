@@ -14,15 +14,15 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.imports.collisions import LOSS, SINKING, SLIP, hull, many
+from ephs.mechanics.imports.collisions import LOSS, MOST_FACETS, NO_CORNERS, SINKING, SLIP, hull, many, too_fine
 from ephs.mechanics.imports.draft import Draft, pose
+from ephs.mechanics.imports.mjcf_keys import Keys, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
 from ephs.semantics.bundle import Array
 
-SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
-"""MuJoCo's default impedance."""
+FINE = f"contacts but those with planes, of meshes with more than {MOST_FACETS} faces and edges"
 
 
 @final
@@ -35,17 +35,15 @@ class Parameters:
     condim: int
 
 
-def contacts(model: Any, names: Names, draft: Draft) -> None:
+def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
     """Surfaces and contacts of a model, or a note of its contacts."""
-    mujoco: Any = import_module("mujoco")
-    off = model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-    pairs = {} if off else _pairs(model, names, draft)
+    pairs = {} if disabled(model, "CONTACT", "CONSTRAINT") else _pairs(model, names, draft)
     if not draft.contact:
         for b in sorted({int(model.geom_bodyid[g]) for pair in pairs for g in pair}):
             draft.leave("contacts of", names.bodies[b] or "the world")
         return
     shapes = {g: _shape(model, g) for pair in pairs for g in pair}
-    surfaces: dict[int, tuple[str, int]] = {}
+    surfaces: dict[int, tuple[str, Array]] = {}
     mass = float(np.sum(model.body_mass[1:]))
     for (one, other), parameters in pairs.items():
         kinds = (shapes[one] or ("",))[0], (shapes[other] or ("",))[0]
@@ -56,46 +54,33 @@ def contacts(model: Any, names: Names, draft: Draft) -> None:
         for g in (one, other):
             if g not in surfaces:
                 surfaces[g] = _surface(model, g, shapes[g] or ("", ()), names, draft)
-        if many(kinds, [surfaces[g][1] for g in (one, other)]):
+        fine = [g for g, kind in zip((one, other), kinds, strict=True) if too_fine(kind, surfaces[g][1])]
+        if fine and "plane" not in kinds:
+            for g in fine:
+                draft.leave(FINE, _named(model, names, g))
+        elif many(kinds, [surfaces[g][1] for g in (one, other)]):
             draft.leave("contacts between shapes with many edges", told)
         elif surfaces[one][0] and surfaces[other][0]:
             draft.touch((surfaces[one][0], surfaces[other][0]), _law(parameters, mass))
-    _softened(model, names, {g for pair in pairs for g in pair}, draft)
+    for g in sorted({g for pair in pairs for g in pair}):
+        keys.note("geoms", g, _named(model, names, g))
+    for p in range(model.npair) if pairs else ():
+        ends = " and ".join(_named(model, names, int(g[p])) for g in (model.pair_geom1, model.pair_geom2))
+        keys.note("pairs", p, ends)
+        if np.any(model.pair_friction[p, [0, 3]] != model.pair_friction[p, [1, 4]]):
+            draft.leave("friction that depends on the direction, of", ends)
+    overridden = import_module("mujoco").mjtEnableBit.mjENBL_OVERRIDE
+    if pairs and model.opt.enableflags & int(overridden):
+        draft.leave("options", "override")
 
 
-def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, int]:
-    """The name of a geom's surface, and its number of corners if it is a mesh."""
+def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, Array]:
+    """The name of a geom's surface, and its corners (n, 3) if it is a mesh."""
     place = pose(model.geom_pos[g], model.geom_quat[g])
     body, name = names.bodies[int(model.geom_bodyid[g])], _named(model, names, g)
     if shape[0] == "mesh":
         return hull(draft, body, name, shape[1], place, {})
-    return draft.surface(body, name, *shape, place), 0
-
-
-def _softened(model: Any, names: Names, touching: set[int], draft: Draft) -> None:
-    """Notes of parameters of contacts without a counterpart."""
-    moved = {
-        "margins of contacts of": np.column_stack([model.geom_margin, model.geom_gap]),
-        "impedance (solimp) of contacts of": model.geom_solimp - SOLIMP,
-        "adhesion of": model.geom_adhesion,
-        "surface velocities of": model.geom_surfacevel,
-    }
-    for what, values in moved.items():
-        for g in sorted(touching):
-            if np.any(values[g]):
-                draft.leave(what, _named(model, names, g))
-    pairs = {
-        "margins of contacts of": np.column_stack([model.pair_margin, model.pair_gap]),
-        "impedance (solimp) of contacts of": model.pair_solimp - SOLIMP,
-        "adhesion of": model.pair_adhesion,
-        "friction that depends on the direction, of": model.pair_friction[:, [0, 3]] - model.pair_friction[:, [1, 4]],
-        "softness of friction (solreffriction) of": model.pair_solreffriction,
-    }
-    for what, values in pairs.items():
-        for p in range(model.npair):
-            if np.any(values[p]):
-                ends = (_named(model, names, int(g[p])) for g in (model.pair_geom1, model.pair_geom2))
-                draft.leave(what, " and ".join(ends))
+    return draft.surface(body, name, *shape, place), NO_CORNERS
 
 
 def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Parameters]:
@@ -127,8 +112,7 @@ def _mixed(model: Any, one: int, other: int) -> Parameters:
 
 
 def _meeting(model: Any) -> Iterator[tuple[int, int]]:
-    mujoco: Any = import_module("mujoco")
-    loose = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    loose = disabled(model, "FILTERPARENT")
     excluded = {(int(s) >> 16, int(s) & 0xFFFF) for s in model.exclude_signature}
     for one, other in combinations(range(model.ngeom), 2):
         if not (

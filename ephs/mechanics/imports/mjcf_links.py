@@ -8,6 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, pose
+from ephs.mechanics.imports.mjcf_keys import disabled
 from ephs.mechanics.imports.mjcf_names import Names
 
 ROUNDED_COSINE = 1e-12
@@ -34,7 +35,7 @@ def screws(model: Any, names: Names) -> dict[int, Thread]:
     found: dict[int, Thread] = {}
     for e in range(model.neq):
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-        if int(model.eq_type[e]) != mujoco.mjtEq.mjEQ_JOINT or second < 0 or not model.eq_active0[e]:
+        if int(model.eq_type[e]) != mujoco.mjtEq.mjEQ_JOINT or second < 0 or not _active(model, e):
             continue
         ends = {names.kinds[j]: j for j in (first, second)}
         ratio, near = float(model.eq_data[e, 1]), abs(first - second) == 1
@@ -63,7 +64,7 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
         name = model.equality(e).name or f"equality_{e + 1}"
         if e in screwed:
             draft.leave("softness of equality constraints", name)
-        elif not model.eq_active0[e]:
+        elif not _active(model, e):
             draft.leave("inactive equality constraints", name)
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             if int(model.eq_objtype[e]) == sites:
@@ -86,6 +87,10 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
             draft.leave("softness of equality constraints", name)
         else:
             draft.leave("equality constraints that are neither lower pairs nor constant ratios", name)
+
+
+def _active(model: Any, e: int) -> bool:
+    return bool(model.eq_active0[e]) and not disabled(model, "EQUALITY", "CONSTRAINT")
 
 
 def _in_ratio(names: Names, joints: tuple[int, int], data: Any) -> bool:

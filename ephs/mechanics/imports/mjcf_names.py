@@ -39,22 +39,13 @@ def noted(model: Any, names: Names, draft: Draft) -> None:
     def joints(values: Any) -> list[str]:
         return [names.joints[j] for j in range(model.njnt) if np.any(values[j])]
 
-    def bodies(values: Any) -> list[str]:
-        return [names.bodies[b] for b in range(1, model.nbody) if np.any(values[b])]
-
-    option = model.opt
     parts = {
         "rotor inertia (armature) of joints with several degrees of freedom": [
             name for name in dofs(model.dof_armature) if names.kinds[names.joints.index(name)] in ("free", "spherical")
         ],
         "damping that is not linear of": dofs(model.dof_dampingpoly),
         "stiffness that is not linear of": joints(model.jnt_stiffnesspoly),
-        "compensation of gravity on": bodies(model.body_gravcomp),
-        "motion capture of": bodies(model.body_mocapid >= 0),
-        "forces of a medium": [
-            word for word in ("density", "viscosity") if getattr(option, word)
-        ] + (["wind"] if np.any(option.wind) else []),
-    }  # fmt: skip
+    }
     for what, found in parts.items():
         for name in found:
             draft.leave(what, name)

@@ -17,11 +17,12 @@ _SECTIONS = {
     "sensor": "sensors",
     "deformable": "deformables",
     "extension": "plugins",
+    "keyframe": "keyframes",
 }
 # Actuators and tendons that may have a counterpart, and targets of actuators.
 _DRIVES = ("general", "motor", "position", "velocity", "cylinder", "damper")
 _TARGETS = ("joint", "jointinparent", "tendon")
-_SILENT = ("visual", "statistic", "custom", "keyframe", "size", "compiler-plugin")
+_SILENT = ("visual", "statistic", "custom", "size", "compiler-plugin")
 _ASSETS = ("texture", "material", "hfield", "skin", "model")
 _UNSUPPORTED = {
     "attach": "write the other model's bodies into this one",

@@ -9,8 +9,12 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import UNLIMITED, WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, draw, named, tensor
+from ephs.mechanics.imports.keys import note_unknown
 from ephs.mechanics.imports.sdf_contacts import ground_surfaces, link_surfaces, solids
 from ephs.mechanics.imports.sdf_frames import MODEL, Frames, read_pose
+from ephs.mechanics.imports.sdf_keys import LINK, ROOT, joint_keys
+from ephs.mechanics.imports.sdf_keys import MODEL as MODEL_KEYS
+from ephs.mechanics.imports.sdf_keys import WORLD as WORLD_KEYS
 from ephs.mechanics.imports.xml import numbers
 from ephs.mechanics.scene.errors import fault
 from ephs.semantics.spaces import SE3
@@ -34,7 +38,6 @@ _PASSED_BY = {
     "plugin": "plugins",
     "gripper": "grippers",
     "sensor": "sensors",
-    "light": "lights",
     "projector": "projectors",
 }
 
@@ -72,7 +75,11 @@ def read_sdf(root: Element, draft: Draft) -> None:
     version = tuple(int(word) for word in (root.get("version") or "1.6").split(".")[:2] if word.isdigit())
     for name, joint in joints.items():
         _joint(name, joint, ends[name], place, frames, version, draft)
-    for element in model.iter():
+    note_unknown(root, ROOT, draft, "files", draft.name)
+    note_unknown(model, MODEL_KEYS, draft, "models", draft.name)
+    for world in root.findall("world"):
+        note_unknown(world, WORLD_KEYS, draft, "worlds", world.get("name") or "world")
+    for element in [*model.iter(), *root.findall("world/plugin")]:
         if element.tag in _PASSED_BY:
             draft.leave(_PASSED_BY[element.tag], element.get("name") or element.tag)
 
@@ -199,8 +206,7 @@ def _link(name: str, link: Element, place: np.ndarray, draft: Draft) -> None:
 
         rows = tensor(entry)
         draft.body(name, mass, turned_tensor(own[:4], rows), own[4:], place)
-    if (link.findtext("gravity") or "").strip() in ("false", "0"):
-        draft.leave("absence of gravity on", name)
+    note_unknown(link, LINK, draft, "links", name)
     for number, visual in enumerate(link.findall("visual")):
         for solid in solids(visual, f"links.{name}.visual[{number}]", draft):
             draw(draft, name, *solid)
@@ -235,8 +241,7 @@ def _joint(
     at1, at2 = (_inside(end, framed, place, frames) for end in ends)
     draft.joint(name, kind, *ends, at1, at2, entries)
     _limits(name, joint, kind, count, draft)
-    if joint.find("sensor") is not None:
-        draft.leave("sensors", name)
+    note_unknown(joint, joint_keys(count, fixed=kind == "fixed"), draft, "joints", name)
 
 
 def _inside(link: str, at: np.ndarray, place: np.ndarray, frames: Frames) -> np.ndarray:
@@ -276,8 +281,6 @@ def _dynamics(name: str, joint: Element, kind: str, count: int, draft: Draft) ->
                 what = "a number not below 0"
                 draft.faults.append(fault("range", f"{key}.dynamics.{word}", f"{value:g}", what=what))
             rows[entry].append(value)
-        if axis is not None and axis.find("mimic") is not None:
-            draft.leave("mimicry of", name)
     if kind == "fixed":
         return {}
     dry = draft.dry(name, max(rows.pop("dry")), 3 if kind == "spherical" else count)
@@ -298,9 +301,6 @@ def _limits(name: str, joint: Element, kind: str, count: int, draft: Draft) -> N
             draft.limit(name, -sides[0] if given["lower"] is None else sides[0], sides[1])
         elif any(abs(side) < UNLIMITED for side in sides):
             draft.leave("limits of", name)
-        for word in limit:
-            if word.tag not in given and 0.0 <= _bound(word.text, f"joints.{name}.{word.tag}", draft) < UNLIMITED:
-                draft.leave(f"{word.tag} of limits of", name)
 
 
 def _bound(text: str | None, key: str, draft: Draft) -> float:

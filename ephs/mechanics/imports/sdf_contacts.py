@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from ephs.mechanics.imports.collisions import collide, default_law
+from ephs.mechanics.imports.collisions import FRICTION, collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along
+from ephs.mechanics.imports.keys import note_unknown
 from ephs.mechanics.imports.sdf_frames import read_pose
+from ephs.mechanics.imports.sdf_keys import COLLISION
 from ephs.mechanics.imports.xml import numbers
 from ephs.mechanics.scene.errors import fault
 from ephs.semantics.bundle import Array
@@ -17,8 +19,6 @@ from ephs.semantics.spaces import SE3
 
 RIGID = 1e12
 """Default of ``kp`` in N/m, which stands for a rigid surface."""
-_READ = {"surface contact ode kp": "stiffness", "surface friction ode mu": "friction"}
-_GEOMETRY = ("pose", "geometry")
 _TRUE = ("true", "1")
 
 
@@ -64,9 +64,6 @@ def link_surfaces(model: Element, links: Mapping[str, Element], draft: Draft) ->
         each = False
     law = default_law(draft) | ({} if each else {"group": name})
     for link, element in links.items():
-        for word in ("self_collide", "kinematic"):
-            if (element.findtext(word) or "").strip() in _TRUE:
-                draft.leave(f"{word} of", link)
         _surfaces(element, link, link, None, law, draft)
 
 
@@ -85,34 +82,39 @@ def _surfaces(
         draft.leave("contacts of", name)
         return
     for number, collision in enumerate(found):
+        if not _meets(collision):
+            continue
         own, key = f"{name}_{collision.get('name') or number + 1}", f"links.{name}.collision[{number}]"
         given = _law(collision, own, key, draft)
         for kind, value, at in solids(collision, key, draft):
             collide(draft, link, own, kind, value, at if place is None else SE3.compose(place, at), {**law, **given})
 
 
+def _meets(collision: Element) -> bool:
+    """Whether a collision makes forces: not with a bit mask of 0, and not where it is for sensors alone."""
+    bits, sensed = (
+        (collision.findtext(f"surface/contact/{word}") or "").strip().lower()
+        for word in ("collide_bitmask", "collide_without_contact")
+    )
+    return not (bits and not bits.removeprefix("0x").strip("0")) and sensed not in _TRUE
+
+
 def _law(collision: Element, name: str, key: str, draft: Draft) -> dict[str, float]:
-    """Stiffness and friction of a collision; a note of each other number that is not 0."""
+    """Stiffness and friction of a collision; a note of other numbers."""
     found: dict[str, float] = {}
-    for path, text in _leaves(collision):
-        if path in _READ:
-            value = numbers(text, 1, f"{key}.{path}", draft.faults)[0]
-            if path == "surface contact ode kp" and not 0.0 < value < RIGID:
-                draft.leave("rigid contacts (kp) of", name)
-            else:
-                found[_READ[path]] = value
-        elif any(word.strip("-+0.") for word in text.split()) or "bitmask" in path:
-            draft.leave(f"contact parameter {path.removeprefix('surface ')} of", name)
+    stiffness, friction = "surface/contact/ode/kp", "surface/friction/ode/mu"
+    if collision.find(friction) is not None:
+        found["friction"] = numbers(collision.findtext(friction), 1, f"{key}.{friction}", draft.faults)[0]
+    if collision.find(stiffness) is not None:
+        found |= soft(numbers(collision.findtext(stiffness), 1, f"{key}.{stiffness}", draft.faults)[0], name, draft)
+    plain = collision.findtext(friction) or f"{FRICTION}"
+    note_unknown(collision, {**COLLISION, f"{friction}2": (plain,)}, draft, "collisions", name)
     return found
 
 
-def _leaves(element: Element, path: str = "") -> Iterator[tuple[str, str]]:
-    """Paths and texts of the elements within a collision that have none themselves."""
-    for child in element:
-        if not path and child.tag in _GEOMETRY:
-            continue
-        here = f"{path} {child.tag}".strip()
-        if len(child):
-            yield from _leaves(child, here)
-        else:
-            yield here, (child.text or "").strip()
+def soft(stiffness: float, name: str, draft: Draft) -> dict[str, float]:
+    """The stiffness ``kp`` of a surface; a note of a rigid one."""
+    if 0.0 < stiffness < RIGID:
+        return {"stiffness": stiffness}
+    draft.leave("rigid contacts (kp) of", name)
+    return {}

@@ -9,6 +9,9 @@ import numpy as np
 from ephs.mechanics.imports.collisions import collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, draw, named, tensor
+from ephs.mechanics.imports.keys import Known, note_unknown
+from ephs.mechanics.imports.sdf_contacts import soft
+from ephs.mechanics.imports.sdf_keys import LINK as SDF_LINK
 from ephs.mechanics.imports.xml import numbers, vector
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.geometry import coupling
@@ -25,10 +28,41 @@ KINDS = {
 }
 AXIAL = ("revolute", "prismatic", "planar")
 ROOT = "root_joint"
-_BULLET = {"lateral_friction": "friction", "stiffness": "stiffness"}
+_BULLET = {
+    "lateral_friction": "friction", "stiffness": "stiffness", "rolling_friction": "rolling",
+    "spinning_friction": "spinning",
+}  # fmt: skip
 """Elements of Bullet's ``<contact>`` in a link -> keys of surfaces."""
-_LINK = ("inertial", "visual", "collision", "contact")
-_PASSED_BY = {"gazebo": "simulator tags", "sensor": "sensors"}
+_ROBOT: Known = dict.fromkeys(("name", "version", "link", "joint", "transmission", "material", "gazebo", "sensor"), ())
+_LINK: Known = {
+    **dict.fromkeys(("name", "type", "inertial/origin", "inertial/mass", "inertial/inertia"), ()),
+    **dict.fromkeys(("visual", "collision", *(f"contact/{word}" for word in _BULLET)), ()),
+    "contact/restitution": ("0",),
+}
+_COLLISION: Known = dict.fromkeys(("name", "origin", "geometry", "material"), ())
+_FIXED: Known = dict.fromkeys(
+    ("name", "type", "parent", "child", "origin", "dont_collapse", "axis", "limit", "dynamics", "mimic"), ()
+)
+_JOINT: Known = {
+    **dict.fromkeys(("name", "type", "parent", "child", "origin", "dont_collapse", "axis", "mimic"), ()),
+    **dict.fromkeys(("dynamics/damping", "dynamics/friction", "limit/lower", "limit/upper", "limit/effort"), ()),
+    "limit/velocity": ("0",),
+}
+_SPRING = {"springStiffness": "stiffness", "springReference": "rest"}
+"""Tags for Gazebo of joints -> keys of joints."""
+_TOUCHING: Known = {
+    **dict.fromkeys(("mu1", "kp"), ()), "kd": ("1",), "mu2": ("1",), "fdir1": ("0 0 0",), "minDepth": ("0",),
+    "maxVel": ("0.01",), "maxContacts": (), "laserRetro": (),
+}  # fmt: skip
+"""Tags for Gazebo of contacts, with their defaults."""
+_GAZEBO: Known = {
+    **{path: plain for path, plain in SDF_LINK.items() if not path.startswith(("collision", "inertial"))},
+    **dict.fromkeys(("reference", "material", "preserveFixedJoint", "disableFixedJointLumping"), ()),
+    **dict.fromkeys(("provideFeedback", "implicitSpringDamper", *_SPRING), ()),
+    **dict.fromkeys(("turnGravityOff", "selfCollide", "dampingFactor", "static"), ("0",)),
+}
+Settings = Mapping[str, Mapping[str, Element]]
+"""Name of a link or joint -> tag -> element, of ``<gazebo reference=…>``."""
 
 
 def read_urdf(root: Element, draft: Draft, base: str) -> None:
@@ -45,9 +79,9 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         return
     for link in links:
         _link(link, links[link], draft)
-    law = default_law(draft) | {"group": draft.name}
+    law, settings = default_law(draft) | {"group": draft.name}, _gazebo(root, links, joints, draft)
     for name, link in links.items():
-        _collisions(name, link, law, draft)
+        _collisions(name, link, law, settings.get(name, {}), draft)
     if draft.contact and root.find("link/collision") is not None:
         draft.leave("contacts between the links of", draft.name)
     free = base == "free"
@@ -55,7 +89,7 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
     of_child = {child: name for name, (_, child) in ends.items()}
     for link in order[1:]:
         name = of_child[link]
-        _joint(name, joints[name], *ends[name], draft)
+        _joint(name, joints[name], *ends[name], settings.get(name, {}), draft)
     for name, joint in joints.items():
         _mimic(name, joint, joints, draft)
     for number, element in enumerate(root.findall("transmission")):
@@ -64,12 +98,32 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         effort = _attribute(joint.find("limit"), "effort", f"joints.{name}.limit", draft, 0.0)
         if effort and KINDS[str(joint.get("type"))] in ("revolute", "prismatic") and not draft.driven(name):
             draft.leave("limits of effort of", name)
-        for tag in ("safety_controller", "calibration"):
-            if joint.find(tag) is not None:
-                draft.leave(f"{tag} of", name)
-    for element in root:
-        if element.tag in _PASSED_BY:
-            draft.leave(_PASSED_BY[element.tag], element.get("name") or element.get("reference") or element.tag)
+    for sensor in root.findall("sensor"):
+        draft.leave("sensors", sensor.get("name") or "sensor")
+    note_unknown(root, _ROBOT, draft, "robots", draft.name)
+
+
+def _gazebo(root: Element, links: Mapping[str, Element], joints: Mapping[str, Element], draft: Draft) -> Settings:
+    """Tags for Gazebo; a note of those that are not imported."""
+    found: dict[str, dict[str, Element]] = {}
+    for element in root.findall("gazebo"):
+        name = element.get("reference", "")
+        kind = "links" if name in links else "joints" if name in joints else "robots"
+        own = found.setdefault(name, {})
+        own.update((child.tag, child) for child in element)
+        touching: Known = _TOUCHING if draft.contact else dict.fromkeys(_TOUCHING, ())
+        if draft.contact and "mu1" in own:
+            touching = {**touching, "mu2": (_text(own["mu1"]) or "",)}
+        for tag in ("plugin", "sensor"):
+            if element.find(tag) is not None:
+                draft.leave(f"{tag}s", name or draft.name)
+        note_unknown(element, {**_GAZEBO, **touching}, draft, kind, name or draft.name)
+    return found
+
+
+def _text(element: Element | None) -> str | None:
+    """The value of a tag for Gazebo, written as a text or as an attribute."""
+    return None if element is None else element.get("value") or element.text
 
 
 def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft) -> tuple[str, str]:
@@ -129,9 +183,7 @@ def _link(name: str, link: Element, draft: Draft) -> None:
             lambda entry: _attribute(entries, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
         )
         draft.body(name, mass, turned_tensor(place[:4], rows), place[4:])
-    for other in link:
-        if other.tag not in _LINK:
-            draft.leave("elements of links", f"{other.tag} of {name}")
+    note_unknown(link, _LINK if draft.contact else {**_LINK, "contact": ()}, draft, "links", name)
     for number, visual in enumerate(link.findall("visual")):
         for solid in _solids(visual, f"links.{name}.visual[{number}]", draft):
             draw(draft, name, *solid)
@@ -158,29 +210,30 @@ def _solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any
         yield solid.tag, value, place
 
 
-def _collisions(name: str, link: Element, law: Mapping[str, Any], draft: Draft) -> None:
+def _collisions(name: str, link: Element, law: Mapping[str, Any], gazebo: Mapping[str, Element], draft: Draft) -> None:
     """Surfaces of a link, or a note of its contacts."""
     found = link.findall("collision")
-    if found and not draft.contact:
-        draft.leave("contacts of", name)
+    if not found or not draft.contact:
+        if found:
+            draft.leave("contacts of", name)
         return
-    bullet: dict[str, float] = {}
+    own: dict[str, float] = {}
+    if "mu1" in gazebo:
+        own["friction"] = numbers(_text(gazebo["mu1"]), 1, f"gazebo.{name}.mu1", draft.faults)[0]
+    if "kp" in gazebo:
+        own |= soft(numbers(_text(gazebo["kp"]), 1, f"gazebo.{name}.kp", draft.faults)[0], name, draft)
     for element in link.findall("contact/*"):
-        value = _attribute(element, "value", f"links.{name}.contact.{element.tag}", draft, 0.0)
         if element.tag in _BULLET:
-            bullet[_BULLET[element.tag]] = value
-        elif value:
-            draft.leave("contact parameters", f"{element.tag} of {name}")
+            key = f"links.{name}.contact.{element.tag}"
+            own[_BULLET[element.tag]] = _attribute(element, "value", key, draft, 0.0)
     for number, collision in enumerate(found):
-        own = collision.get("name") or (f"{name}_{number + 1}" if len(found) > 1 else name)
+        surface = collision.get("name") or (f"{name}_{number + 1}" if len(found) > 1 else name)
         for solid in _solids(collision, f"links.{name}.collision[{number}]", draft):
-            collide(draft, name, own, *solid, {**law, **bullet})
-        for other in collision:
-            if other.tag not in ("origin", "geometry", "material"):
-                draft.leave("elements of collisions", f"{other.tag} of {name}")
+            collide(draft, name, surface, *solid, {**law, **own})
+        note_unknown(collision, _COLLISION, draft, "collisions", name)
 
 
-def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> None:
+def _joint(name: str, joint: Element, parent: str, child: str, gazebo: Mapping[str, Element], draft: Draft) -> None:
     key, kind = f"joints.{name}", KINDS[str(joint.get("type"))]
     origin, turned = _origin(joint, key, draft), pose()
     if kind in AXIAL:
@@ -200,17 +253,19 @@ def _joint(name: str, joint: Element, parent: str, child: str, draft: Draft) -> 
         if d:
             entries["friction"] = losses["damping"]
             entries |= draft.dry(name, losses["friction"], d)
-        for other in set(dynamics.attrib) - {"damping", "friction"}:
-            draft.leave("joint dynamics", f"{other} of {name}")
+    for tag, entry in _SPRING.items():
+        if tag in gazebo and d == 1:
+            entries[entry] = numbers(_text(gazebo[tag]), 1, f"gazebo.{name}.{tag}", draft.faults)[0]
+        elif tag in gazebo:
+            draft.leave(f"{tag} of joints", name)
     draft.joint(name, kind, parent, child, SE3.compose(origin, turned), turned, entries)
     limit = joint.find("limit")
     if limit is not None and kind in ("revolute", "prismatic") and joint.get("type") != "continuous":
         lower, upper = (_attribute(limit, side, f"{key}.limit", draft, 0.0) for side in ("lower", "upper"))
         draft.limit(name, lower, upper)
-        if _attribute(limit, "velocity", f"{key}.limit", draft, 0.0):
-            draft.leave("limits of velocity of", name)
-    elif d and limit is not None:
+    elif d and limit is not None and {"lower", "upper"} & set(limit.attrib):
         draft.leave("limits of", name)
+    note_unknown(joint, _JOINT if d else _FIXED, draft, "joints", name)
 
 
 def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draft) -> None:

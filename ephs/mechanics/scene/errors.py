@@ -8,6 +8,11 @@ from typing import Any, final
 from ephs.operad.messages import legible as legible
 from ephs.operad.messages import nearest_name as nearest_name
 
+ALIKE = 3
+"""Number of faults that expect the same from which on they share a text."""
+SHOWN = 10
+"""Names that the message of a warning shows of a longer list."""
+
 
 @final
 @dataclass(frozen=True, slots=True)
@@ -30,6 +35,21 @@ class Fault:
     def __str__(self) -> str:
         where = f"{self.key}: " if self.key else ""
         return f"{where}found {self.found}, expected {self.expected}" + (f"; {self.advice}" if self.advice else "")
+
+
+def told(faults: Iterable[Fault]) -> list[str]:
+    """A line for each fault, but one text for many that expect the same, followed by what was found."""
+    groups: dict[tuple[str, str], list[Fault]] = {}
+    for one in faults:
+        groups.setdefault((one.expected, one.advice), []).append(one)
+    lines: list[str] = []
+    for (expected, advice), alike in groups.items():
+        if len(alike) < ALIKE:
+            lines += map(str, alike)
+        else:
+            lines.append(f"{len(alike)} times expected {expected}" + (f"; {advice}" if advice else ""))
+            lines += [f"  {one.key}: found {one.found}" for one in alike]
+    return lines
 
 
 @final
@@ -59,7 +79,22 @@ class SceneWarning(UserWarning):
 
 @final
 class ModelWarning(UserWarning):
-    """An imported model has elements without a counterpart in scenes."""
+    """An imported model has elements without a counterpart in scenes.
+
+    Attributes
+    ----------
+    lines : a line for each kind of them, with all names; the message has the first `SHOWN` names of each
+    """
+
+    def __init__(self, path: str, lines: Iterable[str] = ()) -> None:
+        self.lines = tuple(lines)
+        super().__init__("\n  ".join([path, *map(_shortened, self.lines)]))
+
+
+def _shortened(line: str) -> str:
+    names = line.split(", ")
+    more = len(names) - SHOWN
+    return line if more < 2 else f"{', '.join(names[:SHOWN])}, and {more} more"
 
 
 # code: (expected, advice); both may name the values given to `fault`.
@@ -141,6 +176,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "no scale": ("a stiffness, since the scene gives no time scale for a default", "add this key"),
     "unknown surface": ("a surface", "{hint}"),
     "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),
+    "many faces": (
+        "at most {most} where it meets other shapes than planes",
+        "take fewer points, or several simple shapes, or put both surfaces into one group",
+    ),
     "solid points": ("points of a body with volume", "take a plane or a thin box for what is flat"),
     "surface shape": (
         "one of sphere, capsule, cylinder, box, plane = {{}}, mesh, points",

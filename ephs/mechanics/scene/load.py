@@ -17,7 +17,7 @@ from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible
+from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
@@ -109,9 +109,10 @@ def load(
     scene, said, r.faults[:] = as_meant(scene)
     if r.faults:
         raise SceneError(str(path), r.faults)
-    for kind, lines in ((SceneWarning, [*r.odd, *filter(None, [said])]), (ModelWarning, r.left)):
-        if lines:
-            warnings.warn("\n  ".join([str(path) + ":", *map(str, lines)]), kind, stacklevel=2)
+    if odd := [*told(r.odd), *filter(None, [said])]:
+        warnings.warn("\n  ".join([f"{path}:", *map(str, odd)]), SceneWarning, stacklevel=2)
+    if r.left:
+        warnings.warn(ModelWarning(f"{path}:", r.left), stacklevel=2)
     return scene
 
 

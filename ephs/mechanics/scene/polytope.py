@@ -1,14 +1,18 @@
 """Convex meshes: vertices of STL files, after a check of convexity, and of the convex hulls of points."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ephs.mechanics.shapes.hull import hull_of
 from ephs.semantics.bundle import Array
 
 MOST_BYTES = 20_000_000
 MOST_VERTICES = 256
 """Vertices that a surface may have: each is a point of contact."""
+MOST_FACES = 128
+"""Faces and edges that a mesh may have to meet others than planes: all of them are in one compiled function."""
 FLAT = 1e-5
 """Relative tolerance of convexity: depth of vertices inside the hull, and difference of volumes. Bodies that are
 thinner count as flat."""
@@ -63,6 +67,15 @@ def corners_of(points: Array) -> Array:
     return hull[0]
 
 
+def faces_and_edges(corners: Sequence[Sequence[float]]) -> int:
+    """Number of faces and edges of the convex hull of its corners (n, 3); of many corners a lower bound."""
+    least = 2 * len(corners) + 2  # each corner has three edges or more
+    if least > MOST_FACES:
+        return least
+    hull = hull_of(corners)
+    return len(hull.faces) + len(hull.edges)
+
+
 def depth_inside(points: Array) -> float:
     """Greatest depth in m of points (m, 3) inside their convex hull; 0 for corners of a convex body, or a flat one."""
     hull = _hull(points)
@@ -77,9 +90,15 @@ def _inside(faces: Array, points: Array) -> float:
     return max(-float((faces[:, :3] @ block.T + faces[:, 3:]).max(axis=0).min()) for block in blocks)
 
 
-def largest_hull(points: Array) -> tuple[Array, float]:
-    """At most `MOST_VERTICES` of the vertices (n, 3) of the convex hull of points (m, 3), and the distance in m of the
-    farthest point outside of their hull. Those farthest outside are taken first.
+def largest_hull(points: Array, least: int = MOST_VERTICES, share: float = 0.0) -> tuple[Array, float]:
+    """Some vertices (n, 3) of the convex hull of points (m, 3), and the distance in m of the farthest point outside of
+    their hull. Those farthest outside are taken first.
+
+    Parameters
+    ----------
+    least, share
+        All vertices of hulls that have no more than ``least``; of others at least these, and at most `MOST_VERTICES`,
+        until all points are no farther outside than this share of the largest extent.
 
     Raises
     ------
@@ -89,18 +108,20 @@ def largest_hull(points: Array) -> tuple[Array, float]:
     from scipy.spatial import ConvexHull
 
     corners = corners_of(points)
-    if len(corners) <= MOST_VERTICES:
+    if len(corners) <= least:
         return corners, 0.0
     taken = ConvexHull(corners, qhull_options="Qt TA4").vertices
+    enough = share * float(np.ptp(corners, axis=0).max())
     while True:
         faces = ConvexHull(corners[taken]).equations
         heights = faces[:, :3] @ corners.T + faces[:, 3:]
         outside = heights.max(axis=1)
-        if len(taken) == MOST_VERTICES:
-            return corners[taken], float(outside.max())
-        new = np.unique(heights[outside > 0.5 * outside.max()].argmax(axis=1))
+        depth = float(outside.max())
+        new = np.setdiff1d(heights[outside > 0.5 * depth].argmax(axis=1), taken)
+        if not new.size or len(taken) == MOST_VERTICES or (len(taken) >= least and depth <= enough):
+            return corners[taken], depth
         order = np.argsort(-heights.max(axis=0)[new], kind="stable")
-        taken = np.append(taken, new[order][: MOST_VERTICES - len(taken)])
+        taken = np.append(taken, new[order][: (least if len(taken) < least else MOST_VERTICES) - len(taken)])
 
 
 def _spans(triangles: Array) -> tuple[Array, Array]:

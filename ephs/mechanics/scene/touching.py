@@ -16,7 +16,7 @@ from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, fault, unknown
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Joint, Scene, frozen
-from ephs.mechanics.scene.polytope import corners_of, vertices_of
+from ephs.mechanics.scene.polytope import MOST_FACES, corners_of, faces_and_edges, vertices_of
 from ephs.mechanics.scene.resolve import Names, mesh_file
 from ephs.mechanics.scene.schema import JointEntry
 from ephs.mechanics.scene.schema_touching import ContactEntry, ContactLawEntry, SurfaceEntry
@@ -157,6 +157,9 @@ def overlaps(scene: Scene, faults: list[Fault]) -> list[Fault]:
     poses = {GROUND: IDENTITY_POSE} | {name: body.pose for name, body in scene.all_bodies()}
     for name, contact in scene.contacts.items():
         one, other = (surfaces[each] for each in contact.surfaces)
+        if faceted := _faceted(contact.surfaces, one, other):
+            faults.append(fault("many faces", f"contacts.{name}", faceted, most=MOST_FACES))
+            continue
         touching, swapped = touches(one.shape, one.frame, other.shape, other.frame)
         bodies = (other.body, one.body) if swapped else (one.body, other.body)
         depth = 0.0
@@ -172,6 +175,16 @@ def overlaps(scene: Scene, faults: list[Fault]) -> list[Fault]:
                 fault("hard overlap", key, told) if hard else fault("overlap", key, told, most=DEEP * length)
             )
     return found
+
+
+def _faceted(names: tuple[str, str], one: Surface, other: Surface) -> str:
+    """The mesh of a pair that has too many faces and edges to meet the other surface."""
+    if "plane" in one.shape or "plane" in other.shape:
+        return ""
+    for name, surface in zip(names, (one, other), strict=True):
+        if "mesh" in surface.shape and (count := faces_and_edges(surface.shape["mesh"])) > MOST_FACES:
+            return f"{name} with {count} faces and edges or more"
+    return ""
 
 
 def resolve_contacts(

@@ -208,19 +208,22 @@ URDF_NOTES = {
     "dae": (robot(collision('<mesh filename="x.dae"/>')), "contacts with meshes that are neither STL nor OBJ: x.dae"),
     "broken": (robot(collision('<mesh filename="broken.stl"/>')), r"contacts with meshes that cannot be read: broken"),
     "flat": (robot(collision('<mesh filename="flat.obj"/>')), "contacts with meshes that have no volume: l0"),
-    "concave": (robot(collision('<mesh filename="dent.obj"/>')), "contacts inside of convex hulls: l0, 0.25 m deep"),
-    "collision": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "elements of collisions: verbose of l0"),
-    "link": (robot("<gravity/>"), "elements of links: gravity of l0"),
+    "concave": (
+        robot(collision('<mesh filename="dent.obj"/>')), r"contacts inside of convex hulls: l0 \(0.25 m deep\)",
+    ),
+    "collision": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "verbose of collisions: l0"),
+    "link": (robot("<gravity/>"), "gravity of links: l0"),
     "restitution": (
         robot(collision("<box size='1 1 1'/>") + '<contact><restitution value="0.5"/></contact>'),
-        "contact parameters: restitution of l0\n",
+        "contact/restitution of links: l0\n",
     ),
     "velocity": (
         robot("", "").replace('"fixed">', '"revolute"><limit lower="-1" upper="1" velocity="3" effort="2"/>'),
-        "limits of velocity of: j1\n.*limits of effort of: j1",
+        "limit/velocity of joints: j1\n.*limits of effort of: j1",
     ),
     "safety": (
-        robot("", "").replace('"fixed">', '"revolute"><safety_controller k_velocity="3"/>'), "safety_controller of: j1",
+        robot("", "").replace('"fixed">', '"revolute"><safety_controller k_velocity="3"/>'),
+        "safety_controller of joints: j1",
     ),
 }  # fmt: skip
 
@@ -236,46 +239,6 @@ def test_what_is_lost_of_a_urdf_is_said_by_name(kind, tmp_path):
     (tmp_path / "dent.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in dent), encoding="utf-8")
     _, found = loaded(text, tmp_path, "urdf")
     assert re.search(f"not modelled: {said}", found), found
-
-
-SURFACE = "<surface>{}</surface>"
-SDF_NOTES = {
-    "kd": (
-        SURFACE.format("<contact><ode><kd>10</kd></ode></contact>"),
-        "contact parameter contact ode kd of: body_c",
-    ),
-    "rigid": (SURFACE.format("<contact><ode><kp>1e12</kp></ode></contact>"), r"rigid contacts \(kp\) of: body_c"),
-    "mu2": (
-        SURFACE.format("<friction><ode><mu2>0.2</mu2></ode></friction>"),
-        "contact parameter friction ode mu2 of: body_c",
-    ),
-    "bounce": (
-        SURFACE.format("<bounce><restitution_coefficient>0.5</restitution_coefficient></bounce>"),
-        "contact parameter bounce restitution_coefficient of: body_c",
-    ),
-    "bitmask": (
-        SURFACE.format("<contact><collide_bitmask>0</collide_bitmask></contact>"),
-        "contact parameter contact collide_bitmask of: body_c",
-    ),
-    "count": ("<max_contacts>10</max_contacts>", "contact parameter max_contacts of: body_c"),
-}
-
-
-@pytest.mark.parametrize("kind", SDF_NOTES)
-def test_what_is_lost_of_an_sdf_is_said_by_name(kind, tmp_path):
-    surface, said = SDF_NOTES[kind]
-    _, found = loaded(SDF.format(**GIVEN | {"surface": surface}), tmp_path, "sdf")
-    assert re.search(f"not modelled: {said}", found), found
-
-
-def test_limits_of_an_sdf_without_counterpart_are_said_by_name(tmp_path):
-    joint = (
-        '<joint name="j" type="revolute"><parent>world</parent><child>body</child><axis><xyz>0 1 0</xyz><limit>'
-        "<lower>-1</lower><upper>1</upper><effort>5</effort><velocity>-1</velocity><stiffness>1e5</stiffness>"
-        "</limit></axis></joint>"
-    )
-    _, said = loaded(SDF.format(**GIVEN | {"model": joint}), tmp_path, "sdf")
-    assert "effort of limits of: j" in said and "stiffness of limits of: j" in said and "velocity of" not in said
 
 
 def test_two_moving_models_are_refused(tmp_path):

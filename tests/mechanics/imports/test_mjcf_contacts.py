@@ -12,7 +12,6 @@ import ephs
 from ephs.mechanics.imports import convert
 from ephs.mechanics.imports.collisions import SINKING
 from ephs.mechanics.imports.mjcf_contacts import LOSS
-from ephs.mechanics.scene.polytope import MOST_VERTICES
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
 
@@ -151,19 +150,19 @@ def ring(count, height=0.1):
 
 NOTES = {
     "ellipsoid": ('<geom name="x" type="ellipsoid" size="1 2 3"/>', "", "contacts between: floor and x"),
-    "margin": ('<geom name="x" size="1" margin="0.1"/>', "", "margins of contacts of: x"),
-    "gap": ('<geom name="x" size="1" gap="0.1"/>', "", "margins of contacts of: x"),
-    "impedance": ('<geom name="x" size="1" solimp="0.8 0.9 0.01"/>', "", r"impedance \(solimp\) of contacts of: x"),
+    "margin": ('<geom name="x" size="1" margin="0.1"/>', "", "margin of geoms: x"),
+    "gap": ('<geom name="x" size="1" gap="0.1"/>', "", "gap of geoms: x"),
+    "impedance": ('<geom name="x" size="1" solimp="0.8 0.9 0.01"/>', "", "solimp of geoms: x"),
     "directed": (
         '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" friction="1 2 0 0 0"/>',
         "friction that depends on the direction, of: ",
     ),
     "soft friction": (
         '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" solreffriction="0.1 1"/>',
-        r"softness of friction \(solreffriction\) of: ",
+        "solreffriction of pairs: ",
     ),
     "pair margin": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" margin="0.1"/>', "margins of contacts of: ",
+        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" margin="0.1"/>', "margin of pairs: ",
     ),
     "height field": ('<geom name="x" type="hfield" hfield="h"/><geom size="1"/>', "", "height fields: x"),
     "pair of a height field": (
@@ -171,15 +170,19 @@ NOTES = {
         "contacts between: x and floor",
     ),
     "corners": (
-        '<geom name="x" type="mesh" mesh="wheel"/>', "", f"corners beyond {MOST_VERTICES} of convex hulls: x, ",
+        '<geom name="x" type="mesh" mesh="wheel"/>', "", "corners of convex hulls but the farthest: x ",
     ),
     "edges": (
         '<geom name="x" type="mesh" mesh="coin"/></body><body><freejoint/><geom name="y" type="box" size="1 1 1"/>', "",
+        "contacts but those with planes, of meshes with more than 64 faces and edges: x",
+    ),
+    "points": (
+        '<geom name="x" type="mesh" mesh="nut"/></body><body><freejoint/><geom name="y" type="mesh" mesh="bar"/>', "",
         "contacts between shapes with many edges: x and y",
     ),
     "stop": (
         '<joint name="j" type="hinge" range="-1 1" limited="true" solreflimit="0.05 1"/><geom size="1"/>', "",
-        "softness and margins of limits of: j",
+        "solreflimit of joints: j",
     ),
 }  # fmt: skip
 
@@ -191,7 +194,8 @@ def test_what_is_not_imported_is_said_by_name(kind, tmp_path):
     joint = "" if "<joint" in geom else "<freejoint/>"
     text = (
         '<mujoco><asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/>'
-        f'<mesh name="wheel" vertex="{ring(200)}"/><mesh name="coin" vertex="{ring(40)}"/></asset>'
+        f'<mesh name="wheel" vertex="{ring(200)}"/><mesh name="coin" vertex="{ring(40)}"/>'
+        f'<mesh name="nut" vertex="{ring(9)}"/><mesh name="bar" vertex="{ring(9, 0.5)}"/></asset>'
         f'<worldbody><geom name="floor" type="plane" size="1 1 1"/><body pos="0 0 9">{joint}{geom}</body></worldbody>'
         f"<contact>{pair}</contact></mujoco>"
     )

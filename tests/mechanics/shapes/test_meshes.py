@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import ephs
@@ -27,6 +29,7 @@ shape = {{ plane = {{}} }}
 """
 OPTIONS = {"elastic": {"method": "rk87", "rtol": 1e-7}, "hard": {"method": "rk54", "step": 2.0**-7}}
 LAWS = {"elastic": "stiffness = 1e5\nloss = 0.2\nfriction = 0.5", "hard": "restitution = 0.5\nfriction = 0.5"}
+EPS = float(np.finfo(float).eps)
 SIZES = np.array([0.25, 0.125, 0.5])
 
 
@@ -103,6 +106,42 @@ def test_the_largest_hull_says_how_far_points_are_outside():
     steps = np.arccos(1.0 - depth) / (np.pi / count)
     assert steps == pytest.approx(round(steps), abs=1e-6) and 4 <= round(steps) <= 8
     assert largest_hull(corners)[1] == 0.0
+
+
+@given(count=st.integers(4, 300), way=st.integers(0, 2**32 - 1), share=st.sampled_from([0.0, 0.01, 0.1]))
+def test_a_coarse_hull_leaves_no_point_farther_outside_than_it_says(count, way, share):
+    points = np.random.default_rng(way).normal(size=(count, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]  # all are corners
+    corners, depth = largest_hull(points, 32, share)
+    faces = ConvexHull(corners).equations
+    outside = float((faces[:, :3] @ points.T + faces[:, 3:]).max(initial=0.0))
+    assert outside == pytest.approx(depth, abs=8 * count * EPS)
+    if count <= 32:
+        assert len(corners) == count
+    else:
+        assert 32 <= len(corners) <= MOST_VERTICES
+        assert depth <= share * np.ptp(points, axis=0).max() or len(corners) == MOST_VERTICES or share == 0.0
+
+
+@pytest.mark.parametrize("other", ["plane = {}", "sphere = 1.0"])
+def test_a_mesh_with_many_faces_meets_planes_alone(other, tmp_path):
+    angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    ends = [np.stack([np.cos(angle), np.sin(angle), 0.0 * angle + z], axis=1) for z in (2.0, 3.0)]
+    prism = f"shape = {{ points = {np.concatenate(ends).tolist()} }}"
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        'format = 1\nname = "prism"\n[bodies.b]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.j]\ntype = "free"\n'
+        f'bodies = ["ground", "b"]\nframe1 = {{}}\nframe2 = {{}}\n[surfaces.b]\nbody = "b"\n{prism}\nstiffness = 1e4\n'
+        f'[surfaces.g]\nbody = "ground"\nshape = {{ {other} }}\n',
+        encoding="utf-8",
+    )
+    if "plane" in other:
+        assert len(ephs.load(file).contacts) == 1
+    else:
+        with pytest.raises(
+            ephs.SceneError, match=r"contacts\..*: found b with 258 faces and edges or more, expected at"
+        ):
+            ephs.load(file)
 
 
 @pytest.mark.parametrize("first", ["", 'group = "it"'])

@@ -45,13 +45,13 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
             continue
         acting = t.spring[i] >= 0 or t.friction[i] >= 0 or i in acted[0] or _inert(reduced, i)
         free = np.zeros((6, 0)) if acting else reduced.twists[i] if t.kind[i] != SPRING else np.eye(6)
-        barred[groups[max(one, two)]].append(_across(free))
+        barred[groups[max(one, two)]].append(complement(free))
     for body in acted[1]:
         if link[body] >= 0:
             barred[groups[link[body]]].append(np.eye(6))
     onto, bases, number = SE3.adjoint(found.ground), [], {}
     for group, rows in barred.items():
-        free = _across(np.hstack(rows))
+        free = complement(np.hstack(rows))
         if free.shape[1]:
             number[group] = len(bases)
             bases.append(np.hstack([onto @ free, np.zeros((6, 6 - free.shape[1]))]))
@@ -89,9 +89,10 @@ def _inert(reduced: "Reduced", i: int) -> bool:
     return at < t.driven.size and bool(t.driven[at] or np.any(t.armature[at : at + int(t.dim[i])] > 0.0))
 
 
-def _across(columns: Array) -> Array:
+def complement(columns: Array) -> Array:
     """(6, n) an orthonormal basis of the complement of all columns."""
     if not columns.shape[1]:
         return np.eye(6)
-    left, sizes, _ = np.linalg.svd(columns / max(float(np.linalg.norm(columns, axis=0).max()), TINY))
+    whole = np.hstack([columns / max(float(np.linalg.norm(columns, axis=0).max()), TINY), np.zeros((6, 6))])
+    left, sizes, _ = np.linalg.svd(whole, full_matrices=False)  # there may be thousands of columns
     return np.asarray(left[:, int(np.sum(sizes > ASSEMBLY)) :])
