@@ -189,7 +189,7 @@ class Impacts(ReducedMethod):
                     end, error = self._halved(state, share * h, held, gaps, end, error)
                 return end, share, error
             share *= divided
-            if share <= SLIVER:  # a gap that jumps
+            if share <= SLIVER and not held.size:  # a gap that jumps
                 break
         path = self._touching.paths[int(held[0]) if held.size else int(np.argmin(gaps))]
         raise SolveError(Outcome.DIVERGED, str(path), "an impact, or forces of closed contacts")
