@@ -12,12 +12,14 @@ import numpy as np
 from ephs.show.lines import lines_of
 from ephs.show.motion import Array, best_side, point_of, rotate
 from ephs.show.palette import GREY, INK, PAPER
-from ephs.show.solids import Solid, held_at, solids_of
+from ephs.show.solids import Solid, coarse, held_at, solids_of
 from ephs.show.symbols import MUTED, ink
 
 GROUND = "ground"
 ROUND = 28
 """Corners of a circle."""
+DOTS = 200
+"""Dots across a schematic, which fine meshes are drawn with."""
 _LIGHT = np.array([0.35, 0.5, 0.8])  # to the right, up, towards the eye
 _SMOOTH = math.cos(math.radians(25.0))
 _STILL = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -109,7 +111,8 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None, extent
     order = sorted(solids, key=lambda name: float((corners[name] @ view[:, 2]).mean()))
     for name in order:  # the far bodies first
         solid, tone = solids[name], MUTED if solids[name].kind == "stand-in" else ink(list(solids).index(name))
-        faces, colours, edges = _surface(solid, corners[name] @ view, 0.4 + 0.6 * np.array(tone) / 255.0)
+        fine = coarse(solid, size / DOTS)
+        faces, colours, edges = _surface(fine, corners[name] @ view, 0.4 + 0.6 * np.array(tone) / 255.0)
         for point in held_at(name, joints.values(), springs.values()):
             if stick := solid.stick(point):
                 across = (poses[name][4:] + rotate(poses[name][:4], np.array(stick))) @ view

@@ -17,6 +17,8 @@ from ephs.show.motion import Array, equivalent_box, rotate
 
 MOST_MB = 100
 """Largest mesh that is drawn."""
+FINE = 2000
+"""Faces from which on a schematic takes corners together that are one dot on it."""
 SIDES = 28
 """Sides of a round solid."""
 
@@ -63,6 +65,18 @@ class Solid:
     def triangles(self) -> NDArray[np.int64]:
         """(k, 3) corners."""
         return np.array([(f[0], f[i], f[i + 1]) for f in self.faces for i in range(1, len(f) - 1)]).reshape(-1, 3)
+
+
+def coarse(solid: Solid, cell: float) -> Solid:
+    """A solid with many faces, with all corners within a cell of a grid, m, at one of them; others as they are."""
+    if len(solid.faces) <= FINE:
+        return solid
+    cells = np.floor(solid.vertices / cell).astype(np.int64)
+    _, first, which = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    faces = first[which.reshape(-1)][solid.triangles]
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    turned = np.arange(3) + faces.argmin(axis=1)[:, None]
+    return replace(solid, faces=tuple(np.unique(np.take_along_axis(faces, turned % 3, axis=1), axis=0)))
 
 
 def box(sides: Array) -> tuple[Array, tuple[NDArray[np.int64], ...]]:

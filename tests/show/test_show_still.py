@@ -5,11 +5,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
 
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.show.lines import lines_of
 from ephs.show.sketch import sketch
+from ephs.show.solids import Solid, coarse
 from ephs.show.stage import stage_of
 from ephs.show.still import HIGHEST, WIDTH, still_svg
 
@@ -72,3 +76,17 @@ def test_tendons_are_drawn_straight_from_point_to_point(tmp_path):
         ("ground", "a", False), ("a", "a", False), ("a", "ground", False)
     ]  # fmt: skip
     assert lines["t-2"].at1.tolist() == [0.0, 0.1, 0.0]
+
+
+@given(count=st.integers(1500, 3000), way=st.integers(0, 2**32 - 1))
+def test_a_fine_mesh_is_drawn_with_corners_of_its_own_within_a_dot(count, way):
+    points = np.random.default_rng(way).normal(size=(count, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    fine = Solid(points, tuple(np.asarray(face) for face in ConvexHull(points).simplices), "mesh")
+    cell = 0.2
+    found = coarse(fine, cell)
+    drawn = np.unique(np.concatenate(found.faces))
+    assert found.vertices is fine.vertices and len(found.faces) < len(fine.faces)
+    assert all(len(set(face)) == 3 for face in found.faces)
+    gaps = np.linalg.norm(points[:, None] - points[None, drawn], axis=2).min(axis=1)
+    assert gaps.max() <= np.sqrt(3.0) * cell

@@ -17,7 +17,7 @@ def note_unknown(element: Element, known: Known, draft: Draft, kind: str, name: 
 
 def _unknown(element: Element, known: Known, path: str) -> Iterator[str]:
     for key, value in element.items():
-        if _differs(value, known.get(path + key, (value + "?",))):
+        if path + key not in known or _differs(value, known[path + key]):
             yield path + key
     for child in element:
         here = f"{path}{child.tag.rpartition('}')[2]}"  # without its namespace
