@@ -33,6 +33,13 @@ class Lagging(Protocol):
     onsager: dict[int, int]
     memory: dict[str, Any]
 
+    def stages(
+        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,
+        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
+    ) -> Array:  # fmt: skip
+        """The rates k at the stages of a step, and y at its end; see `Equations.stages`."""
+        ...
+
 
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
@@ -159,7 +166,7 @@ class March:
         a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
         if lagged is not None:
-            self.march = eq.engine.lagged(lagged.onsager, *given, lagged.memory, 0)
+            self.march = eq.engine.lagged("march", lagged.onsager, *given, lagged.memory, 0)
         elif kept is not None:
             self.march = eq.engine.implicit(*given, kept.memory, 0)
         else:

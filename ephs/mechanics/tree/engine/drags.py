@@ -1,4 +1,4 @@
-"""Resistances of a tree's losses.
+"""Resistances of a mechanism's losses.
 
 A loss pulls with −μ u on the relative twist u of two links, or on a joint's rates; so D = Σ Jᵀ μ J with the rows J of
 u on the rates. All twists are about one point, the place of the first link, and along the ground's axes.
@@ -11,7 +11,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist
+from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, constrain, resist
 from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
@@ -66,6 +66,11 @@ class Drags(Lagged):
         (n, n): M, then the factor of M + w D; D: lower triangles, see `ephs.semantics.linear.skyline`.
     part, sign
         (n,): memory.
+    led
+        Rates of joints with prescribed motions.
+    held, bent, among, pulled
+        (constraints, n), (constraints, n), (constraints, constraints), (constraints,): rows J that rates obey, the
+        prescribed ones first; J (M + w D)⁻¹; the factor of J (M + w D)⁻¹ Jᵀ; multipliers.
     """
 
     scheme: Matrix
@@ -92,6 +97,11 @@ class Drags(Lagged):
     drag: Matrix
     part: Vector
     sign: Vector
+    led: Integers
+    held: Matrix
+    bent: Matrix
+    among: Matrix
+    pulled: Vector
 
     # ---- what acts -------------------------------------------------------------------------------------------------
 
@@ -102,6 +112,8 @@ class Drags(Lagged):
 
         def place() -> None:
             on.reach(motion.tables.own[0].axes, *motion.swept, q, self.column)
+            if motion.looped:
+                constrain(on, self, motion, q)
 
         on.when(on.both(on.same(status, 0), self.counts[EDGES] > 0), place)
         return status, component
@@ -115,6 +127,10 @@ class Drags(Lagged):
     def resist(self, on: Evaluator, motion: Motion, y: Vector, weight: Real, fresh: Truth, out: Vector) -> Integer:
         assert isinstance(motion, Mechanism)
         return resist(on, self, motion, y, weight, on.select(fresh, 1, 0), out)
+
+    def advance(self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector) -> None:
+        assert isinstance(motion, Mechanism)
+        motion.advance(on, base, y, q)
 
 
 @staged
@@ -202,16 +218,23 @@ def chains(parts: Sequence[Part]) -> dict[str, Any]:
     return {"order": np.array(order), "above": above, "owner": owner, "tip": tip, "reach": reach}
 
 
-def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Any]:
-    """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
+def memory_of(
+    tables: Mapping[str, Any], parts: Sequence[Part], size: int, rows: int, led: Sequence[int]
+) -> dict[str, Any]:
+    """Memory of the losses of a mechanism whose links are given, but for a scheme.
+
+    ``size``: of its y; ``rows``: how many close loops; ``led``: rates with prescribed motions.
+    """
     whole, losses = chains(parts), len(frictions(tables))
-    n = whole["reach"].size
+    n, held = whole["reach"].size, len(led) + rows
+    whole["led"] = np.array(led)
     whole |= {"first": whole["reach"], "counts": np.zeros(2), "chain": np.zeros(n)}
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
         **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
-        "body": (len(parts), 10), "seen": (size,),
+        "body": (len(parts), 10), "seen": (size,), "held": (held, n), "bent": (held, n), "among": (held, held),
+        "pulled": (held,),
     }  # fmt: skip
     return {name: array.astype(np.int64) for name, array in whole.items()} | {
         name: np.zeros(shape) for name, shape in shapes.items()
@@ -223,5 +246,6 @@ DRAGS: Final[dict[str, Any]] = {
     "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(),
     "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(), "resistance": matrix(36),
     "row": matrix(36), "joined": matrix(36), "column": matrix(6), "moved": matrix(6), "body": matrix(10),
-    "mass": matrix(), "drag": matrix(), "part": vector(), "sign": vector(),
+    "mass": matrix(), "drag": matrix(), "part": vector(), "sign": vector(), "led": indices(), "held": matrix(),
+    "bent": matrix(), "among": matrix(), "pulled": vector(),
 }  # fmt: skip

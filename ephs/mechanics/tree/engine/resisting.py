@@ -1,4 +1,4 @@
-"""The linear system (M + w D) of a tree's losses for the accelerations, and the heat that they make.
+"""The linear system (M + w D) of losses for the accelerations, where these obey constraints J, and the heat made.
 
 The mass matrix is that of composite bodies, see Featherstone, *Rigid Body Dynamics Algorithms*, 2008, 6.2.
 """
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_TREE
+from ephs.mechanics.tree.sweeps.closing import TARGET
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.records import Link
-from ephs.semantics.linear.dense import cholesky, copy
+from ephs.semantics.linear.dense import backward, cholesky, clear, copy, dot, forward, subtract
 from ephs.semantics.linear.skyline import skyline_solve, skyline_times
 from ephs.semantics.spaces import vectors
 from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
@@ -28,7 +29,9 @@ EDGES, PAIRS = 0, 1
 def resist(
     on: Evaluator, drags: "Drags", motion: Mechanism, y: Vector, weight: Real, fresh: Integer, out: Vector
 ) -> Integer:
-    """Complete ẏ, where losses act on rates z that are reached: M ṙ = forces − D z, z = known + w ṙ; return a status.
+    """Complete ẏ, where losses act on rates z that are reached; return a status.
+
+    M ṙ = forces − D z + Jᵀ λ with z = known + w ṙ, where ṙ without losses is known and obeys J.
 
     ``fresh``: 1 where M + w D is factorised.
     """
@@ -44,9 +47,14 @@ def resist(
             _masses(on, drags, motion)
             _losses(on, drags, motion)
             status.value = _factorise(on, drags, weight)
+            if motion.looped:
+                on.when(on.same(status.value, 0), among)
 
         on.when(on.same(fresh, 1), lambda: None, assemble)
         on.when(on.same(status.value, 0), change)
+
+    def among() -> None:
+        status.value = _among(on, drags)
 
     def change() -> None:
         def move(i: Integer) -> None:
@@ -54,6 +62,8 @@ def resist(
 
         skyline_times(on, drags.drag, drags.first, z, part)
         skyline_solve(on, drags.mass, drags.first, part)
+        if motion.looped:
+            _pull(on, drags, motion, out)
         on.loop(n, move)
         _heat(on, drags, motion, out)
 
@@ -118,6 +128,72 @@ def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
     # Masses alone are definite, as the sweeps have found: what fails are numbers out of range.
     found = cholesky(on, drags.mass, drags.mass, drags.first)
     return on.select(found > 0, int(Status.UNSETTLED), 0)
+
+
+# ---- constraints -----------------------------------------------------------------------------------------------------
+
+
+@staged
+def constrain(on: Evaluator, drags: "Drags", motion: Mechanism, q: Vector) -> None:
+    """Write the rows J at q."""
+    led, unit, targets = drags.led.size, drags.sign, motion.work.value
+
+    def lead(k: Integer) -> None:
+        clear(on, drags.held.row(k))
+        drags.held[k, drags.led[k]] = 1.0
+
+    def column(j: Integer) -> None:
+        def entry(a: Integer) -> None:
+            drags.held[led + a, j] = -targets[a, TARGET]
+
+        unit[j] = 1.0
+        motion.stray(on, q, unit)
+        unit[j] = 0.0
+        on.loop(targets.rows, entry)
+
+    clear(on, unit)
+    on.loop(led, lead)
+    on.loop(unit.size, column)
+
+
+def _among(on: Evaluator, drags: "Drags") -> Integer:
+    """Factorise J (M + w D)⁻¹ Jᵀ; return a status."""
+
+    def row(a: Integer) -> None:
+        bent = drags.bent.row(a)
+
+        def entry(b: Integer) -> None:
+            drags.among[a, b] = dot(on, drags.held.row(b), bent)
+
+        copy(on, drags.held.row(a), bent)
+        skyline_solve(on, drags.mass, drags.first, bent)
+        on.loop(a + 1, entry)
+
+    on.loop(drags.held.rows, row)
+    return on.select(cholesky(on, drags.among, drags.among) > 0, int(Status.UNSETTLED), 0)
+
+
+def _pull(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None:
+    """Take out of accelerations what is across the constraints; add the power of prescribed motions by that."""
+    pulled, part, power = drags.pulled, drags.part, motion.summed + (motion.tables.node.size + 1)
+
+    def look(a: Integer) -> None:
+        pulled[a] = dot(on, drags.held.row(a), part)
+
+    def hold(a: Integer) -> None:
+        subtract(on, pulled[a], drags.bent.row(a), part)
+
+    def lead(k: Integer) -> None:
+        out[power] = out[power] + pulled[k] * drags.reached[drags.led[k]]
+
+    on.loop(pulled.size, look)
+    forward(on, drags.among, pulled)
+    backward(on, drags.among, pulled)
+    on.loop(pulled.size, hold)
+    on.loop(drags.led.size, lead)
+
+
+# ---- masses and losses -----------------------------------------------------------------------------------------------
 
 
 @staged
