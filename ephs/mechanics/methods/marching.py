@@ -31,7 +31,11 @@ class Lagging(Protocol):
     """Memory of semi-implicit steps, see `ephs.mechanics.methods.semi.Semi`."""
 
     onsager: dict[int, int]
-    memory: dict[str, Any]
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Memory of the stages."""
+        ...
 
     def stages(
         self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,

@@ -11,7 +11,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, constrain, resist
+from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, constrain, push, resist
 from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
@@ -66,6 +66,8 @@ class Drags(Lagged):
         (n, n): M, then the factor of M + w D; D: lower triangles, see `ephs.semantics.linear.skyline`.
     part, sign
         (n,): memory.
+    given
+        (n,): given forces and wrenches as forces on the rates.
     led
         Rates of joints with prescribed motions.
     held, bent, among, pulled
@@ -97,6 +99,7 @@ class Drags(Lagged):
     drag: Matrix
     part: Vector
     sign: Vector
+    given: Vector
     led: Integers
     held: Matrix
     bent: Matrix
@@ -112,6 +115,7 @@ class Drags(Lagged):
 
         def place() -> None:
             on.reach(motion.tables.own[0].axes, *motion.swept, q, self.column)
+            push(on, self, motion)
             if motion.looped:
                 constrain(on, self, motion, q)
 
@@ -232,7 +236,7 @@ def memory_of(
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
-        **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
+        **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached", "given"), (n,)),
         "body": (len(parts), 10), "seen": (size,), "held": (held, n), "bent": (held, n), "among": (held, held),
         "pulled": (held,),
     }  # fmt: skip
@@ -246,6 +250,6 @@ DRAGS: Final[dict[str, Any]] = {
     "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(), "first": indices(),
     "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(), "resistance": matrix(36),
     "row": matrix(36), "joined": matrix(36), "column": matrix(6), "moved": matrix(6), "body": matrix(10),
-    "mass": matrix(), "drag": matrix(), "part": vector(), "sign": vector(), "led": indices(), "held": matrix(),
-    "bent": matrix(), "among": matrix(), "pulled": vector(),
+    "mass": matrix(), "drag": matrix(), "part": vector(), "sign": vector(), "given": vector(), "led": indices(),
+    "held": matrix(), "bent": matrix(), "among": matrix(), "pulled": vector(),
 }  # fmt: skip

@@ -13,7 +13,7 @@ from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.linear.dense import backward, cholesky, clear, copy, dot, forward, subtract
 from ephs.semantics.linear.skyline import skyline_solve, skyline_times
-from ephs.semantics.spaces import vectors
+from ephs.semantics.spaces import se3, vectors
 from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Vector, staged
 from ephs.solve.march.records import Status
@@ -37,6 +37,7 @@ def resist(
     """
     n, status, z, part = motion.freedoms, on.counter(0), drags.reached, drags.part
     rate, losses = out.part(motion.increments, n), drags.counts[EDGES] > 0
+    power = motion.summed + (motion.tables.node.size + 1)
 
     def reach(i: Integer) -> None:
         z[i] = z[i] + weight * rate[i]
@@ -65,7 +66,12 @@ def resist(
         if motion.looped:
             _pull(on, drags, motion, out)
         on.loop(n, move)
+        on.loop(n, work)
         _heat(on, drags, motion, out)
+
+    def work(i: Integer) -> None:
+        # At the rates of Y, which losses do not bound, it would miss the energies of what z moves.
+        out[power] = out[power] + drags.given[i] * (z[i] - y[motion.increments + i])
 
     on.loop(n, reach)
     on.when(losses, solve)
@@ -128,6 +134,31 @@ def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
     # Masses alone are definite, as the sweeps have found: what fails are numbers out of range.
     found = cholesky(on, drags.mass, drags.mass, drags.first)
     return on.select(found > 0, int(Status.UNSETTLED), 0)
+
+
+@staged
+def push(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
+    """Write the given forces on the tree's joints and wrenches on bodies as forces on the rates."""
+    tables = motion.tables
+
+    def body(b: Integer) -> None:
+        one = tables.body[b]
+
+        def pushed() -> None:
+            place = place_of(on, motion.work.place, one.link)
+            here = se3.wrench_outward(one.turn, one.at, [tables.wrench[b, k] for k in range(6)])
+            there = se3.wrench_outward(place.turn, place.at, here)
+
+            def grow(j: Integer) -> None:
+                along = vectors.dot([drags.column[j, k] for k in range(6)], there)
+                drags.given[j] = drags.given[j] + along
+
+            _walk(on, drags, one.link, grow)
+
+        on.when(one.link >= 0, pushed)
+
+    copy(on, tables.drive.part(0, drags.given.size), drags.given)
+    on.loop(tables.body.size, body)
 
 
 # ---- constraints -----------------------------------------------------------------------------------------------------
