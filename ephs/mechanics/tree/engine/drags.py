@@ -116,8 +116,7 @@ class Drags(Lagged):
         def place() -> None:
             on.reach(motion.tables.own[0].axes, *motion.swept, q, self.column)
             push(on, self, motion)
-            if motion.looped:
-                constrain(on, self, motion, q)
+            on.when(self.held.rows > 0, lambda: constrain(on, self, motion, q))
 
         on.when(on.both(on.same(status, 0), self.counts[EDGES] > 0), place)
         return status, component

@@ -36,7 +36,7 @@ def resist(
     ``fresh``: 1 where M + w D is factorised.
     """
     n, status, z, part = motion.freedoms, on.counter(0), drags.reached, drags.part
-    rate, losses = out.part(motion.increments, n), drags.counts[EDGES] > 0
+    rate, losses, held = out.part(motion.increments, n), drags.counts[EDGES] > 0, drags.held.rows > 0
     power = motion.summed + (motion.tables.node.size + 1)
 
     def reach(i: Integer) -> None:
@@ -48,8 +48,7 @@ def resist(
             _masses(on, drags, motion)
             _losses(on, drags, motion)
             status.value = _factorise(on, drags, weight)
-            if motion.looped:
-                on.when(on.same(status.value, 0), among)
+            on.when(on.both(held, on.same(status.value, 0)), among)
 
         on.when(on.same(fresh, 1), lambda: None, assemble)
         on.when(on.same(status.value, 0), change)
@@ -63,8 +62,7 @@ def resist(
 
         skyline_times(on, drags.drag, drags.first, z, part)
         skyline_solve(on, drags.mass, drags.first, part)
-        if motion.looped:
-            _pull(on, drags, motion, out)
+        on.when(held, lambda: _pull(on, drags, motion, out))
         on.loop(n, move)
         on.loop(n, work)
         _heat(on, drags, motion, out)
@@ -184,9 +182,11 @@ def constrain(on: Evaluator, drags: "Drags", motion: Mechanism, q: Vector) -> No
 
     clear(on, unit)
     on.loop(led, lead)
-    on.loop(unit.size, column)
+    if motion.looped:
+        on.loop(unit.size, column)
 
 
+@staged
 def _among(on: Evaluator, drags: "Drags") -> Integer:
     """Factorise J (M + w D)⁻¹ Jᵀ; return a status."""
 
@@ -204,6 +204,7 @@ def _among(on: Evaluator, drags: "Drags") -> Integer:
     return on.select(cholesky(on, drags.among, drags.among) > 0, int(Status.UNSETTLED), 0)
 
 
+@staged
 def _pull(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None:
     """Take out of accelerations what is across the constraints; add the power of prescribed motions by that."""
     pulled, part, power = drags.pulled, drags.part, motion.summed + (motion.tables.node.size + 1)
