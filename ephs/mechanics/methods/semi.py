@@ -88,8 +88,8 @@ class Semi:
         eq, engine = self._equations, self._equations.engine
         if self._made is None or self._made[0] is not engine:
             rows, parts = len(engine.array("value")), links_of(eq.reduced).parts
-            memory = memory_of(engine.tables, parts, engine.sizes[1], rows, eq.driven.tolist())
-            memory |= {"scheme": SCHEME, "again": AGAIN}
+            sizes = engine.tables, parts, engine.sizes[1], rows, eq.driven.tolist()
+            memory = memory_of(*sizes, pushed=eq.given.pushed) | {"scheme": SCHEME, "again": AGAIN}
             given = ARRAYS, self._steering, self._base, self._start, self._k, memory, self._y, self._q
             self._made = engine, memory, engine.lagged("stage", self.onsager, *given, 0, 0.0)
         return self._made

@@ -67,7 +67,7 @@ class Drags(Lagged):
     part, sign
         (n,): memory.
     given
-        (n,): given forces and wrenches as forces on the rates.
+        (n,): given forces and wrenches as forces on the rates; (0,) where there are none.
     led
         Rates of joints with prescribed motions.
     held, bent, among, pulled
@@ -115,10 +115,11 @@ class Drags(Lagged):
 
         def place() -> None:
             on.reach(motion.tables.own[0].axes, *motion.swept, q, self.column)
-            push(on, self, motion)
-            on.when(self.held.rows > 0, lambda: constrain(on, self, motion, q))
+            on.when(self.given.size > 0, lambda: push(on, self, motion))
+            on.when(on.both(lossy, self.held.rows > 0), lambda: constrain(on, self, motion, q))
 
-        on.when(on.both(on.same(status, 0), self.counts[EDGES] > 0), place)
+        lossy = self.counts[EDGES] > 0
+        on.when(on.both(on.same(status, 0), on.either(lossy, self.given.size > 0)), place)
         return status, component
 
     def note(self, on: Evaluator, tables: Tables, work: Work, edge: Acting, number: Integer) -> None:
@@ -222,11 +223,12 @@ def chains(parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def memory_of(
-    tables: Mapping[str, Any], parts: Sequence[Part], size: int, rows: int, led: Sequence[int]
+    tables: Mapping[str, Any], parts: Sequence[Part], size: int, rows: int, led: Sequence[int], *, pushed: bool
 ) -> dict[str, Any]:
     """Memory of the losses of a mechanism whose links are given, but for a scheme.
 
-    ``size``: of its y; ``rows``: how many close loops; ``led``: rates with prescribed motions.
+    ``size``: of its y; ``rows``: how many close loops; ``led``: rates with prescribed motions; ``pushed``: whether
+    forces on joints or wrenches on bodies may be given.
     """
     whole, losses = chains(parts), len(frictions(tables))
     n, held = whole["reach"].size, len(led) + rows
@@ -235,9 +237,9 @@ def memory_of(
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)), **dict.fromkeys(("column", "moved"), (n, 6)),
-        **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached", "given"), (n,)),
+        **dict.fromkeys(("mass", "drag"), (n, n)), **dict.fromkeys(("part", "sign", "reached"), (n,)),
         "body": (len(parts), 10), "seen": (size,), "held": (held, n), "bent": (held, n), "among": (held, held),
-        "pulled": (held,),
+        "pulled": (held,), "given": (n * pushed,),
     }  # fmt: skip
     return {name: array.astype(np.int64) for name, array in whole.items()} | {
         name: np.zeros(shape) for name, shape in shapes.items()

@@ -64,15 +64,15 @@ def resist(
         skyline_solve(on, drags.mass, drags.first, part)
         on.when(held, lambda: _pull(on, drags, motion, out))
         on.loop(n, move)
-        on.loop(n, work)
         _heat(on, drags, motion, out)
 
     def work(i: Integer) -> None:
-        # At the rates of Y, which losses do not bound, it would miss the energies of what z moves.
+        # At the rates of Y it would miss the energies of what z moves.
         out[power] = out[power] + drags.given[i] * (z[i] - y[motion.increments + i])
 
     on.loop(n, reach)
     on.when(losses, solve)
+    on.loop(drags.given.size, work)
     on.when(on.same(status.value, 0), lambda: motion.flow(on, y, z, out))
     return status.value
 
