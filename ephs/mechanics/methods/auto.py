@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, final
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.marching import Rival
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.semi import hindrance, narrow, semi_implicit
+from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -69,7 +69,7 @@ class Auto(ReducedMethod):
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
         if name == "rk54" and _touches(equations):
-            if control.rtol.value > COARSE and narrow(equations) and hindrance(equations) is None:
+            if control.rtol.value > COARSE and cheap(equations):
                 self._semi = semi_implicit(equations, control)
                 self.name = self.counts["chosen"] = self._semi.name
                 self.exponent, self.share = self._semi.exponent, self._semi.share

@@ -4,7 +4,7 @@ SSP3(4,3,3) of Pareschi and Russo, J. Sci. Comput. 25 (2005) 129-155, of order 3
 stability, its implicit one is L-stable. No weight is negative, so that no step loses entropy, whatever its length.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, final
 
 import numpy as np
@@ -21,7 +21,6 @@ from ephs.semantics.derive.irreversible import Irreversible
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.control import Control
-from ephs.solve.errors import OptionError
 from ephs.solve.march import Control as Steering
 from ephs.solve.march import Status
 
@@ -71,8 +70,8 @@ class Semi:
     """
 
     def __init__(self, equations: Equations) -> None:
-        self._equations, found = equations, _relations(equations)
-        self.onsager = {number: onsager(one).compiled()["value"].address for number, one in found.items() if one}
+        self._equations = equations
+        self.onsager = {number: onsager(one).compiled()["value"].address for number, one in _relations(equations)}
         self._made: tuple[Engine, dict[str, Any], Bound] | None = None
         coordinates, size = equations.engine.sizes
         self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), Steering.table(1)
@@ -126,39 +125,20 @@ class Semi:
 
 
 def semi_implicit(equations: Equations, control: Control) -> Explicit:
-    """The method on one mechanism.
-
-    Raises
-    ------
-    OptionError
-        Its steps do not serve the mechanism.
-    """
-    if (obstacle := hindrance(equations)) is not None:
-        raise OptionError("method", NAME, f"radau or rk54: {obstacle}")
+    """The method on one mechanism."""
     return Explicit(equations, control, TABLEAU, lagged=Semi(equations))
 
 
-def hindrance(equations: Equations) -> str | None:
-    """Reason why semi-implicit steps do not serve a mechanism; None: they do."""
-    if (hard := strikes(equations.problem.descriptor.components)) is not None:
-        return f"{hard} acts by impulses"
-    number = next((number for number, one in _relations(equations).items() if one is None), None)
-    return None if number is None else f"the relation of {equations.model.path_of(number)} is not in machine code"
-
-
-def narrow(equations: Equations) -> bool:
-    """Whether the masses of a tree are factorised in little time."""
+def cheap(equations: Equations) -> bool:
+    """Whether the masses of a tree are factorised in little time, and no contact is hard."""
     reach = chains(links_of(equations.reduced).parts)["reach"]
-    return reach.size <= FREEDOMS and bool(np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size)
+    narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
+    return bool(narrow) and strikes(equations.problem.descriptor.components) is None
 
 
-def _relations(equations: Equations) -> dict[int, Irreversible | None]:
-    """Relations of the components of friction, by their numbers; None where one is not in machine code."""
-    kernels = {
-        number: equations.problem.descriptor.components[number].primitive.kernel
-        for number in frictions(equations.engine.tables)
-    }
-    return {
-        number: kernel.relation if kernel is not None and isinstance(kernel.relation, Irreversible) else None
-        for number, kernel in kernels.items()
-    }
+def _relations(equations: Equations) -> Iterator[tuple[int, Irreversible]]:
+    """Numbers and relations of the components of friction."""
+    for number in frictions(equations.engine.tables):
+        kernel = equations.problem.descriptor.components[number].primitive.kernel
+        assert kernel is not None and isinstance(kernel.relation, Irreversible)
+        yield number, kernel.relation
