@@ -6,12 +6,12 @@ Steps of a mechanism on which nothing but given constants acts are taken many in
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from ephs.mechanics.methods import tableaux as t
-from ephs.mechanics.methods.marching import Lagging, March
+from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
@@ -21,6 +21,9 @@ from ephs.solve.march import STEPS
 from ephs.solve.march.account import WHOLE, WORTH
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
+
+if TYPE_CHECKING:
+    from ephs.mechanics.methods.semi import Semi
 
 Solve = Callable[..., Array]
 """Solver of the stages of a step, with the arguments of `Equations.stages`."""
@@ -89,7 +92,7 @@ class Explicit(ReducedMethod):
 
     def __init__(
         self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None,
-        lagged: Lagging | None = None,
+        lagged: "Semi | None" = None,
     ) -> None:  # fmt: skip
         super().__init__(equations, control)
         self.solve: Solve = solve or (equations.stages if lagged is None else lagged.stages)

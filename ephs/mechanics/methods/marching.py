@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, final
+from typing import TYPE_CHECKING, Any, Protocol, final
 
 import numpy as np
 
@@ -20,29 +20,14 @@ from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Counts, Span
 
+if TYPE_CHECKING:
+    from ephs.mechanics.methods.semi import Semi
+
 ROWS = 1024
 """Capacity of the buffer of rows."""
 WINDOW, LATEST = 10, 30
 """Steps of implicit legs, rejected ones included, that are weighed against those of a rival: at a new matrix, and
 after so many without one."""
-
-
-class Lagging(Protocol):
-    """Memory of semi-implicit steps, see `ephs.mechanics.methods.semi.Semi`."""
-
-    onsager: dict[int, int]
-
-    @property
-    def memory(self) -> dict[str, Any]:
-        """Memory of the stages."""
-        ...
-
-    def stages(
-        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,
-        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
-    ) -> Array:  # fmt: skip
-        """The rates k at the stages of a step, and y at its end; see `Equations.stages`."""
-        ...
 
 
 Leave = Callable[[float, float, str], None]
@@ -139,7 +124,7 @@ class March:
         kept: Kept | None = None,
         rival: Rival | None = None,
         most: int | None = None,
-        lagged: Lagging | None = None,
+        lagged: "Semi | None" = None,
     ) -> None:
         eq, start = method.equations, method.equations.accounts.opened(span.state)
         self.own, eq.accounts.kept = eq.accounts.own, True

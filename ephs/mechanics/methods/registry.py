@@ -309,7 +309,15 @@ for _method in (
         for order in (4, 6, 8)
     ),
     Method(
-        "semi", 3, True, True, False, True, "semi-implicit, losses implicit", on_joints(_corrected(_semi)), ("keep",)
+        "semi",
+        3,
+        True,
+        True,
+        False,
+        True,
+        "losses implicit, all else explicit",
+        on_joints(_corrected(_semi)),
+        ("keep",),
     ),
     Method("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
 ):

@@ -1,4 +1,4 @@
-"""Semi-implicit steps of trees: losses are taken implicitly, with resistances of explicit stages; all else explicitly.
+"""Semi-implicit steps: losses are taken implicitly, with resistances of explicit stages; all else explicitly.
 
 SSP3(4,3,3) of Pareschi and Russo, J. Sci. Comput. 25 (2005) 129-155, of order 3: its explicit part preserves strong
 stability, its implicit one is L-stable. No weight is negative, so that no step loses entropy, whatever its length.
@@ -140,5 +140,6 @@ def _relations(equations: Equations) -> Iterator[tuple[int, Irreversible]]:
     """Numbers and relations of the components of friction."""
     for number in frictions(equations.engine.tables):
         kernel = equations.problem.descriptor.components[number].primitive.kernel
-        assert kernel is not None and isinstance(kernel.relation, Irreversible)
+        assert kernel is not None
+        assert isinstance(kernel.relation, Irreversible)
         yield number, kernel.relation

@@ -10,15 +10,16 @@ from typing import Any, Final, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.held import constrain
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, constrain, push, resist
+from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist, walk
 from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.pack import Part
-from ephs.semantics.linear.dense import clear
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces import se3
-from ephs.semantics.spaces.vectors import add, apply, product, sub
+from ephs.semantics.spaces.vectors import add, apply, dot, product, sub
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
@@ -115,7 +116,7 @@ class Drags(Lagged):
 
         def place() -> None:
             on.reach(motion.tables.own[0].axes, *motion.swept, q, self.column)
-            on.when(self.given.size > 0, lambda: push(on, self, motion))
+            on.when(self.given.size > 0, lambda: _push(on, self, motion))
             on.when(on.both(lossy, self.held.rows > 0), lambda: constrain(on, self, motion, q))
 
         lossy = self.counts[EDGES] > 0
@@ -190,6 +191,31 @@ def _join(on: Evaluator, drags: Drags, work: Work, edge: Acting, c: Integer) -> 
                 joined[6 * k + m] = joined[6 * k + m] + drags.row[c, 6 * i + k] * total.value
 
     on.loop(d, grow)
+
+
+@staged
+def _push(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
+    """Write the given forces on the tree's joints and wrenches on bodies as forces on the rates."""
+    tables = motion.tables
+
+    def body(b: Integer) -> None:
+        one = tables.body[b]
+
+        def pushed() -> None:
+            place = place_of(on, motion.work.place, one.link)
+            here = se3.wrench_outward(one.turn, one.at, [tables.wrench[b, k] for k in range(6)])
+            there = se3.wrench_outward(place.turn, place.at, here)
+
+            def grow(j: Integer) -> None:
+                along = dot([drags.column[j, k] for k in range(6)], there)
+                drags.given[j] = drags.given[j] + along
+
+            walk(on, drags, one.link, grow)
+
+        on.when(one.link >= 0, pushed)
+
+    copy(on, tables.drive.part(0, drags.given.size), drags.given)
+    on.loop(tables.body.size, body)
 
 
 def frictions(tables: Mapping[str, Any]) -> list[int]:

@@ -6,14 +6,14 @@ The mass matrix is that of composite bodies, see Featherstone, *Rigid Body Dynam
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from ephs.mechanics.tree.engine.held import among, pull
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_TREE
-from ephs.mechanics.tree.sweeps.closing import TARGET
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.records import Link
-from ephs.semantics.linear.dense import backward, cholesky, clear, copy, dot, forward, subtract
+from ephs.semantics.linear.dense import cholesky, copy
 from ephs.semantics.linear.skyline import skyline_solve, skyline_times
-from ephs.semantics.spaces import se3, vectors
+from ephs.semantics.spaces import vectors
 from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Vector, staged
 from ephs.solve.march.records import Status
@@ -48,13 +48,13 @@ def resist(
             _masses(on, drags, motion)
             _losses(on, drags, motion)
             status.value = _factorise(on, drags, weight)
-            on.when(on.both(held, on.same(status.value, 0)), among)
+            on.when(on.both(held, on.same(status.value, 0)), factorise)
 
         on.when(on.same(fresh, 1), lambda: None, assemble)
         on.when(on.same(status.value, 0), change)
 
-    def among() -> None:
-        status.value = _among(on, drags)
+    def factorise() -> None:
+        status.value = among(on, drags)
 
     def change() -> None:
         def move(i: Integer) -> None:
@@ -62,7 +62,7 @@ def resist(
 
         skyline_times(on, drags.drag, drags.first, z, part)
         skyline_solve(on, drags.mass, drags.first, part)
-        on.when(held, lambda: _pull(on, drags, motion, out))
+        on.when(held, lambda: pull(on, drags, motion, out))
         on.loop(n, move)
         _heat(on, drags, motion, out)
 
@@ -77,7 +77,7 @@ def resist(
     return status.value
 
 
-def _walk(on: Evaluator, drags: "Drags", link: Integer, body: Callable[[Integer], None]) -> None:
+def walk(on: Evaluator, drags: "Drags", link: Integer, body: Callable[[Integer], None]) -> None:
     """Call body(rate) for the rates that move a link, the last one first."""
     at = on.counter(on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)]))
 
@@ -106,7 +106,7 @@ def _begin(on: Evaluator, drags: "Drags") -> None:
 
         for body in (find, lower):
             for link in links:
-                _walk(on, drags, link, body)
+                walk(on, drags, link, body)
 
     def empty(i: Integer) -> None:
         def entry(j: Integer) -> None:
@@ -132,100 +132,6 @@ def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
     # Masses alone are definite, as the sweeps have found: what fails are numbers out of range.
     found = cholesky(on, drags.mass, drags.mass, drags.first)
     return on.select(found > 0, int(Status.UNSETTLED), 0)
-
-
-@staged
-def push(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
-    """Write the given forces on the tree's joints and wrenches on bodies as forces on the rates."""
-    tables = motion.tables
-
-    def body(b: Integer) -> None:
-        one = tables.body[b]
-
-        def pushed() -> None:
-            place = place_of(on, motion.work.place, one.link)
-            here = se3.wrench_outward(one.turn, one.at, [tables.wrench[b, k] for k in range(6)])
-            there = se3.wrench_outward(place.turn, place.at, here)
-
-            def grow(j: Integer) -> None:
-                along = vectors.dot([drags.column[j, k] for k in range(6)], there)
-                drags.given[j] = drags.given[j] + along
-
-            _walk(on, drags, one.link, grow)
-
-        on.when(one.link >= 0, pushed)
-
-    copy(on, tables.drive.part(0, drags.given.size), drags.given)
-    on.loop(tables.body.size, body)
-
-
-# ---- constraints -----------------------------------------------------------------------------------------------------
-
-
-@staged
-def constrain(on: Evaluator, drags: "Drags", motion: Mechanism, q: Vector) -> None:
-    """Write the rows J at q."""
-    led, unit, targets = drags.led.size, drags.sign, motion.work.value
-
-    def lead(k: Integer) -> None:
-        clear(on, drags.held.row(k))
-        drags.held[k, drags.led[k]] = 1.0
-
-    def column(j: Integer) -> None:
-        def entry(a: Integer) -> None:
-            drags.held[led + a, j] = -targets[a, TARGET]
-
-        unit[j] = 1.0
-        motion.stray(on, q, unit)
-        unit[j] = 0.0
-        on.loop(targets.rows, entry)
-
-    clear(on, unit)
-    on.loop(led, lead)
-    if motion.looped:
-        on.loop(unit.size, column)
-
-
-@staged
-def _among(on: Evaluator, drags: "Drags") -> Integer:
-    """Factorise J (M + w D)⁻¹ Jᵀ; return a status."""
-
-    def row(a: Integer) -> None:
-        bent = drags.bent.row(a)
-
-        def entry(b: Integer) -> None:
-            drags.among[a, b] = dot(on, drags.held.row(b), bent)
-
-        copy(on, drags.held.row(a), bent)
-        skyline_solve(on, drags.mass, drags.first, bent)
-        on.loop(a + 1, entry)
-
-    on.loop(drags.held.rows, row)
-    return on.select(cholesky(on, drags.among, drags.among) > 0, int(Status.UNSETTLED), 0)
-
-
-@staged
-def _pull(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None:
-    """Take out of accelerations what is across the constraints; add the power of prescribed motions by that."""
-    pulled, part, power = drags.pulled, drags.part, motion.summed + (motion.tables.node.size + 1)
-
-    def look(a: Integer) -> None:
-        pulled[a] = dot(on, drags.held.row(a), part)
-
-    def hold(a: Integer) -> None:
-        subtract(on, pulled[a], drags.bent.row(a), part)
-
-    def lead(k: Integer) -> None:
-        out[power] = out[power] + pulled[k] * drags.reached[drags.led[k]]
-
-    on.loop(pulled.size, look)
-    forward(on, drags.among, pulled)
-    backward(on, drags.among, pulled)
-    on.loop(pulled.size, hold)
-    on.loop(drags.led.size, lead)
-
-
-# ---- masses and losses -----------------------------------------------------------------------------------------------
 
 
 @staged
@@ -361,8 +267,8 @@ def _losses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
             on.loop(size.value, entry)
 
         for one, other in ((clear_sign, clear_sign), (leave, join), (gather, gather)):
-            _walk(on, drags, links[0], one)
-            _walk(on, drags, links[1], other)
+            walk(on, drags, links[0], one)
+            walk(on, drags, links[1], other)
         on.loop(size.value, row)
 
     on.loop(drags.counts[EDGES], within)

@@ -207,14 +207,9 @@ class Conduction(Record):
 
 
 class Sink(Record):
-    """The entropy, or −1, that takes what a component makes at a place.
+    """The entropy, or −1, that takes what a component makes at a place; ``owner``: its component's first place.
 
-    Attributes
-    ----------
-    owner
-        Its component's first place.
-    rubs
-        1 where all that the component makes becomes energy of a store of heat.
+    ``rubs``: 1 where all that the component makes becomes energy of a store of heat.
     """
 
     maker = integer()
