@@ -109,12 +109,12 @@ class Semi:
 
         self._base[:], self._start[:] = state.q, y0
         for i in range(1, len(scheme["a"])):
-            before, count = self._y.copy(), i < len(c)
-            if not eq.constant and count and not AGAIN[i]:
+            before, anew = self._y.copy(), i < len(c) and not AGAIN[i]
+            if anew and not eq.constant:
                 y = y0 + h * (scheme["a"][i, :i] @ self._k[:i])
                 v, r, heats, _ = np.split(y, np.cumsum([eq.nv, eq.n, eq.ns]))
                 eq.load(state.t + float(c[i]) * h, eq.advance(state.q, v), r, heats)
-            eq.evaluations += count
+            eq.evaluations += anew
             status = int(stage(i, h))
             if status == Status.DEPENDENT:
                 before, y1[:] = evaluated(at, scheme, c, h, y0, k, None, chosen=chosen)
