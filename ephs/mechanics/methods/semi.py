@@ -113,7 +113,7 @@ class Semi:
             if anew and not eq.constant:
                 y = y0 + h * (scheme["a"][i, :i] @ self._k[:i])
                 v, r, heats, _ = np.split(y, np.cumsum([eq.nv, eq.n, eq.ns]))
-                eq.load(state.t + float(c[i]) * h, eq.advance(state.q, v), r, heats)
+                eq.load(state.t + (0.0 if eq.held else float(c[i]) * h), eq.advance(state.q, v), r, heats)
             eq.evaluations += anew
             status = int(stage(i, h))
             if status == Status.DEPENDENT:
