@@ -18,6 +18,7 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, group, real, vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
+from tests.mechanics.plain import uncorrected
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
 IMPLICIT = SCHEME[1:, 1:]
@@ -237,6 +238,20 @@ def test_so_they_do_with_loops_and_prescribed_motions(closed):
     exact = end(method="rk87", rtol=1e-11, atol=1e-12)
     errors = [np.abs(end(method="semi", step=0.1 / count) - exact).max() for count in (20, 40, 80)]
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+
+
+def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
+    scene = ephs.load(SCENES / "four-bar.toml")
+    inputs = {"joints.main": lambda t, state: 4.0 * np.sin(20.0 * t) - 0.1 * state.joints["main"].rate[0]}
+
+    def end(**how):
+        with uncorrected():
+            sol = ephs.simulate(scene, 0.2, inputs=inputs, audit="off", **how)
+        return np.concatenate([*(sol.body(body).velocity[-1] for body in scene.bodies), sol.heat[-1:], sol.work[-1:]])
+
+    exact = end(method="rk87", rtol=1e-11, atol=1e-12)
+    errors = [np.abs(end(method="semi", step=0.2 / count) - exact).max() for count in (20, 40, 80)]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.7)
 
 
 @pytest.mark.parametrize("name", ["four-bar", "hot-brake", "biped"])
