@@ -14,7 +14,7 @@ COARSE, FINE = 1e-4, 100.0
 """Errors count between the first and so many times what the reference is known to."""
 MOST = 20_000
 """Steps of the longest run."""
-START = {2: 1.0, 4: 8.0, 5: 8.0, 8: 16.0}
+START = {2: 1.0, 3: 2.0, 4: 8.0, 5: 8.0, 8: 16.0}
 """Order -> the first step, in steps of the case."""
 
 

@@ -36,6 +36,7 @@ RUNS = {
     "gauss4": (0.0025, 0.5),
     "gauss6": (0.0025, 0.5),
     "gauss8": (0.0025, 0.5),
+    "semi": (0.01, 10.0),
 }
 """Constant step and time in s of the methods on one window of four bars, so that steps cost more than setting up; those
 that are not here choose their steps."""

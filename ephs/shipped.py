@@ -21,7 +21,7 @@ SHIPPED: Final = (
     "ephs.mechanics.tree.engine.programs:motion_of_loops",
     "ephs.mechanics.tree.engine.programs:motion_of_trees",
     "ephs.mechanics.tree.engine.programs:stiff_program",
-    "ephs.mechanics.tree.engine.programs:lagged_program",
+    "ephs.mechanics.tree.engine.programs:lagged_steps_of_trees",
     "ephs.mechanics.tree.engine.slopes:rate_slopes",
     "ephs.mechanics.tree.engine.residuals:point_program",
     "ephs.mechanics.tree.sweeps.balances:network_program",

@@ -139,10 +139,11 @@ def test_pendulum_on_a_led_cart_by_every_method(method, form):
     scene, law, end = loaded(CART.replace("{motion}", form)), FORMS[form], 1.2
     own = METHODS[method]
     fixed = {"natural": 2e-3, "natural4": 1e-2, "variational": 2e-3, "alpha": 1e-3}
-    options = {"step": fixed[method]} if method in fixed else {"rtol": 1e-8, "atol": 1e-10}
+    tolerance = 1e-6 if own.order < 4 else 1e-8
+    options = {"step": fixed[method]} if method in fixed else {"rtol": tolerance, "atol": 0.01 * tolerance}
     sol = ephs.simulate(scene, end, method=method, **options)
     angle, rate = cart(law, end)
-    allowed = 2e-5 if own.order == 2 else 1e-6
+    allowed = 2e-5 if own.order < 4 else 1e-6
     assert sol.joint("pivot").coordinate[-1, 0] == pytest.approx(angle, abs=allowed)
     assert sol.joint("pivot").rate[-1, 0] == pytest.approx(rate, abs=10.0 * allowed)
     rail, moved = sol.joint("rail"), [law.displacement(t) - law.displacement(0.0) for t in sol.t]

@@ -87,7 +87,7 @@ def test_loops_and_all_pairs_and_heat_are_generated():
         find(mechanisms(), lambda s, kind=kind: any(j.kind == kind for j in s.joints.values()), settings=quick)
 
 
-STEPS = {2: (0.01, 0.005), 4: (0.04, 0.02), 5: (0.05, 0.025), 6: (0.1, 0.05), 8: (0.1, 0.05)}
+STEPS = {2: (0.01, 0.005), 3: (0.01, 0.005), 4: (0.04, 0.02), 5: (0.05, 0.025), 6: (0.1, 0.05), 8: (0.1, 0.05)}
 LAWLESS = ("alpha", "variational")  # unless they are asked to
 
 

@@ -15,6 +15,7 @@ from ephs import quantity as Q
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
+from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.methods.radau import COEFFICIENTS, NODES
@@ -58,6 +59,14 @@ def explicit(a, b):
     return lambda z: rational([1.0, *weights], [1.0], z)
 
 
+def semi(z):
+    """Stages of SSP3(4,3,3) as one linear system: rates of the implicit stages move and lose, explicit angles pull."""
+    pulled = np.array([[0.0, 0.0], [z[1, 0], 0.0]])
+    explicit, implicit = ARRAYS["a"][1:5, 1:], SCHEME[1:, 1:]
+    stages = np.eye(8) - np.kron(explicit, pulled) - np.kron(implicit, z - pulled)
+    return np.eye(2) + np.kron(ARRAYS["a"][5, 1:], np.eye(2)) @ np.linalg.solve(stages, np.kron(np.ones((4, 1)), z))
+
+
 FUNCTIONS = {
     "natural": diagonal(1),
     "natural4": diagonal(3),
@@ -67,6 +76,7 @@ FUNCTIONS = {
     "radau": radau,
     "rk54": explicit(tableaux.A5, tableaux.B5),
     "rk87": explicit(tableaux.A8, tableaux.B8),
+    "semi": semi,
 }
 
 

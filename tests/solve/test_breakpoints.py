@@ -12,6 +12,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.solve import probe
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.probe import WIDTH, Asked
+from tests.mechanics.plain import uncorrected
 
 SCENE = sprung()
 UNTIL = 1.0
@@ -35,7 +36,8 @@ def test_chosen_steps_end_on_declared_jumps_and_keep_the_tolerance(method):
 
 @pytest.mark.parametrize("method", CONSTANT)
 def test_constant_steps_keep_their_order_over_jumps_that_divide_them(method):
-    sols = [run(method, step=1.0 / n, jumps=TIMES, audit="off") for n in (30, 60)]
+    with uncorrected():  # corrections are largest where the mass turns back, which a grid meets by chance
+        sols = [run(method, step=1.0 / n, jumps=TIMES, audit="off") for n in (30, 60)]
     for n, sol in zip((30, 60), sols, strict=True):
         off = [t for t in TIMES if abs(t * n - round(t * n)) > 1e-6]
         assert set(TIMES) <= set(sol.t.tolist())

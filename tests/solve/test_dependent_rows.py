@@ -106,7 +106,7 @@ def test_an_effort_too_small_beside_its_row_makes_no_row_independent():
     assert list(entangled(csr_array(rows))) == [0, 1]
 
 
-METHODS = ("natural", "natural4", "rk54", "ida", "gauss4", "alpha", "variational")
+METHODS = ("natural", "natural4", "rk54", "semi", "ida", "gauss4", "alpha", "variational")
 
 
 def oscillator(row=None):

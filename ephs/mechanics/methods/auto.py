@@ -10,9 +10,9 @@ Contacts are stiff for a while: compiled steps of radau end where explicit ones 
 from typing import TYPE_CHECKING, Any, final
 
 from ephs.mechanics.methods.explicit import Explicit, tableau
-from ephs.mechanics.methods.marching import March, Rival
+from ephs.mechanics.methods.marching import Rival
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.semi import ARRAYS, EXPONENT, NAME, Semi, serves
+from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -64,15 +64,15 @@ class Auto(ReducedMethod):
         self._begun: Implicit | None = None
         self._held = self._free = self._failures = 0
         self._trial: int | None = None
-        self._semi: Semi | None = None
+        self._semi: Explicit | None = None
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
         if name == "rk54" and _touches(equations):
-            if control.rtol.value > COARSE and serves(equations):
-                self._semi = Semi(equations)
-                self.name = self.counts["chosen"] = NAME
-                self.exponent, self.share = EXPONENT, 0.0
+            if control.rtol.value > COARSE and cheap(equations):
+                self._semi = semi_implicit(equations, control)
+                self.name = self.counts["chosen"] = self._semi.name
+                self.exponent, self.share = self._semi.exponent, self._semi.share
             elif equations.n <= FREEDOMS:
                 self._begin()
 
@@ -89,7 +89,9 @@ class Auto(ReducedMethod):
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
-        if self._semi is not None:  # which steps in compiled code alone
+        if self._semi is not None and h >= 0.0:
+            return self._semi.step(state, h)
+        if self._semi is not None:  # losses gain energy backward in time, which implicit steps do not see
             self._begin()
         if self._implicit is not None:
             return self._implicit.step(state, h)
@@ -115,8 +117,8 @@ class Auto(ReducedMethod):
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
         if self._semi is not None and span.until >= span.t0:
-            return March(self, ARRAYS, span, lagged=self._semi)
-        if self._semi is not None:  # losses gain energy backward in time, which implicit steps do not see
+            return self._semi.many(span)
+        if self._semi is not None:
             self._begin()
         if self._implicit is not None:
             if self._trial is None or not isinstance(self._explicit, Explicit):

@@ -6,7 +6,7 @@ Steps of a mechanism on which nothing but given constants acts are taken many in
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -18,8 +18,12 @@ from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.march import STEPS
+from ephs.solve.march.account import WHOLE, WORTH
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
+
+if TYPE_CHECKING:
+    from ephs.mechanics.methods.semi import Semi
 
 Solve = Callable[..., Array]
 """Solver of the stages of a step, with the arguments of `Equations.stages`."""
@@ -82,13 +86,19 @@ class Explicit(ReducedMethod):
     ----------
     solve
         Solves the stages of a step as `Equations.stages` does, which is taken where there is none.
+    lagged
+        What makes steps semi-implicit: its stages need no rates at the start, and energy that they miss becomes heat.
     """
 
-    def __init__(self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None) -> None:
+    def __init__(
+        self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None,
+        lagged: "Semi | None" = None,
+    ) -> None:  # fmt: skip
         super().__init__(equations, control)
-        self.solve: Solve = equations.stages if solve is None else solve
+        self.solve: Solve = solve or (equations.stages if lagged is None else lagged.stages)
+        self.lagged = lagged
         self.method, self.name, self.exponent = method, method.name, method.exponent
-        self.share = 0.5
+        self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
         self._known: tuple[Array, Array] | None = None
         self.stiffness = 0.0
         self.rough: tuple[Array, ...] = ()
@@ -121,15 +131,16 @@ class Explicit(ReducedMethod):
     def _tried(self, state: ReducedState, h: float, *, part: bool) -> Attempt[ReducedState]:
         eq, scheme = self.equations, self.method.arrays
         state = eq.accounts.opened(state)
-        if self._known is None or self._known[0] is not state.q:
-            self._known = state.q, eq.rates(state.t, state.q, eq.vector(state))
         y0, y1 = eq.vector(state), np.empty(eq.size)
         k = np.zeros((scheme["a"].shape[0], eq.size))
-        k[0] = self._known[1]
+        if self.lagged is None:
+            if self._known is None or self._known[0] is not state.q:
+                self._known = state.q, eq.rates(state.t, state.q, y0)
+            k[0] = self._known[1]
         tolerances, chosen = (self.atol, self.rtol), self.control.step is None
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
-        y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part)
+        y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=self.lagged is not None)
         sums = np.array(eq.engine.totals["low" if part else "whole"])
         end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)
@@ -141,15 +152,18 @@ class Explicit(ReducedMethod):
             self._open[:], self._shut[:] = end.r, closed.r
             error = max(error, float(self._drift()))
         if not error > 1.0 or self.control.step is not None:
-            closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None)
+            closed, missed = eq.accounts.corrected(
+                state, closed, h, allowed, chosen=self.control.step is None, share=self._worth
+            )
             error = max(error, missed)
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
-        self._fine[:], self._coarse[:] = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
-        self.stiffness = float(self._stiffness(h))
-        if not (eq.engine.looped or eq.careful):  # nothing was projected: the last rates are the next first ones
-            first = k[-1].copy()
-            first[: eq.nv] = closed.r
-            self._known = closed.q, first
+        if self.lagged is None:
+            self._fine[:], self._coarse[:] = (k[-1] - k[-2])[eq.counted], (y1 - before)[eq.counted]
+            self.stiffness = float(self._stiffness(h))
+            if not (eq.engine.looped or eq.careful):  # nothing was projected: the last rates are the next first ones
+                first = k[-1].copy()
+                first[: eq.nv] = closed.r
+                self._known = closed.q, first
         return Attempt(state, closed, h, error, eq.least(state, closed), sums)
 
     def taken(self, state: ReducedState) -> Snapshot:
@@ -175,4 +189,6 @@ class Explicit(ReducedMethod):
         The leg calls left(t, h, reason) and ends after ``most`` steps, or when stability limits the steps: h·|λ| is
         ``limit`` then.
         """
-        return March(self, self.method.arrays, span, limit, left, most=most) if self.equations.constant else None
+        if not self.equations.constant:
+            return None
+        return March(self, self.method.arrays, span, limit, left, most=most, lagged=self.lagged)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, final
+from typing import TYPE_CHECKING, Any, Protocol, final
 
 import numpy as np
 
@@ -20,18 +20,14 @@ from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Counts, Span
 
+if TYPE_CHECKING:
+    from ephs.mechanics.methods.semi import Semi
+
 ROWS = 1024
 """Capacity of the buffer of rows."""
 WINDOW, LATEST = 10, 30
 """Steps of implicit legs, rejected ones included, that are weighed against those of a rival: at a new matrix, and
 after so many without one."""
-
-
-class Lagging(Protocol):
-    """Memory of semi-implicit steps, see `ephs.mechanics.methods.semi.Semi`."""
-
-    onsager: dict[int, int]
-    memory: dict[str, Any]
 
 
 Leave = Callable[[float, float, str], None]
@@ -128,7 +124,7 @@ class March:
         kept: Kept | None = None,
         rival: Rival | None = None,
         most: int | None = None,
-        lagged: Lagging | None = None,
+        lagged: "Semi | None" = None,
     ) -> None:
         eq, start = method.equations, method.equations.accounts.opened(span.state)
         self.own, eq.accounts.kept = eq.accounts.own, True
@@ -159,7 +155,7 @@ class March:
         a.alone = int(kept is not None and span.policy is None)  # constant implicit steps may not resolve fast modes
         given = arrays, self.memory, self.steering, self.account
         if lagged is not None:
-            self.march = eq.engine.lagged(lagged.onsager, *given, lagged.memory, 0)
+            self.march = eq.engine.lagged("march", lagged.onsager, *given, lagged.memory, 0)
         elif kept is not None:
             self.march = eq.engine.implicit(*given, kept.memory, 0)
         else:

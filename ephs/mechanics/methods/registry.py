@@ -158,6 +158,12 @@ def _gauss(name: str) -> Callable[..., Any]:
     return make
 
 
+def _semi(equations: Any, control: Control) -> Any:
+    from ephs.mechanics.methods.semi import semi_implicit
+
+    return semi_implicit(equations, control)
+
+
 def _variational(equations: Any, control: Control, **options: Any) -> Any:
     from ephs.mechanics.methods.variational import Variational
 
@@ -301,6 +307,17 @@ for _method in (
             impacts=True,
         )
         for order in (4, 6, 8)
+    ),
+    Method(
+        "semi",
+        3,
+        True,
+        True,
+        False,
+        True,
+        "losses implicit, all else explicit",
+        on_joints(_corrected(_semi)),
+        ("keep",),
     ),
     Method("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
 ):

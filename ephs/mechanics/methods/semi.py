@@ -1,24 +1,31 @@
-"""Semi-implicit steps of trees: losses are taken implicitly, with resistances of explicit stages; all else explicitly.
+"""Semi-implicit steps: losses are taken implicitly, with resistances of explicit stages; all else explicitly.
 
 SSP3(4,3,3) of Pareschi and Russo, J. Sci. Comput. 25 (2005) 129-155, of order 3: its explicit part preserves strong
 stability, its implicit one is L-stable. No weight is negative, so that no step loses entropy, whatever its length.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, final
 
 import numpy as np
 
+from ephs.mechanics.methods.explicit import Explicit, Tableau
 from ephs.mechanics.tree.engine.drags import chains, frictions, memory_of
+from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.stages import evaluated
 from ephs.mechanics.tree.finding.roles import strikes
+from ephs.semantics.bundle import Array
 from ephs.semantics.derive.irreversible import Irreversible
 from ephs.semantics.derive.relations import onsager
+from ephs.semantics.stage.calling import Bound
+from ephs.solve.control import Control
+from ephs.solve.march import Control as Steering
+from ephs.solve.march import Status
 
 NAME: Final = "semi"
-EXPONENT: Final = 3.0
-"""The power of the step with which the estimate falls."""
+ORDER: Final = 3
 FREEDOMS: Final = 1000
 """Degrees of freedom up to which the memory of a matrix is little."""
 WORK: Final = 2000.0
@@ -48,42 +55,91 @@ SCHEME: Final = np.array([
 """The implicit coefficients."""
 AGAIN: Final = np.array([0, 0, 1, 0, 0])
 """1 where a stage has the explicit state of the one before."""
+TABLEAU: Final = Tableau(NAME, ORDER, ARRAYS, ARRAYS["a"][:-1].sum(axis=1), float(ORDER))
+"""The explicit coefficients, with the nodes at which inputs are taken."""
 
 
 @final
 class Semi:
-    """Memory of semi-implicit steps of one tree.
+    """Memory of semi-implicit steps of one mechanism.
 
     Attributes
     ----------
     onsager
         Addresses of the programs of M/θ₀ of the components of friction, by their numbers.
-    memory
-        Of the stages, by the names of `ephs.mechanics.tree.engine.drags.Drags`.
     """
 
     def __init__(self, equations: Equations) -> None:
-        engine, found = equations.engine, _relations(equations)
-        self.onsager = {number: onsager(one).compiled()["value"].address for number, one in found.items() if one}
-        memory = memory_of(engine.tables, links_of(equations.reduced).parts, engine.sizes[1])
-        self.memory: dict[str, Any] = memory | {"scheme": SCHEME, "again": AGAIN}
+        self._equations = equations
+        self.onsager = {number: onsager(one).compiled()["value"].address for number, one in _relations(equations)}
+        self._made: tuple[Engine, dict[str, Any], Bound] | None = None
+        coordinates, size = equations.engine.sizes
+        self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), Steering.table(1)
+        self._start, self._y, self._k = np.zeros(size), np.zeros(size), np.zeros((len(ARRAYS["a"]), size))
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """Memory of the stages, by the names of `ephs.mechanics.tree.engine.drags.Drags`."""
+        return self._of_engine()[1]
+
+    def _of_engine(self) -> tuple[Engine, dict[str, Any], Bound]:
+        """The present engine, which a start may make anew, with memory, and its stages."""
+        eq, engine = self._equations, self._equations.engine
+        if self._made is None or self._made[0] is not engine:
+            rows, parts = len(engine.array("value")), links_of(eq.reduced).parts
+            sizes = engine.tables, parts, engine.sizes[1], rows, eq.driven.tolist()
+            memory = memory_of(*sizes, pushed=eq.given.pushed) | {"scheme": SCHEME, "again": AGAIN}
+            given = ARRAYS, self._steering, self._base, self._start, self._k, memory, self._y, self._q
+            self._made = engine, memory, engine.lagged("stage", self.onsager, *given, 0, 0.0)
+        return self._made
+
+    def stages(
+        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,
+        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
+    ) -> Array:  # fmt: skip
+        """The rates k at the stages of a step, each under the inputs at its node, and y at its end into y1.
+
+        Returns y at the last stage. Stages are explicit where constraints nearly repeat each other. See
+        `Equations.stages`.
+        """
+        (engine, _, stage), eq, before = self._of_engine(), self._equations, y0
+
+        def at(part: float, y: Array) -> Array:
+            return eq.rates(state.t + part * h, state.q, y)
+
+        self._base[:], self._start[:] = state.q, y0
+        for i in range(1, len(scheme["a"])):
+            before, anew = self._y.copy(), i < len(c) and not AGAIN[i]
+            if anew and not eq.constant:
+                y = y0 + h * (scheme["a"][i, :i] @ self._k[:i])
+                v, r, heats, _ = np.split(y, np.cumsum([eq.nv, eq.n, eq.ns]))
+                eq.load(state.t + (0.0 if eq.held else float(c[i]) * h), eq.advance(state.q, v), r, heats)
+            eq.evaluations += anew
+            status = int(stage(i, h))
+            if status == Status.DEPENDENT:
+                before, y1[:] = evaluated(at, scheme, c, h, y0, k, None, chosen=chosen)
+                return before
+            eq.refuse(status, engine.failed)
+        k[:], y1[:] = self._k, self._y
+        return before
 
 
-def serves(equations: Equations) -> bool:
-    """Whether the losses of a tree are known, and act by forces, and its masses are factorised in little time."""
+def semi_implicit(equations: Equations, control: Control) -> Explicit:
+    """The method on one mechanism."""
+    return Explicit(equations, control, TABLEAU, lagged=Semi(equations))
+
+
+def cheap(equations: Equations) -> bool:
+    """Whether the masses of a tree are factorised in little time, and no contact is hard."""
     reach = chains(links_of(equations.reduced).parts)["reach"]
     narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
-    known = None not in _relations(equations).values()
-    return bool(narrow) and known and strikes(equations.problem.descriptor.components) is None
+    return bool(narrow) and strikes(equations.problem.descriptor.components) is None
 
 
-def _relations(equations: Equations) -> dict[int, Irreversible | None]:
-    """Relations of the components of friction, by their numbers; None where one is not in machine code."""
-    kernels = {
-        number: equations.problem.descriptor.components[number].primitive.kernel
-        for number in frictions(equations.engine.tables)
-    }
-    return {
-        number: kernel.relation if kernel is not None and isinstance(kernel.relation, Irreversible) else None
-        for number, kernel in kernels.items()
-    }
+def _relations(equations: Equations) -> Iterator[tuple[int, Irreversible]]:
+    """Numbers and relations of the components of friction."""
+    for number in frictions(equations.engine.tables):
+        kernel = equations.problem.descriptor.components[number].primitive.kernel
+        assert kernel is not None
+        assert isinstance(kernel.relation, Irreversible)
+        yield number, kernel.relation

@@ -19,6 +19,7 @@ METHOD_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "rk54": ("DormandPrince1980",),
         "rk87": ("PrinceDormand1981", "HairerNorsettWanner1993"),
         **{f"gauss{order}": ("HairerLubichWanner2006",) for order in (4, 6, 8)},
+        "semi": ("PareschiRusso2005", "BoscarinoFilbetRusso2016"),
         "ida": ("HindmarshEtAl2005",),
     }
 )

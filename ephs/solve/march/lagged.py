@@ -45,6 +45,53 @@ class Lagged(ABC):
         ``fresh``: whether Y is that of the stage before.
         """
 
+    @abstractmethod
+    def advance(self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector) -> None:
+        """Write base·exp(v), of v in y, to q."""
+
+
+@staged
+def stage(
+    on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
+    lagged: Lagged, i: Integer, y: Vector, q: Vector,
+) -> Integer:  # fmt: skip
+    """Evaluate a stage into its row of k; return a status."""
+    nv, n, status, known = motion.increments, motion.freedoms, on.counter(0), on.same(lagged.again[i], 1)
+
+    def observe() -> None:
+        combine(on, tableau.a.row(i), i, h, k, start, y)
+        control.evaluations = control.evaluations + 1
+        status.value, control.component = lagged.observe(on, motion, base, y, q)
+
+    def resist() -> None:
+        copy(on, lagged.seen, k.row(i))
+        copy(on, start.part(nv, n), lagged.reached)
+
+        def add(j: Integer) -> None:
+            weight = h * lagged.scheme[i, j]
+
+            def entry(m: Integer) -> None:
+                lagged.reached[m] = lagged.reached[m] + weight * k[j, nv + m]
+
+            on.loop(n, entry)
+
+        on.loop(i, add, start=1)
+        status.value = lagged.resist(on, motion, y, h * lagged.scheme[i, i], known, k.row(i))
+
+    on.when(known, lambda: None, observe)
+    on.when(on.same(status.value, 0), resist)
+    return status.value
+
+
+def end(
+    on: Evaluator, motion: Motion, tableau: Tableau, base: Vector, start: Vector, h: Real, k: Matrix, lagged: Lagged,
+    y: Vector, q: Vector,
+) -> None:  # fmt: skip
+    """Write the step's end to y and q."""
+    count = tableau.a.columns
+    combine(on, tableau.a.row(count), count, h, k, start, y)
+    lagged.advance(on, motion, base, y, q)
+
 
 @staged
 def lag(
@@ -52,43 +99,13 @@ def lag(
     lagged: Lagged, y: Vector, q: Vector,
 ) -> Integer:  # fmt: skip
     """Evaluate the stages after the first, and write the step's end to y and q; return a status."""
-    count, nv, n = tableau.a.columns, motion.increments, motion.freedoms
-    stage, status = on.counter(1), on.counter(0)
-
-    def observe() -> None:
-        combine(on, tableau.a.row(stage.value), stage.value, h, k, start, y)
-        control.evaluations = control.evaluations + 1
-        status.value, control.component = lagged.observe(on, motion, base, y, q)
+    at, status = on.counter(1), on.counter(0)
 
     def one() -> Truth:
-        i = stage.value
-        known = on.same(lagged.again[i], 1)
-        on.when(known, lambda: None, observe)
-
-        def resist() -> None:
-            copy(on, lagged.seen, k.row(i))
-            copy(on, start.part(nv, n), lagged.reached)
-
-            def add(j: Integer) -> None:
-                weight = h * lagged.scheme[i, j]
-
-                def entry(m: Integer) -> None:
-                    lagged.reached[m] = lagged.reached[m] + weight * k[j, nv + m]
-
-                on.loop(n, entry)
-
-            on.loop(i, add, start=1)
-            status.value = lagged.resist(on, motion, y, h * lagged.scheme[i, i], known, k.row(i))
-
-        on.when(on.same(status.value, 0), resist)
-        stage.value = i + 1
-        return on.either(on.negate(on.same(status.value, 0)), stage.value >= count)
+        status.value = stage(on, motion, tableau, control, base, start, h, k, lagged, at.value, y, q)
+        at.value = at.value + 1
+        return on.either(on.negate(on.same(status.value, 0)), at.value >= tableau.a.columns)
 
     on.repeat(one)
-    combine(on, tableau.a.row(count), count, h, k, start, y)
-
-    def settle() -> None:
-        status.value = motion.settle(on, base, y, q)
-
-    on.when(on.same(status.value, 0), settle)
+    end(on, motion, tableau, base, start, h, k, lagged, y, q)
     return status.value

@@ -6,7 +6,7 @@ from typing import final
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
-from ephs.solve.march.account import WORTH, Account, worth
+from ephs.solve.march.account import WHOLE, WORTH, Account, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.memory import Memory, Totals
@@ -216,8 +216,7 @@ class _Run:
             self.status.value = motion.correct(on, self.account, h, totals.start, y, q, m.allowed)
 
             def weigh() -> None:
-                # An estimate of low order misses surfaces that meet at a step's end: the correction shows them.
-                share = WORTH if self.lagged is None else 1.0
+                share = WORTH if self.lagged is None else WHOLE
                 error.value = on.maximum(error.value, worth(on, self.account, share))
 
             on.when(self.sound, weigh)

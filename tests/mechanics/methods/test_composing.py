@@ -17,6 +17,7 @@ ROUNDING = 1e-12
 MAPS = {
     "natural": True, "natural4": True, "variational": True, "alpha": True,
     "rk54": False, "rk87": False, "gauss4": False, "gauss6": False, "gauss8": False, "radau": False,
+    "semi": False,
 }  # fmt: skip
 """Whether the steps of a method, as it is by default, are those of the parts."""
 STEPS = {"rk87": 0.25, "gauss6": 0.2, "gauss8": 0.4, "radau": 0.2}

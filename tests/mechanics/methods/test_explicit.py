@@ -202,7 +202,7 @@ def test_a_loop_of_prescribed_joints_is_refused_by_name(tmp_path):
         (
             {"method": "rk45"},
             "method is 'rk45', expected one of auto, natural, natural4, variational, radau, alpha, rk54, rk87, gauss4, "
-            "gauss6, gauss8, ida",
+            "gauss6, gauss8, semi, ida",
         ),
     ],
 )

@@ -16,7 +16,7 @@ from tests.mechanics.momenta import floating, momenta
 
 SCENES = Path(__file__).parents[3] / "scenes"
 METHODS = {
-    **{name: {"rtol": 1e-4, "atol": 1e-4} for name in ("rk54", "rk87", "radau", "auto")},
+    **{name: {"rtol": 1e-4, "atol": 1e-4} for name in ("rk54", "rk87", "radau", "auto", "semi")},
     **{name: {"step": 0.04} for name in ("gauss4", "alpha", "variational")},
 }
 BOTH = {"keep": "energy and momenta"}

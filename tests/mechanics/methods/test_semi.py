@@ -1,12 +1,15 @@
 """Semi-implicit steps: their coefficients, their stages, and what contact loses by them."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi, serves
+from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.drags import DRAGS, Drags, resisting
 from ephs.mechanics.tree.engine.programs import of_motion
@@ -15,9 +18,11 @@ from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, group, real, vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
+from tests.mechanics.plain import uncorrected
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
 IMPLICIT = SCHEME[1:, 1:]
+SCENES = Path(ephs.__file__).parents[1] / "scenes"
 
 
 def test_coefficients_are_of_order_three():
@@ -54,11 +59,10 @@ def probe(on, motion, drags, base, y, q, out, known, weight):
     return status
 
 
-ENTRY = of_motion(
-    probe, looped=False, drags=group(Drags, **DRAGS), base=vector(), y=vector(), q=vector(), out=vector(),
-    known=vector(), weight=real(),
-)  # fmt: skip
-PROBE = Program("probe", probe=ENTRY)
+KINDS = {
+    "drags": group(Drags, **DRAGS), **dict.fromkeys(("base", "y", "q", "out", "known"), vector()), "weight": real()
+}  # fmt: skip
+PROBES = {looped: Program("probe", probe=of_motion(probe, looped=looped, **KINDS)) for looped in (False, True)}
 
 
 class Stage:
@@ -71,7 +75,7 @@ class Stage:
         self.rates = slice(eq.nv, eq.nv + eq.n)
         self.y[self.rates] += np.random.default_rng(seed).normal(size=eq.n)
         semi = Semi(eq)
-        call = PROBE.compiled()["probe"]
+        call = PROBES[eq.engine.looped].compiled()["probe"]
         coordinates, size = eq.engine.sizes
         self.out, self.known, self.memory = np.zeros(size), np.zeros(eq.n), semi.memory
         first = call.first(resisting(eq.engine.tables, semi.onsager), eq.engine.work)
@@ -173,12 +177,30 @@ def check(stage, seed):
     assert np.all(made >= 0.0)
 
 
-@given(scene=mechanisms(loops=False), seed=st.integers(0, 2**20))
+@given(scene=mechanisms(), seed=st.integers(0, 2**20))
 @settings(max_examples=25)
 def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
     stage = Stage(scene, seed)
-    if stage.eq.n and serves(stage.eq) and not stage.eq.engine.looped:
+    if stage.eq.n and not stage.eq.careful:
         check(stage, seed)
+
+
+@pytest.fixture(scope="module", params=["four-bar", "slider-crank", "slider-crank, led", "cardan-shaft", "universal"])
+def closed(request, tmp_path_factory):
+    """A mechanism with loops and friction, of which one has a crank whose motion is prescribed."""
+    name, _, led = request.param.partition(", ")
+    text = (SCENES / f"{name}.toml").read_text(encoding="utf-8")
+    file = tmp_path_factory.mktemp("closed") / "closed.toml"
+    file.write_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text, encoding="utf-8")
+    return ephs.load(file)
+
+
+@given(seed=st.integers(0, 2**20))
+@settings(max_examples=5)
+def test_so_they_do_within_loops_and_beside_prescribed_motions(closed, seed):
+    stage = Stage(closed, seed)
+    check(stage, seed)
+    assert stage.memory["counts"][0] > 0
 
 
 @given(seed=st.integers(0, 2**20))
@@ -205,6 +227,60 @@ def test_steps_converge_with_order_three(tmp_path):
     exact = np.concatenate([exact.body("hand").velocity[-1], exact.body("trunk").angular_velocity[-1]])
     errors = [np.abs(end(4e-3 / count) - exact).max() for count in (16, 32, 64)]
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+
+
+def test_so_they_do_with_loops_and_prescribed_motions(closed):
+    def end(**how):
+        sol = ephs.simulate(closed, 0.1, audit="off", **how)
+        ledgers = [sol.heat[-1], sol.work[-1]]
+        return np.concatenate([*(sol.body(body).velocity[-1] for body in closed.bodies), ledgers])
+
+    exact = end(method="rk87", rtol=1e-11, atol=1e-12)
+    errors = [np.abs(end(method="semi", step=0.1 / count) - exact).max() for count in (20, 40, 80)]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
+
+
+def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
+    scene = ephs.load(SCENES / "four-bar.toml")
+    inputs = {"joints.main": lambda t, state: 4.0 * np.sin(20.0 * t) - 0.1 * state.joints["main"].rate[0]}
+
+    def end(**how):
+        with uncorrected():
+            sol = ephs.simulate(scene, 0.2, inputs=inputs, audit="off", **how)
+        return np.concatenate([*(sol.body(body).velocity[-1] for body in scene.bodies), sol.heat[-1:], sol.work[-1:]])
+
+    exact = end(method="rk87", rtol=1e-11, atol=1e-12)
+    errors = [np.abs(end(method="semi", step=0.2 / count) - exact).max() for count in (20, 40, 80)]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.7)
+
+
+@pytest.mark.parametrize("name", ["four-bar", "hot-brake", "biped"])
+@pytest.mark.parametrize("how", [{"step": 2e-3}, {"rtol": 1e-4, "atol": 1e-5}])
+def test_single_steps_are_those_of_compiled_runs(name, how):
+    scene, times = ephs.load(SCENES / f"{name}.toml"), np.linspace(0.0, 0.1, 8)
+    looked_at = {"events": [ephs.Event(lambda t, state: 1.0 + t, "never", stop=False)]}
+    whole, single = (
+        ephs.simulate(scene, 0.1, method="semi", save_at=times, audit="off", **how, **more)
+        for more in ({}, looked_at)
+    )  # fmt: skip
+    assert whole.stats["steps"] == single.stats["steps"]
+    for path in whole.states:
+        size = np.abs(whole[path]).max() + 1.0
+        assert np.abs(whole[path] - single[path]).max() <= 1e-10 * size
+    assert np.abs(whole.heat - single.heat).max() <= 1e-10 * (1.0 + np.abs(whole.heat).max())
+    assert max(np.abs(sol.energy_error).max() for sol in (whole, single)) <= 1e-11
+
+
+def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes(tmp_path):
+    """Losses a thousand times as fast as steps, whose stages are one by one."""
+    file = tmp_path / "bar.toml"
+    text = (SCENES / "four-bar.toml").read_text(encoding="utf-8")
+    file.write_text(re.sub(r"friction = [0-9.]+", "friction = 1e4", text), encoding="utf-8")
+    scene = ephs.load(file)
+    inputs = {"joints.main": lambda t, state: 4.0 + t}
+    found = ephs.simulate(scene, 0.5, method="semi", step=0.02, inputs=inputs, audit="off")
+    assert np.abs(found.joint("main").rate).max() <= 1e-2
+    assert found.stats["least_production"] >= 0.0 and np.abs(found.energy_error).max() <= 1e-11
 
 
 @pytest.mark.parametrize("slip", [1e-2, 1e-4, 1e-6])

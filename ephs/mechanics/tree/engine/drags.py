@@ -1,4 +1,4 @@
-"""Resistances of a tree's losses.
+"""Resistances of a mechanism's losses.
 
 A loss pulls with −μ u on the relative twist u of two links, or on a joint's rates; so D = Σ Jᵀ μ J with the rows J of
 u on the rates. All twists are about one point, the place of the first link, and along the ground's axes. Rows of M and
@@ -11,15 +11,16 @@ from typing import Any, Final, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.held import constrain
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist
+from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist, walk
 from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import place_of
 from ephs.mechanics.tree.sweeps.pack import Part
-from ephs.semantics.linear.dense import clear
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces import se3
-from ephs.semantics.spaces.vectors import add, apply, product, sub
+from ephs.semantics.spaces.vectors import add, apply, dot, product, sub
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
@@ -69,6 +70,13 @@ class Drags(Lagged):
         (n, n): M, then the factor of M + w D; D: lower triangles, see `ephs.semantics.linear.skyline`.
     speed, part, sign
         (n,): rates that are reached, by rows; memory.
+    given
+        (n,): given forces and wrenches as forces on the rates; (0,) where there are none.
+    led
+        Rates of joints with prescribed motions.
+    held, bent, among, pulled
+        (constraints, n), (constraints, n), (constraints, constraints), (constraints,): rows J that rates obey, along
+        the order of M, the prescribed ones first; J (M + w D)⁻¹; the factor of J (M + w D)⁻¹ Jᵀ; multipliers.
     """
 
     scheme: Matrix
@@ -98,6 +106,12 @@ class Drags(Lagged):
     speed: Vector
     part: Vector
     sign: Vector
+    given: Vector
+    led: Integers
+    held: Matrix
+    bent: Matrix
+    among: Matrix
+    pulled: Vector
 
     # ---- what acts -------------------------------------------------------------------------------------------------
 
@@ -108,8 +122,11 @@ class Drags(Lagged):
 
         def place() -> None:
             on.reach(motion.tables.own[0].axes, *motion.swept, q, self.axes)
+            on.when(self.given.size > 0, lambda: _push(on, self, motion))
+            on.when(on.both(lossy, self.held.rows > 0), lambda: constrain(on, self, motion, q))
 
-        on.when(on.both(on.same(status, 0), self.counts[EDGES] > 0), place)
+        lossy = self.counts[EDGES] > 0
+        on.when(on.both(on.same(status, 0), on.either(lossy, self.given.size > 0)), place)
         return status, component
 
     def note(self, on: Evaluator, tables: Tables, work: Work, edge: Acting, number: Integer) -> None:
@@ -121,6 +138,10 @@ class Drags(Lagged):
     def resist(self, on: Evaluator, motion: Motion, y: Vector, weight: Real, fresh: Truth, out: Vector) -> Integer:
         assert isinstance(motion, Mechanism)
         return resist(on, self, motion, y, weight, on.select(fresh, 1, 0), out)
+
+    def advance(self, on: Evaluator, motion: Motion, base: Vector, y: Vector, q: Vector) -> None:
+        assert isinstance(motion, Mechanism)
+        motion.advance(on, base, y, q)
 
 
 @staged
@@ -178,6 +199,31 @@ def _join(on: Evaluator, drags: Drags, work: Work, edge: Acting, c: Integer) -> 
     on.loop(d, grow)
 
 
+@staged
+def _push(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
+    """Write the given forces on the tree's joints and wrenches on bodies as forces on the rates."""
+    tables = motion.tables
+
+    def body(b: Integer) -> None:
+        one = tables.body[b]
+
+        def pushed() -> None:
+            place = place_of(on, motion.work.place, one.link)
+            here = se3.wrench_outward(one.turn, one.at, [tables.wrench[b, k] for k in range(6)])
+            there = se3.wrench_outward(place.turn, place.at, here)
+
+            def grow(p: Integer) -> None:
+                j = drags.rate[p]
+                drags.given[j] = drags.given[j] + dot([drags.axes[j, k] for k in range(6)], there)
+
+            walk(on, drags, one.link, grow)
+
+        on.when(one.link >= 0, pushed)
+
+    copy(on, tables.drive.part(0, drags.given.size), drags.given)
+    on.loop(tables.body.size, body)
+
+
 def frictions(tables: Mapping[str, Any]) -> list[int]:
     """Numbers of the components of friction, edge by edge."""
     acting: Any = tables["acting"]
@@ -212,17 +258,25 @@ def chains(parts: Sequence[Part]) -> dict[str, Any]:
     return {"rate": rate, "row_of": np.argsort(rate), "above": above, "owner": owner, "tip": tips, "reach": reach}
 
 
-def memory_of(tables: Mapping[str, Any], parts: Sequence[Part], size: int) -> dict[str, Any]:
-    """Memory of the losses of a tree whose links are given, but for a scheme; ``size``: of its y."""
+def memory_of(
+    tables: Mapping[str, Any], parts: Sequence[Part], size: int, rows: int, led: Sequence[int], *, pushed: bool
+) -> dict[str, Any]:
+    """Memory of the losses of a mechanism whose links are given, but for a scheme.
+
+    ``size``: of its y; ``rows``: how many close loops; ``led``: rates with prescribed motions; ``pushed``: whether
+    forces on joints or wrenches on bodies may be given.
+    """
     whole, losses = chains(parts), len(frictions(tables))
-    n = whole["reach"].size
+    n, held = whole["reach"].size, len(led) + rows
+    whole["led"] = np.array(led)
     whole |= {"first": whole["reach"], "counts": np.zeros(2), "chain": np.zeros(n)}
     whole |= {"edge": np.zeros(losses), "pair": np.zeros(2 * losses)}
     shapes = {
         **dict.fromkeys(("resistance", "row", "joined"), (losses, 36)),
         **dict.fromkeys(("axes", "column", "moved"), (n, 6)), **dict.fromkeys(("mass", "drag"), (n, n)),
         **dict.fromkeys(("speed", "part", "sign", "reached"), (n,)),
-        "body": (len(parts), 10), "seen": (size,),
+        "body": (len(parts), 10), "seen": (size,), "held": (held, n), "bent": (held, n), "among": (held, held),
+        "pulled": (held,), "given": (n * pushed,),
     }  # fmt: skip
     return {name: array.astype(np.int64) for name, array in whole.items()} | {
         name: np.zeros(shape) for name, shape in shapes.items()
@@ -235,5 +289,6 @@ DRAGS: Final[dict[str, Any]] = {
     "first": indices(), "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(),
     "resistance": matrix(36), "row": matrix(36), "joined": matrix(36), "axes": matrix(6), "column": matrix(6),
     "moved": matrix(6), "body": matrix(10), "mass": matrix(), "drag": matrix(), "speed": vector(), "part": vector(),
-    "sign": vector(),
+    "sign": vector(), "given": vector(), "led": indices(), "held": matrix(), "bent": matrix(), "among": matrix(),
+    "pulled": vector(),
 }  # fmt: skip

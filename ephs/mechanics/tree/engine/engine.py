@@ -12,6 +12,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.march import ERRORS, TOTALS, Account, Control
+from ephs.solve.march.account import WORTH
 
 
 @final
@@ -61,7 +62,7 @@ class Engine:
             "counted": (self._start, self._y),
             "energy": (self._q, self._r, self._heats, self._held),
             "measured": (self._q, self._r),
-            "corrected": (self._account, self._start, self._y, self._q, self._allowed, 0.0),
+            "corrected": (self._account, self._start, self._y, self._q, self._allowed, 0.0, 0.0),
             "close": (self._q, self._r),
             "project": (self._q, self._change),
         }
@@ -82,13 +83,13 @@ class Engine:
         """Return implicit steps, bound to this tree and to further arguments."""
         return stiff_program().compiled()["march"].bind(*arguments, first=self._first)
 
-    def lagged(self, onsager: Mapping[int, int], *arguments: Any) -> Bound:
-        """Return semi-implicit steps, bound to this tree and to further arguments.
+    def lagged(self, name: str, onsager: Mapping[int, int], *arguments: Any) -> Bound:
+        """Return semi-implicit steps, ``march``, or one stage of them, ``stage``, bound to this mechanism and more.
 
         ``onsager``: addresses of the programs of M/θ₀ of the components of friction, by their numbers.
         """
-        march = lagged_program().compiled()["march"]
-        return march.bind(*arguments, first=march.first(resisting(self.tables, onsager), self.work))
+        call = lagged_program(looped=self.looped).compiled()[name]
+        return call.bind(*arguments, first=call.first(resisting(self.tables, onsager), self.work))
 
     def array(self, name: str) -> Array:
         """Return an array of the memory."""
@@ -166,12 +167,12 @@ class Engine:
         return self._y.copy()
 
     def sum(
-        self, tableau: Mapping[str, Any], k: Array, h: float, y0: Array, y1: Array, carry: Array, *, anchor: float,
-        part: bool,
+        self, tableau: Mapping[str, Any], k: Array, h: float, base: Array, y0: Array, y1: Array, carry: Array, *,
+        anchor: float, part: bool, damped: bool,
     ) -> tuple[int, Array, Array]:  # fmt: skip
         """Sum what a step with rates k adds to heats and totals; a part of one is held by ``totals``.
 
-        ``anchor`` is that of the account.
+        ``anchor`` is that of the account; ``damped``: whether energy that is missing becomes heat.
 
         Returns
         -------
@@ -181,16 +182,17 @@ class Engine:
         known = self._sums.get(id(tableau))
         if known is None or known[0] is not tableau:
             rows = np.zeros(k.shape)
-            known = tableau, rows, self.bind("summed", tableau, rows, self.totals, h, anchor, int(part))
+            given = tableau, rows, self.totals, self._base, self._q
+            known = tableau, rows, self.bind("summed", *given, h, anchor, int(part), int(damped))
             self._sums[id(tableau)] = known
         _, rows, summed = known
-        self._start[:], self._y[:], self.totals["before"][:], rows[:] = y0, y1, carry, k
-        status = int(summed(h, anchor, int(part)))
+        self._base[:], self._start[:], self._y[:], self.totals["before"][:], rows[:] = base, y0, y1, carry, k
+        status = int(summed(h, anchor, int(part), int(damped)))
         return status, self._y.copy(), self.totals["after"].copy()
 
     def correct(
         self, account: Array, y0: Array, y: Array, q: Array, allowed: Array, h: float, *, chosen: bool,
-        alone: bool = False,
+        alone: bool = False, share: float = WORTH,
     ) -> tuple[int, Array, Array, Array, float]:  # fmt: skip
         """Move the end (q, y) of a step from y0 to the energy that is left to it.
 
@@ -204,7 +206,7 @@ class Engine:
         a: Any = self._account[0]
         (a.anchor, a.left, a.put, a.total), self.work["kept"][: self.momenta] = account[:4].tolist(), account[4:]
         a.chosen, a.alone = int(chosen), int(alone)
-        status = self._run("corrected", h)
+        status = self._run("corrected", h, share)
         after = np.concatenate([[a.anchor, a.rest, a.put + a.moved, a.total + abs(a.moved)], account[4:]])
         return status, self._q.copy(), self._y.copy(), after, float(a.size)
 

@@ -156,22 +156,27 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
 
 def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
     """Make the heat of friction in a step's changes what the motion lost in J, see `ephs.solve.heats.Heats.booked`."""
-    nodes, total, whole = tables.node.size, on.variable(0.0), on.variable(0.0)
+    nodes, whole = tables.node.size, on.variable(0.0)
 
     def weigh(i: Integer) -> None:
-        flow = change[nodes + 2 + tables.sink[i].maker]
-        total.value, whole.value = total.value + flow, whole.value + on.maximum(flow, 0.0)
+        sink = tables.sink[i]
+        flow = on.select(sink.rubs > 0, change[nodes + 2 + sink.maker], 0.0)
+        whole.value = whole.value + on.maximum(flow, 0.0)
 
     on.loop(tables.sink.size, weigh)
-    short, made = lost - total.value, whole.value
+    short, made = lost - change[nodes], whole.value
     share = on.select(on.both(made > 0.0, short > -LITTLE * made), short / on.select(made > 0.0, made, 1.0), 0.0)
 
     def grow(i: Integer) -> None:
         sink = tables.sink[i]
         at = nodes + 2 + sink.maker
-        more = share * on.maximum(change[at], 0.0)
-        for place in (at, sink.entropy, nodes):
-            change[place] = change[place] + more
+
+        def more() -> None:
+            heat = share * on.maximum(change[at], 0.0)
+            for place in (at, sink.entropy, nodes):
+                change[place] = change[place] + heat
+
+        on.when(sink.rubs > 0, more)
 
     on.loop(tables.sink.size, grow)
 

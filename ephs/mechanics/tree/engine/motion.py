@@ -317,10 +317,14 @@ class Mechanism(Motion):
         on.loop(charts.size, joint)
         on.loop(self.tables.node.size, energy)
 
-    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
+    def stray(self, on: Evaluator, q: Vector, change: Vector) -> None:
+        """Write targets that take a change of the rates back across the constraints."""
         own, w = self.tables.own[0], self.work
         on.reach(own.spread, *self.swept, q, change, w.change)
         on.reach(own.across, *self._cuts, w.change, w.value)
+
+    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
+        self.stray(on, q, change)
         alter = self._resolve(on, q)
 
         def add(j: Integer) -> None:

@@ -41,6 +41,7 @@ from ephs.solve.march import (
     march,
 )
 from ephs.solve.march.account import worth
+from ephs.solve.march.lagged import end, stage
 from ephs.solve.march.steps import attempt, book
 
 _MOVING = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
@@ -85,17 +86,27 @@ def motion_program(*, looped: bool) -> Program:
         motion.count(on, before, after)
 
     def summed(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, k: Matrix, totals: Totals, h: Real, anchor: Real,
-        part: Integer,
+        on: Evaluator, motion: Mechanism, tableau: Tableau, k: Matrix, totals: Totals, base: Vector, q: Vector,
+        h: Real, anchor: Real, part: Integer, damped: Integer,
     ) -> Integer:  # fmt: skip
-        return book(on, motion, tableau, k, h, totals, anchor, on.same(part, 1))
+        status = on.counter(0)
+
+        def add(end: Vector | None) -> None:
+            status.value = book(on, motion, tableau, k, h, totals, anchor, on.same(part, 1), end)
+
+        def absorb() -> None:
+            motion.advance(on, base, totals.end, q)
+            add(q)
+
+        on.when(on.same(damped, 1), absorb, lambda: add(None))
+        return status.value
 
     def corrected(
         on: Evaluator, motion: Mechanism, account: Table[Account], start: Vector, y: Vector, q: Vector,
-        allowed: Vector, h: Real,
+        allowed: Vector, h: Real, share: Real,
     ) -> Integer:  # fmt: skip
         status = motion.correct(on, account[0], h, start, y, q, allowed)
-        account[0].size = worth(on, account[0])
+        account[0].size = worth(on, account[0], share)
         return status
 
     def advance(on: Evaluator, motion: Mechanism, base: Vector, v: Vector, q: Vector) -> None:
@@ -130,11 +141,12 @@ def motion_program(*, looped: bool) -> Program:
         "velocities": entry(velocities, y=vector(), r=vector(), out=vector()),
         "counted": entry(counted, before=vector(), after=vector()),
         "summed": entry(
-            summed, tableau=tried["tableau"], k=matrix(), totals=group(Totals, **TOTALS), h=real(), anchor=real(),
-            part=integer(),
+            summed, tableau=tried["tableau"], k=matrix(), totals=group(Totals, **TOTALS), base=vector(), q=vector(),
+            h=real(), anchor=real(), part=integer(), damped=integer(),
         ),
         "corrected": entry(
-            corrected, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real()
+            corrected, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real(),
+            share=real(),
         ),
         "measured": entry(measure, q=vector(), r=vector()),
         "energy": entry(held, q=vector(), r=vector(), heats=vector(), out=vector(3)),
@@ -168,8 +180,8 @@ def stiff_program() -> Program:
 
 
 @cache
-def lagged_program() -> Program:
-    """Return the program of semi-implicit steps of trees, many in one call."""
+def lagged_program(*, looped: bool) -> Program:
+    """Return the program of semi-implicit steps, many in one call, or stage by stage."""
 
     def marched(
         on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
@@ -177,11 +189,28 @@ def lagged_program() -> Program:
     ) -> Integer:  # fmt: skip
         return march(on, motion, tableau, memory, control[0], account[0], steps, lagged=drags)
 
+    def staged(
+        on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
+        k: Matrix, drags: Drags, y: Vector, q: Vector, i: Integer, h: Real,
+    ) -> Integer:  # fmt: skip
+        status = on.counter(0)
+
+        def one() -> None:
+            status.value = stage(on, motion, tableau, control[0], base, start, h, k, drags, i, y, q)
+
+        on.when(i < tableau.a.columns, one, lambda: end(on, motion, tableau, base, start, h, k, drags, y, q))
+        return status.value
+
+    given = {"tableau": group(Tableau, **TABLEAU), "control": table(Control), "drags": group(Drags, **DRAGS)}
     return Program(
-        "lagged_steps_of_trees",
+        "lagged_steps_of_loops" if looped else "lagged_steps_of_trees",
         march=of_motion(
-            marched, looped=False, tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY),
-            control=table(Control), account=table(Account), drags=group(Drags, **DRAGS), steps=integer(),
+            marched, looped=looped, tableau=given["tableau"], memory=group(Memory, **MEMORY),
+            control=given["control"], account=table(Account), drags=given["drags"], steps=integer(),
+        ),
+        stage=of_motion(
+            staged, looped=looped, tableau=given["tableau"], control=given["control"], base=vector(), start=vector(),
+            k=matrix(), drags=given["drags"], y=vector(), q=vector(), i=integer(), h=real(),
         ),
     )  # fmt: skip
 
@@ -194,3 +223,8 @@ def motion_of_trees() -> Program:
 def motion_of_loops() -> Program:
     """Return the program with loops."""
     return motion_program(looped=True)
+
+
+def lagged_steps_of_trees() -> Program:
+    """Return the program of semi-implicit steps without loops."""
+    return lagged_program(looped=False)

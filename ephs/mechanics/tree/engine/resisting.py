@@ -1,4 +1,4 @@
-"""The linear system (M + w D) of a tree's losses for the accelerations, and the heat that they make.
+"""The linear system (M + w D) of losses for the accelerations, where these obey constraints J, and the heat made.
 
 The mass matrix is that of composite bodies, see Featherstone, *Rigid Body Dynamics Algorithms*, 2008, 6.2.
 """
@@ -6,6 +6,7 @@ The mass matrix is that of composite bodies, see Featherstone, *Rigid Body Dynam
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from ephs.mechanics.tree.engine.held import among, pull
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_TREE
 from ephs.mechanics.tree.sweeps.cuts import place_of
@@ -28,12 +29,15 @@ EDGES, PAIRS = 0, 1
 def resist(
     on: Evaluator, drags: "Drags", motion: Mechanism, y: Vector, weight: Real, fresh: Integer, out: Vector
 ) -> Integer:
-    """Complete ẏ, where losses act on rates z that are reached: M ṙ = forces − D z, z = known + w ṙ; return a status.
+    """Complete ẏ, where losses act on rates z that are reached; return a status.
+
+    M ṙ = forces − D z + Jᵀ λ with z = known + w ṙ, where ṙ without losses is known and obeys J.
 
     ``fresh``: 1 where M + w D is factorised.
     """
     n, status, z, part = motion.freedoms, on.counter(0), drags.reached, drags.part
-    rate, losses = out.part(motion.increments, n), drags.counts[EDGES] > 0
+    rate, losses, held = out.part(motion.increments, n), drags.counts[EDGES] > 0, drags.held.rows > 0
+    power = motion.summed + (motion.tables.node.size + 1)
 
     def reach(i: Integer) -> None:
         z[i] = z[i] + weight * rate[i]
@@ -44,9 +48,13 @@ def resist(
             _masses(on, drags, motion)
             _losses(on, drags, motion)
             status.value = _factorise(on, drags, weight)
+            on.when(on.both(held, on.same(status.value, 0)), factorise)
 
         on.when(on.same(fresh, 1), lambda: None, assemble)
         on.when(on.same(status.value, 0), change)
+
+    def factorise() -> None:
+        status.value = among(on, drags)
 
     def change() -> None:
         def move(p: Integer) -> None:
@@ -54,17 +62,23 @@ def resist(
             rate[i], z[i] = rate[i] - change, z[i] - weight * change
             drags.speed[p] = z[i]
 
-        _pull(on, drags, z)
+        _drag(on, drags, z)
+        on.when(held, lambda: pull(on, drags, motion, out))
         on.loop(n, move)
         _heat(on, drags, motion, out)
 
+    def work(i: Integer) -> None:
+        # At the rates of Y it would miss the energies of what z moves.
+        out[power] = out[power] + drags.given[i] * (z[i] - y[motion.increments + i])
+
     on.loop(n, reach)
     on.when(losses, solve)
+    on.loop(drags.given.size, work)
     on.when(on.same(status.value, 0), lambda: motion.flow(on, y, z, out))
     return status.value
 
 
-def _pull(on: Evaluator, drags: "Drags", z: Vector) -> None:
+def _drag(on: Evaluator, drags: "Drags", z: Vector) -> None:
     """Write (M + w D)⁻¹ D z, by rows, to the memory, and z by rows."""
 
     def gather(p: Integer) -> None:
@@ -75,7 +89,7 @@ def _pull(on: Evaluator, drags: "Drags", z: Vector) -> None:
     skyline_solve(on, drags.mass, drags.first, drags.part)
 
 
-def _walk(on: Evaluator, drags: "Drags", link: Integer, body: Callable[[Integer], None]) -> None:
+def walk(on: Evaluator, drags: "Drags", link: Integer, body: Callable[[Integer], None]) -> None:
     """Call body(row) for the rates that move a link, the last one first."""
     at = on.counter(on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)]))
 
@@ -104,7 +118,7 @@ def _begin(on: Evaluator, drags: "Drags") -> None:
 
         for body in (find, lower):
             for link in links:
-                _walk(on, drags, link, body)
+                walk(on, drags, link, body)
 
     def empty(i: Integer) -> None:
         def entry(j: Integer) -> None:
@@ -264,8 +278,8 @@ def _losses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
             on.loop(size.value, entry)
 
         for one, other in ((clear_sign, clear_sign), (leave, join), (gather, gather)):
-            _walk(on, drags, links[0], one)
-            _walk(on, drags, links[1], other)
+            walk(on, drags, links[0], one)
+            walk(on, drags, links[1], other)
         on.loop(size.value, row)
 
     on.loop(drags.counts[EDGES], within)

@@ -38,7 +38,7 @@ class Forces(NamedTuple):
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
     node: Table[Node]
     conduction: Index  # (conductions, 3): component, entropy, entropy
-    sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
+    sink: Index  # (sinks, 4): see `ephs.mechanics.tree.sweeps.acting.Sink`
     port: Index  # (rates, 3): place of the freedom, edge, freedom in it
     component: Table[Component]  # with their relations over a step
     resting: Table[Component]  # with those at rest, without derivatives

@@ -13,6 +13,7 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import OptionError
 from ephs.solve.march import Status
+from ephs.solve.march.account import WORTH
 from ephs.solve.march.noted import Noted
 from ephs.solve.snapshot import Snapshot
 
@@ -72,14 +73,17 @@ class Accounts:
         return replace(state, account=account)
 
     def booked(
-        self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, part: bool = False
-    ) -> tuple[Array, Array]:
+        self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, part: bool = False,
+        damped: bool = False,
+    ) -> tuple[Array, Array]:  # fmt: skip
         """The end y1 of a step with rates k with heats and totals, and the account with what rounding left of them.
 
         Parameters
         ----------
         part
             Whether it is a part of a step: its sums lie between those in the engine's ``totals``.
+        damped
+            Whether energy that the step misses becomes heat.
 
         Raises
         ------
@@ -88,13 +92,14 @@ class Accounts:
         """
         eq, start = self._equations, self.opened(start)
         carry, anchor = start.account[self.own :], float(start.account[0])
-        status, y, carry = eq.engine.sum(tableau, k, h, eq.vector(start), y1, carry, anchor=anchor, part=part)
+        given = tableau, k, h, start.q, eq.vector(start), y1, carry
+        status, y, carry = eq.engine.sum(*given, anchor=anchor, part=part, damped=damped)
         eq.refuse(status, eq.engine.failed)
         return y, np.concatenate([start.account[: self.own], carry])
 
     def corrected(
         self, start: "ReducedState", end: "ReducedState", h: float, allowed: Array, *, chosen: bool,
-        alone: bool = False,
+        alone: bool = False, share: float = WORTH,
     ) -> tuple["ReducedState", float]:  # fmt: skip
         """The end of a step of h seconds moved to the energy that is left to it, and the step's error by that.
 
@@ -109,6 +114,8 @@ class Accounts:
             Whether steps are chosen: then it is moved by no more than `ephs.solve.march.account.MOST` of these.
         alone
             Whether rates alone are moved, as of methods that do not resolve fast modes.
+        share
+            Share of the correction that counts as an error.
 
         Raises
         ------
@@ -121,9 +128,9 @@ class Accounts:
             return replace(end, account=np.concatenate([start.account[: self.own], carry])), 0.0
         own, every = start.account[: self.own], np.full(allowed.size, np.inf)
         given = own, eq.vector(start), eq.vector(end), end.q
-        found = eq.engine.correct(*given, every if eq.careful else allowed, h, chosen=chosen, alone=alone)
+        found = eq.engine.correct(*given, every if eq.careful else allowed, h, chosen=chosen, alone=alone, share=share)
         if found[0] == Status.DEPENDENT:  # rates alone
-            found = eq.engine.correct(*given, every, h, chosen=chosen, alone=alone)
+            found = eq.engine.correct(*given, every, h, chosen=chosen, alone=alone, share=share)
         status, q, y, account, error = found
         eq.refuse(status, eq.engine.failed)
         end = replace(end, account=np.concatenate([account, carry]))

@@ -55,6 +55,11 @@ class Given:
         self._fixed = {port: self._signals[port].at(0.0, {}) for port in ports if self._signals[port].constant}
         self.place(0.0, None)
 
+    @property
+    def pushed(self) -> bool:
+        """Whether there are forces on joints or wrenches on bodies."""
+        return bool(self._drives or self._wrenches)
+
     def place(self, t: float, state: Mapping[Path, Array] | None) -> None:
         """Put the inputs at a time and state into the arrays; without a state those that are constant."""
         fixed, signals = self._fixed, self._signals

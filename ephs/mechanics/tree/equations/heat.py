@@ -5,7 +5,7 @@ import numpy as np
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.sweeps.acting import Node
 from ephs.semantics.bundle import Array
-from ephs.solve.heats import PLAIN, Heats
+from ephs.solve.heats import Heats
 
 
 def heats_of(reduced: Reduced, theta: float) -> Heats:
@@ -22,13 +22,11 @@ def heats_of(reduced: Reduced, theta: float) -> Heats:
         rows = table.arrays[1].reshape(-1, Node.real_width)[t.node >= 0]
         return rows[:, Node.c1.offset], rows[:, Node.c2.offset]
 
-    flows, sinks, owners = t.sink.T
+    flows, sinks, owners, rubs = t.sink.T
     ends = np.full((len(reduced.made), 2), -1, dtype=np.int64)
     ends[flows, 1] = sinks
     owner = np.arange(len(reduced.made))
     owner[flows] = owners
-    booked = (sinks >= 0) & (t.node[sinks] != PLAIN) if sinks.size else np.zeros(0, dtype=bool)
-    frictions = flows[booked & (np.bincount(owners, minlength=owner.size)[owners] == 1)]
     for component, one, two in t.conduction.tolist():
         ends[t.made_at[component]] = one, two
-    return Heats(reduced.entropies, t.node, laws, ends, frictions, theta, owner)
+    return Heats(reduced.entropies, t.node, laws, ends, flows[rubs > 0], theta, owner)

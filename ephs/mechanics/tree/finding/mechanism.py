@@ -239,6 +239,8 @@ def _tables(
     for called, mine in zip(parts.network.attached, flows, strict=True):
         sinks += [[int(flow), taken, int(mine[0])] for flow, (_, taken) in zip(mine, called.heated, strict=True)]
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
+    owners = [owner for _, _, owner in sinks]
+    rubs = [0 <= taken < len(storages) and owners.count(owner) == 1 for _, taken, owner in sinks]
     acting = np.unique([*spring, *friction, *_called(parts.network)]).astype(np.int64)
     return Mechanism(
         parent=np.array(parents, dtype=np.int64),
@@ -272,7 +274,7 @@ def _tables(
             dtype=np.int64,
         ),
         conduction=np.array(parts.conduction, dtype=np.int64).reshape(-1, 3),
-        sink=np.array(sinks, dtype=np.int64).reshape(-1, 3),
+        sink=np.column_stack([np.array(sinks, dtype=np.int64).reshape(-1, 3), np.array(rubs, dtype=np.int64)]),
         address=t.address,
         resting=model.resting(acting[acting >= 0]),
         dims=t.dims,

@@ -39,7 +39,7 @@ class Mechanism(NamedTuple):
     armature: Array  # (tree degrees of freedom,): inertia on the rate itself
     node: Index  # (entropies,): component of the storage, −1: the environment, −2: a state of an attachment
     conduction: Index  # (conductions, 3): component, entropy, entropy
-    sink: Index  # (sinks, 3): place of what it makes, entropy that takes it or −1, first place of its component
+    sink: Index  # (sinks, 4): see `ephs.mechanics.tree.sweeps.acting.Sink`
     address: Index  # (components,): of its relation over a step
     resting: Index  # (components,): at rest, of what acts
     dims: Index  # (components, 4)

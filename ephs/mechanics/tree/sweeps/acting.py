@@ -228,11 +228,15 @@ class Conduction(Record):
 
 
 class Sink(Record):
-    """The entropy, or −1, that takes what a component makes at a place; ``owner``: its component's first place."""
+    """The entropy, or −1, that takes what a component makes at a place; ``owner``: its component's first place.
+
+    ``rubs``: 1 where all that the component makes becomes energy of a store of heat.
+    """
 
     maker = integer()
     entropy = integer()
     owner = integer()
+    rubs = integer()
 
 
 class Port(Record):
