@@ -4,7 +4,8 @@ All read the same models. Contact laws differ, so that motions are not compared 
 refined run of its own, in the places of bodies at twenty times: what rests at the end may have moved wrongly before.
 Errors in contact depend on where in a step surfaces meet, so they are medians over runs under slightly different
 gravity. Beside that stand processor time, the share of the energy that has no place in the balance, and how deep bodies
-sink. MuJoCo runs at the step of the file. The time of steps is that of the calls of compiled code, with the set-up of
+sink. MuJoCo runs at the step of the file, and at shorter ones: what its error is in the time that `ephs` takes lies
+between. The time of steps is that of the calls of compiled code, with the set-up of
 derivatives; all else of a run is its start.
 """
 
@@ -35,8 +36,10 @@ TOLERANCES = ((1e-1, 1e-3), (1e-2, 1e-4), (2e-3, 1e-4), (1e-3, 1e-5), (1e-2, 1e-
 """rtol and atol: near rest, errors are allowed by the latter."""
 REFINED = 1e-7
 """Tolerance of the refined run."""
-FINER = 64
-"""Part of MuJoCo's step that its refined run takes."""
+SHORTER = (1, 2, 4, 8, 16)
+"""Parts of the file's step that MuJoCo takes."""
+FINER = 128
+"""The part that its refined run takes."""
 TIMES = 20
 """Number of times of a run at which places are compared."""
 GRAVITIES = (0.98, 0.99, 1.0, 1.01, 1.02)
@@ -50,6 +53,7 @@ COLUMNS = {
     "time [ms]": ("seconds", 1e3),
     "times MuJoCo": ("ratio", 1.0),
     "error [mm]": ("error", 1e3),
+    "MuJoCo's in this time [mm]": ("rival", 1e3),
     "energy without a place": ("lost", 1.0),
     "deepest overlap [mm]": ("overlap", 1e3),
 }
@@ -76,13 +80,13 @@ def report() -> Report:
 
 
 def _beside(name: str, scene: Any, mjcf: str, until: float) -> list[dict[str, Any]]:
-    other, times = _mujoco(mjcf, until)
-    rows = [{"model": name, **row, "ratio": row["seconds"] / other["seconds"]} for row in _ours(scene, until, times)]
-    rows += [
-        {"model": name, **row, "ratio": row["seconds"] / other["seconds"]}
-        for row in contact_drake.beside(name, mjcf, times, REPEATS)
-    ]
-    return [*rows, {"model": name, **other, "ratio": 1.0}]
+    others, times = _mujoco(mjcf, until)
+    rows = [*_ours(scene, until, times), *contact_drake.beside(name, mjcf, times, REPEATS)]
+    reached = np.log([[other["seconds"], other["error"]] for other in others]).T
+    for row in rows:
+        row["rival"] = float(np.exp(np.interp(np.log(row["seconds"]), *reached, left=np.nan, right=np.nan)))
+    least = others[0]["seconds"]
+    return [{"model": name, "ratio": row["seconds"] / least, "rival": np.nan, **row} for row in [*rows, *others]]
 
 
 def _least(run: Callable[[], Any]) -> float:
@@ -156,8 +160,8 @@ def _median(runs: list[Any], exact: list[Any]) -> float:
     return float(np.median([np.linalg.norm(one - other, axis=2).max() for one, other in zip(runs, exact, strict=True)]))
 
 
-def _mujoco(text: str, until: float) -> tuple[dict[str, Any], Any]:
-    """A row of the table, and the times in s, of whole steps, at which places are compared."""
+def _mujoco(text: str, until: float) -> tuple[list[dict[str, Any]], Any]:
+    """Rows of the table, and the times in s, of whole steps, at which places are compared."""
     mujoco: Any = import_module("mujoco")
     mujoco.set_mju_user_warning(silent)  # else it writes a log file into the working folder
 
@@ -175,40 +179,40 @@ def _mujoco(text: str, until: float) -> tuple[dict[str, Any], Any]:
         mujoco.mj_forward(model, data)
 
     model, data = made()
-    first, energies, deepest, steps = float(sum(data.energy)), list[float](), 0.0, round(until / model.opt.timestep)
-
-    def run() -> None:
-        for _ in range(steps):
-            mujoco.mj_step(model, data)
-
-    seconds: list[float] = []
-    for _ in range(REPEATS):
-        again(model, data)
-        start = time.process_time()
-        run()
-        seconds.append(time.process_time() - start)
-    again(model, data)
-    for _ in range(steps):
-        mujoco.mj_step(model, data)
-        energies.append(float(sum(data.energy)))
-        deepest = max(deepest, -float(data.contact.dist.min(initial=0.0)))
-    step, weight = model.opt.timestep, model.opt.gravity.copy()
-
+    first, step, weight = float(sum(data.energy)), model.opt.timestep, model.opt.gravity.copy()
+    steps = round(until / step)
     kept = np.unique(np.round(np.linspace(0, steps, TIMES + 1)).astype(int)[1:])
 
-    def places(factor: float, finer: int) -> Any:
+    def run(finer: int, factor: float = 1.0, after: Callable[[int], None] = lambda _: None) -> float:
+        """Processor time of all steps; ``after`` is called with the number of the file's steps taken."""
         model.opt.gravity[:], model.opt.timestep = factor * weight, step / finer
         again(model, data)
-        found: list[Any] = []
-        for after in np.diff(kept, prepend=0):
-            for _ in range(finer * after):
+        start = time.process_time()
+        for taken in range(1, steps + 1):
+            for _ in range(finer):
                 mujoco.mj_step(model, data)
-            found.append(np.array(data.xpos))
-        return np.array(found)
+            after(taken)
+        return time.process_time() - start
 
-    runs, exact = ([places(factor, finer) for factor in GRAVITIES] for finer in (1, FINER))
-    gross = max(abs(energy - first) for energy in energies) + abs(first)
-    return {
-        "by": "MuJoCo", "steps": steps, "start": _least(made), "seconds": min(seconds),
-        "error": _median(runs, exact), "lost": abs(first - energies[-1]) / gross, "overlap": deepest,
-    }, np.append(step * kept[:-1], until)  # fmt: skip
+    def places(finer: int) -> list[Any]:
+        found: list[Any] = []
+        for factor in GRAVITIES:
+            run(finer, factor, lambda taken: found.append(np.array(data.xpos)) if taken in kept else None)
+        return list(np.split(np.array(found), len(GRAVITIES)))
+
+    exact, start, rows = places(FINER), _least(made), list[dict[str, Any]]()
+    for finer in SHORTER:
+        energies, deep = list[float](), [0.0]
+
+        def look(_: int, energies: list[float] = energies, deep: list[float] = deep) -> None:
+            energies.append(float(sum(data.energy)))
+            deep.append(-float(data.contact.dist.min(initial=0.0)))
+
+        run(finer, after=look)
+        gross = max(abs(energy - first) for energy in energies) + abs(first)
+        rows.append({
+            "by": f"MuJoCo, step/{finer}", "steps": finer * steps, "start": start,
+            "seconds": min(run(finer) for _ in range(REPEATS)), "error": _median(places(finer), exact),
+            "lost": abs(first - energies[-1]) / gross, "overlap": max(deep),
+        })  # fmt: skip
+    return rows, np.append(step * kept[:-1], until)
