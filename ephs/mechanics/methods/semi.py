@@ -5,6 +5,7 @@ stability, its implicit one is L-stable. No weight is negative, so that no step 
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Final, final
 
 import numpy as np
@@ -30,6 +31,9 @@ FREEDOMS: Final = 1000
 """Degrees of freedom up to which the memory of a matrix is little."""
 WORK: Final = 2000.0
 """Squared width of rows of the mass matrix up to which its factors cost less than some evaluations."""
+FINE, SEVERE = 1e-4, 5.0
+"""The rtol from which on, downwards, estimates count so many times: errors of the many steps of a low order add up, those
+of a tumbling body to some thousand tolerances."""
 ALPHA: Final = (9.0 - 57.0**0.5) / 6.0
 """Diagonal of the implicit coefficients, which makes them L-stable."""
 _LAST = 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0
@@ -126,7 +130,10 @@ class Semi:
 
 def semi_implicit(equations: Equations, control: Control) -> Explicit:
     """The method on one mechanism."""
-    return Explicit(equations, control, TABLEAU, lagged=Semi(equations))
+    tableau = TABLEAU
+    if control.rtol.value <= FINE:
+        tableau = replace(TABLEAU, arrays={**ARRAYS, "error": SEVERE * ARRAYS["error"]})
+    return Explicit(equations, control, tableau, lagged=Semi(equations))
 
 
 def cheap(equations: Equations) -> bool:
