@@ -32,8 +32,8 @@ FREEDOMS: Final = 1000
 WORK: Final = 2000.0
 """Squared width of rows of the mass matrix up to which its factors cost less than some evaluations."""
 FINE, SEVERE = 1e-4, 5.0
-"""The rtol from which on, downwards, estimates count so many times: errors of the many steps of a low order add up, those
-of a tumbling body to some thousand tolerances."""
+"""The rtol from which on, downwards, estimates count so many times: errors of the many steps of a low order add up,
+those of a tumbling body to some thousand tolerances."""
 ALPHA: Final = (9.0 - 57.0**0.5) / 6.0
 """Diagonal of the implicit coefficients, which makes them L-stable."""
 _LAST = 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0
