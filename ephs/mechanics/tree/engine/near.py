@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 
-from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Acting, Group, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Acting, Tables, Work
 from ephs.mechanics.tree.sweeps.cuts import Relative, place_of
+from ephs.mechanics.tree.sweeps.grouping import Group
 from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.semantics.spaces.vectors import Rows, add, apply, apply_transposed, dot, product, sub, transposed
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable

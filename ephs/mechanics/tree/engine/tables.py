@@ -11,12 +11,11 @@ from ephs.mechanics.tree.sweeps.acting import (
     Body,
     Component,
     Conduction,
-    Group,
-    Middle,
     Node,
     Port,
     Sink,
 )
+from ephs.mechanics.tree.sweeps.grouping import Group, Middle
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Record, Table
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals

@@ -7,6 +7,7 @@ from ephs.mechanics.tree.sweeps import loops, programs
 from ephs.mechanics.tree.sweeps.balances import ATTACH
 from ephs.mechanics.tree.sweeps.charts import Chart
 from ephs.mechanics.tree.sweeps.cuts import Place, Relative
+from ephs.mechanics.tree.sweeps.grouping import Group, Middle
 from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
@@ -167,35 +168,6 @@ class Acting(Record):
     halves = reals(6)
     parallel = real()
     left = reals(6, 6)
-
-
-class Middle(Record):
-    """A point of a link, −1: the ground, and a direction there, along which planes are above."""
-
-    link = integer()
-    at = reals(3)
-    axis = reals(3)
-
-
-class Group(Record):
-    """Consecutive edges between the same links, of which none acts where two points are far from each other.
-
-    Attributes
-    ----------
-    support, spread
-        `ABOVE` or `BEYOND`: where the second point is higher above the first, or farther from it, none acts; else 0.
-    start, end
-        Numbers of the edges.
-    one, two
-        The points, of the first and of the second link.
-    """
-
-    support = integer()
-    start = integer()
-    end = integer()
-    one = integer()
-    two = integer()
-    spread = real()
 
 
 class Body(Record):
