@@ -82,7 +82,7 @@ _AXIS: Known = {
 
 
 def joint_keys(count: int, *, fixed: bool) -> Known:
-    """What is known of a joint with this many axes; a fixed one and a ball may have axes without use."""
+    """Known keys of a joint with this many axes; fixed joints and ball joints may have axes that are not used."""
     used = ("axis", "axis2")[: max(count, 1)]
     axes = (
         _known("axis axis2") if fixed else {f"{axis}/{path}": plain for axis in used for path, plain in _AXIS.items()}

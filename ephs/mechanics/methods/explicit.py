@@ -87,7 +87,7 @@ class Explicit(ReducedMethod):
     solve
         Solves the stages of a step as `Equations.stages` does, which is taken where there is none.
     lagged
-        What makes steps semi-implicit: its stages need no rates at the start, and energy that they miss becomes heat.
+        Memory of semi-implicit steps, which need no rates at the start and turn energy that they lose into heat.
     """
 
     def __init__(
