@@ -1,6 +1,7 @@
 """Functions beyond the elementary ones, for numbers and symbols alike."""
 
 import math
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
@@ -12,6 +13,8 @@ from ephs.semantics.stage.plain import PLAIN
 
 SHORT = 1e-2
 """Below this a series serves, whose first term left out is below rounding: z⁸/9!."""
+HALVINGS = 54
+"""Of an interval, until it is one of neighbouring numbers."""
 
 
 @singledispatch
@@ -44,6 +47,21 @@ def choose(number: Any, one: Any, other: Any) -> Any:
     if np.ndim(number):
         return np.where(number > 0.0, one, other)  # pyright: ignore[reportUnknownVariableType]
     return one if number > 0.0 else other
+
+
+def root(function: Callable[..., Any], low: Any, high: Any, *given: Any) -> Any:
+    """The number x between two ends at which an increasing function f(x, *given) is zero.
+
+    Its derivatives and slopes are those of an implicit function, so f needs to say by itself all that it depends on.
+    """
+    recorded = next((each for each in (low, high, *given) if isinstance(each, Recorded)), None)
+    if recorded is not None:
+        return recorded.root(function, low, high, given)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        above = function(middle, *given) > 0.0
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return 0.5 * (low + high)
 
 
 def squared_turn(q: Any) -> Any:

@@ -17,7 +17,7 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.support import Support
 
 UPRIGHT: Final = 1e-3
-"""Inclination in rad below which a circle counts as flat: its gap is smaller by this part of the radius at the most."""
+"""Inclination in rad below which a circle counts as flat: its gap is larger by this part of the radius at the most."""
 PARALLEL: Final = 1e-6
 """Square of the sine of an angle below which segments count as parallel: any of their nearest points is taken."""
 CROSSING: Final = 1.0 / 32.0
@@ -109,25 +109,36 @@ def plane_sphere(radius: float) -> Gap:
     return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, numbers, Support(HEIGHT, radius))
 
 
-def plane_rim(radius: float) -> Gap:
-    """Gap between the plane z = 0 of C1, solid below, and the circle in the plane z = 0 of C2 about its origin.
+def rounded(level: Any, upright: Any) -> tuple[Any, Any]:
+    """How far a circle's lowest point is from its axis, by the sine of its inclination, and below its centre; in radii.
 
-    Its lowest point goes through the centre where the circle comes to lie flat, within an inclination of `UPRIGHT`.
+    The point is nearly that of an ellipsoid as flat as `UPRIGHT`, so it goes through the centre where the circle comes
+    to lie flat. It is as high as that of the circle where this lies flat, and where it stands.
+
+    Parameters
+    ----------
+    level, upright
+        Squares of the sine and the cosine.
     """
+    length = np.sqrt(level + UPRIGHT**2 * upright)
+    return (1.0 - UPRIGHT**2) / length + 4.0 * UPRIGHT * upright, length - UPRIGHT * upright * upright
 
-    def inclined(pose: Any) -> tuple[Vector, Any]:
+
+def plane_rim(radius: float) -> Gap:
+    """Gap between the plane z = 0 of C1, solid below, and the circle in the plane z = 0 of C2 about its origin."""
+
+    def inclined(pose: Any) -> tuple[Vector, Any, Any]:
         normal = _upwards(pose)
-        return normal, np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + UPRIGHT**2)
+        return normal, *rounded(normal[0] * normal[0] + normal[1] * normal[1], normal[2] * normal[2])
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
-        normal, length = inclined(pose)
-        out = -radius / length
-        return normal, (out * normal[0], out * normal[1], 0.0)
+        normal, out, _ = inclined(pose)
+        return normal, (-radius * out * normal[0], -radius * out * normal[1], 0.0)
 
     def distance(pose: Any) -> Any:
-        return pose[6] - radius * inclined(pose)[1]
+        return pose[6] - radius * inclined(pose)[2]
 
-    return Gap("plane_rim", distance, contact, radius, (("radius", radius),), Support(HEIGHT, radius * (1.0 + UPRIGHT)))
+    return Gap("plane_rim", distance, contact, radius, (("radius", radius),), Support(HEIGHT, radius))
 
 
 def clamped(x: Any, most: float) -> Any:

@@ -201,12 +201,17 @@ def _capsule_mesh(capsule: Sequence[float], vertices: Any) -> Points:
     yield from ((CENTRE, there, segments(0.5 * length, radius, long, solid.radius)) for there, long in solid.edges())
 
 
-def _cylinder(sizes: Sequence[float]) -> tuple[Body, tuple[Array, ...]]:
+def _cylinder(sizes: Sequence[float], domed: float = 0.0) -> tuple[Body, tuple[Array, ...]]:
     """A cylinder with rounded rims, and the centres of their cores."""
     size, length = sizes
-    radius = ROUNDED * min(2.0 * size, length)
+    radius = _rounding(sizes)
     half = 0.5 * length - radius
-    return cylinder(size - radius, half, radius), tuple(np.array([0.0, 0.0, z]) for z in (-half, half))
+    return cylinder(size - radius, half, radius, domed), tuple(np.array([0.0, 0.0, z]) for z in (-half, half))
+
+
+def _rounding(sizes: Sequence[float]) -> float:
+    """Radius of the rims of a cylinder."""
+    return ROUNDED * min(2.0 * sizes[0], sizes[1])
 
 
 def _capsule_cylinder(capsule: Sequence[float], sizes: Sequence[float]) -> Points:
@@ -226,10 +231,11 @@ def _polyhedron_cylinder(solid: _Rounded, sizes: Sequence[float]) -> Points:
 
 
 def _cylinders(one: Sequence[float], other: Sequence[float]) -> Points:
-    (body1, rims1), (body2, rims2) = _cylinder(one), _cylinder(other)
+    touching = _rounding(one) + _rounding(other)
+    (body1, rims1), (body2, rims2) = _cylinder(one, touching), _cylinder(other, touching)
     yield from ((CENTRE, at, meeting(rim(body2.halves[0], body2.radius), body1, first=False)) for at in rims2)
     yield from ((at, CENTRE, meeting(rim(body1.halves[0], body1.radius), body2, first=True)) for at in rims1)
-    yield CENTRE, CENTRE, meeting(side(body1.halves[0], body1.axial, body1.radius), body2, first=True)
+    yield CENTRE, CENTRE, meeting(side(body1.halves[0], body1.halves[2], body1.radius), body2, first=True)
 
 
 def _box_capsule(sizes: Sequence[float], capsule: Sequence[float]) -> Points:

@@ -5,41 +5,33 @@ gives its points that may be nearest to a body. The gap is the least distance le
 bounds it from above, whether it is the nearest one or not.
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
 
 from ephs.mechanics.shapes.gap import (
-    CROSSING,
-    PARALLEL,
     UPRIGHT,
     Gap,
     Vector,
     apart,
     clamped,
-    cross,
     dot,
     into,
     ramp,
+    rounded,
     times,
 )
 from ephs.mechanics.shapes.hull import Hull, around
 from ephs.mechanics.shapes.selecting import chosen, least, most, moved
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.special import choose
+from ephs.semantics.special import choose, root
 
-STEPS: Final = 4
-"""Steps along a segment to the point nearest to a rim: a projection, then Newton's."""
-TURNS: Final = 6
-PROJECTIONS: Final = 3
-"""Steps around a rim, and how many of them are projections, before Newton's."""
-WIDEST: Final = 0.5
-"""Largest turn of a step around a rim, rad."""
-REGION: Final = 1e-3
-"""Distance beyond a cap or a side, by the size, from which on Newton's steps include its curvature."""
+LEANING: Final = 1e-7
+"""Inclination in rad below which the direction in which an axis leans is smooth."""
 MIDDLE: Final = 1e-6
 """Distance from the axis of a cylinder, by its radius, at which the direction away from it is smooth."""
 Spot = tuple[Vector, Any]
@@ -55,12 +47,8 @@ class Body:
     ----------
     distance, normal
         Point in its axes -> distance from the core in m, and unit normal away from it.
-    bend
-        Point and direction u -> u·H u of half the squared distance.
-    curved
-        It is not flat wherever it is near: steps find its nearest points.
-    axial
-        Half length of a cylinder's core, 0 of others.
+    pull
+        Of a round body: point -> half the gradient of the squared distance.
     radius, halves, thickness
         Distance of the surface from the core, half lengths of a box about the frame that holds the core, its least
         thickness; m.
@@ -69,9 +57,7 @@ class Body:
     name: str
     distance: Callable[[Vector], Any]
     normal: Callable[[Vector], Vector]
-    bend: Callable[[Vector, Vector], Any]
-    curved: bool
-    axial: float
+    pull: Callable[[Vector], Vector] | None
     radius: float
     halves: tuple[float, float, float]
     thickness: float
@@ -85,12 +71,12 @@ class Feature:
 
     Parameters
     ----------
-    spots
-        Centre and axis (unit) in a body's axes, and the body -> points that may be nearest.
+    spot
+        Centre and axis (unit) in a body's axes, and the body -> the nearest point.
     """
 
     name: str
-    spots: Callable[[Vector, Vector, Body], Sequence[Spot]]
+    spot: Callable[[Vector, Vector, Body], Spot]
     radius: float
     halves: tuple[float, float, float]
     numbers: tuple[tuple[str, float], ...]
@@ -115,21 +101,13 @@ def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
         return place, (axes[0][2], axes[1][2], axes[2][2])
 
     def distance(pose: Any) -> Any:
-        found: Any = None
-        for at, longer in feature.spots(*seen(pose), body):
-            one = body.distance(at) + longer
-            found = one if found is None else least(found, one)
-        return found - radii
+        at, longer = feature.spot(*seen(pose), body)
+        return body.distance(at) + longer - radii
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         centre, axis = seen(pose)
-        (at, longer), *others = feature.spots(centre, axis, body)
+        at, _ = feature.spot(centre, axis, body)
         far = body.distance(at)
-        for other, more in others:
-            away = body.distance(other)
-            nearer = far + longer - away - more
-            at = chosen(nearer, other, at)
-            far, longer = choose(nearer, away, far), choose(nearer, more, longer)
         normal = body.normal(at)
         if first:
             out = times(body.radius - far, normal)
@@ -156,127 +134,133 @@ def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
 
 def point(radius: float) -> Feature:
     """A ball about the origin."""
-    return Feature("point", lambda at, _axis, _body: [(at, 0.0)], radius, (0.0, 0.0, 0.0), (("radius", radius),))
+    return Feature("point", lambda at, _axis, _body: (at, 0.0), radius, (0.0, 0.0, 0.0), (("radius", radius),))
 
 
 def segment(half: float, radius: float) -> Feature:
     """A capsule about a segment: one point, which moves to an end, or to the edge of the body, where it tilts."""
 
-    def spots(centre: Vector, axis: Vector, body: Body) -> list[Spot]:
-        stay = UPRIGHT * (radius + body.radius) / half
-        level = axis[0] * axis[0] + axis[1] * axis[1] + PARALLEL
-        side = clamped(-(centre[0] * axis[0] + centre[1] * axis[1]) / level, half)  # nearest to the cylinder's axis
-        upright = clamped(centre[2] + side * axis[2], body.axial) - centre[2]
-        along = clamped(upright * axis[2] / (axis[2] * axis[2] + PARALLEL), half)
-        for step in range(STEPS):
-            at = moved(centre, along, axis)
-            slope = body.distance(at) * dot(body.normal(at), axis) + stay * along
-            along = clamped(along - (slope / (body.bend(at, axis) + stay) if step else slope), half)
-        found: list[Spot] = []
-        for place in (side, along):
-            at = moved(centre, place, axis)
-            far = body.distance(at)
-            found.append((at, np.sqrt(far * far + stay * place * place + TINY) - far))
-        return found
+    def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
+        stay, pull = UPRIGHT * (radius + body.radius) / half, body.pull
+        assert pull is not None
 
-    return Feature("segment", spots, radius, (0.0, 0.0, half), (("half", half), ("radius", radius)))
+        def rising(place: Any, x: Any, y: Any, z: Any, u: Any, v: Any, w: Any) -> Any:
+            """Half the slope of the squared distance and of a square, least in the middle."""
+            return dot(pull(moved((x, y, z), place, (u, v, w))), (u, v, w)) + stay * place
+
+        reach = 2.0 * (np.sqrt(dot(centre, centre)) + math.hypot(*body.halves))  # beyond, the centre is nearer
+        place = clamped(root(rising, -reach, reach, *centre, *axis), half)
+        at = moved(centre, place, axis)
+        far = body.distance(at)
+        return at, np.sqrt(far * far + stay * place * place + TINY) - far
+
+    return Feature("segment", spot, radius, (0.0, 0.0, half), (("half", half), ("radius", radius)))
 
 
 def rim(size: float, radius: float) -> Feature:
-    """A circle of a radius ``size``, rounded: one point, which goes through the centre where the circle lies flat.
+    """A circle of a radius ``size``, rounded, and the disc in it: one point.
 
-    It moves as that of an ellipsoid, as flat as `UPRIGHT`.
+    On a face it is as on a plane (`rounded`); where it lies flat on a cap, it is near the axis of that.
     """
 
-    def across(way: Vector, axis: Vector) -> Vector:
-        """Part of a vector in the plane of the circle."""
-        return moved(way, -dot(way, axis), axis)
+    def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
+        if body.pull is not None:
+            return _disc(centre, axis, size, body.pull), 0.0
+        normal = body.normal(centre)
+        inward = moved(normal, -dot(normal, axis), axis)
+        level = dot(inward, inward)
+        out, lower = rounded(level, dot(normal, axis) ** 2)
+        return moved(centre, -size * out, inward), size * (level * out - lower)
 
-    def softly(way: Vector) -> tuple[Vector, Any]:
-        """A direction, or less of a short vector, and the vector's length."""
-        length = np.sqrt(dot(way, way) + UPRIGHT**2)
-        return times(1.0 / length, way), length
-
-    def spots(centre: Vector, axis: Vector, body: Body) -> list[Spot]:
-        way: Vector = (0.0, 0.0, 0.0)
-        for step in range(TURNS if body.curved else 0):
-            at = moved(centre, size, way)
-            far, normal = body.distance(at), body.normal(at)
-            if step < PROJECTIONS:
-                nearest = moved(at, -far, normal)
-                off = nearest[0] - centre[0], nearest[1] - centre[1], nearest[2] - centre[2]
-                way, _ = softly(times(1.0 / size, across(off, axis)))
-            else:
-                side = cross(axis, way)
-                bend = size * body.bend(at, side) - far * dot(normal, way)
-                bend = np.sqrt(bend * bend + (PARALLEL * size) ** 2)
-                turn = clamped(-far * dot(normal, side) / bend, WIDEST)
-                way = times(1.0 / np.sqrt(1.0 + turn * turn), moved(way, turn, side))
-        way, length = softly(times(-1.0, across(body.normal(moved(centre, size, way)), axis)))
-        return [(moved(centre, size, way), -size * UPRIGHT**2 / length)]
-
-    wide = size * float(np.hypot(1.0, UPRIGHT))  # upright points of the ellipsoid are this far from the axis
-    return Feature("rim", spots, radius, (wide, wide, UPRIGHT * size), (("size", size), ("radius", radius)))
+    return Feature("rim", spot, radius, (size, size, 0.0), (("size", size), ("radius", radius)))
 
 
 def side(size: float, half: float, radius: float) -> Feature:
-    """The side of a cylinder, where it crosses that of another: one point, of axes that are not parallel.
+    """The side of a cylinder, where it crosses that of another: one point.
 
-    Parallel sides touch along a line, whose ends are of rims; so do sides that cross beyond an end. The gap is larger
-    there, so that no force jumps.
+    Parallel sides touch along a line, whose ends are of rims: the point is in its middle, and goes to an end by a tilt
+    of `UPRIGHT`. Sides that would cross beyond an end touch at rims alone: the gap is larger there.
     """
 
-    def spots(centre: Vector, axis: Vector, body: Body) -> list[Spot]:
+    def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
+        barrel = UPRIGHT * (size + body.halves[0]) / half
         level = axis[0] * axis[0] + axis[1] * axis[1]
-        along = -(centre[0] * axis[0] + centre[1] * axis[1]) / (level + PARALLEL)
-        beyond = ramp(abs(along) - half)
-        inside = moved(centre, clamped(along, half), axis)
-        up = axis[0] * inside[0] + axis[1] * inside[1]
-        way = up * axis[0] - inside[0], up * axis[1] - inside[1], up * axis[2]
-        at = moved(inside, size / np.sqrt(dot(way, way) + TINY), way)
-        parallel = ramp(1.0 - level / CROSSING)
-        return [(at, beyond * beyond / radius + (half + body.axial) * (parallel * parallel))]
+        crossing = -(centre[0] * axis[0] + centre[1] * axis[1]) / (level + barrel)
+        high = centre[2] + crossing * axis[2]
+        along = clamped(crossing + (clamped(high, body.halves[2]) - high) * axis[2], half)
+        inside = moved(centre, along, axis)
+        square = inside[0] * inside[0] + inside[1] * inside[1] + TINY
+        far, beyond = np.sqrt(square), along - crossing
+        nearer = 1.0 - size / far
+        at = nearer * inside[0], nearer * inside[1], inside[2]
+        return at, np.sqrt(square + barrel * along * along) - far + beyond * beyond / radius
 
     numbers = (("size", size), ("half", half), ("radius", radius))
-    return Feature("side", spots, radius, (size, size, half), numbers)
+    return Feature("side", spot, radius, (size, size, half), numbers)
+
+
+def _disc(centre: Vector, axis: Vector, size: float, pull: Callable[[Vector], Vector]) -> Vector:
+    """The point of a disc that is nearest to a cylinder.
+
+    The disc is a family of chords perpendicular to the cylinder's axis; of each, the point nearest to the axis is the
+    nearest. From the first chord to the last it gets nearer, and then further again. The tangent of half an angle,
+    whose sine says which chord it is and whose cosine how long it is, goes from −1 to 1.
+    """
+    x, y = axis[0] + LEANING, axis[1]
+    level = np.sqrt(x * x + y * y)
+    x, y = x / level, y / level
+    lean, rise = x * axis[0] + y * axis[1], axis[2]
+    along, aside = x * centre[0] + y * centre[1], x * centre[1] - y * centre[0]
+
+    def rising(place: Any, along: Any, beside: Any, up: Any, lean: Any, rise: Any) -> Any:
+        """The slope of the distance along the chords, but for a factor."""
+        sine, cosine = turned(place)
+        off = ramp(beside - size * cosine)
+        way = pull((along + size * rise * sine, off, up - size * lean * sine))
+        return way[0] * rise * cosine + way[1] * sine - way[2] * lean * cosine
+
+    def turned(place: Any) -> tuple[Any, Any]:
+        below = 1.0 + place * place
+        return 2.0 * place / below, (1.0 - place * place) / below
+
+    sine, cosine = turned(root(rising, -1.0, 1.0, along, abs(aside), centre[2], lean, rise))
+    across, upon = size * rise * sine, clamped(-aside, size * cosine)
+    return centre[0] + x * across - y * upon, centre[1] + y * across + x * upon, centre[2] - size * lean * sine
 
 
 # ---- bodies ------------------------------------------------------------------------------------------------------
 
 
-def cylinder(size: float, half: float, radius: float) -> Body:
-    """A cylinder about z, of the radius ``size`` and this half length, rounded outwards."""
+def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> Body:
+    """A cylinder about z, of the radius ``size`` and this half length, rounded outwards.
 
-    near, middle = (REGION * min(size, half)) ** 2, (MIDDLE * size) ** 2
+    Parameters
+    ----------
+    domed
+        Distance in m that points on its edges are further by than they are, by half of `UPRIGHT` of the radius: so what
+        lies flat on a cap touches near the axis. 0: none.
+    """
+    middle, dome = (MIDDLE * size) ** 2, UPRIGHT / (size * domed) if domed else 0.0
 
-    def beyond(at: Vector) -> tuple[Any, Any, Any, Any]:
-        """Distance from the axis; outwards from the side, along the axis from the caps, and in all."""
-        wide = np.sqrt(at[0] * at[0] + at[1] * at[1] + middle)
-        out, up = ramp(wide - size), at[2] - clamped(at[2], half)
-        return wide, out, up, np.sqrt(out * out + up * up + TINY)
+    def pull(at: Vector) -> Vector:
+        """Half the gradient of the squared distance."""
+        square = at[0] * at[0] + at[1] * at[1]
+        wide, up = np.sqrt(square + middle), at[2] - clamped(at[2], half)
+        aside, more = ramp(wide - size) / wide, dome * up * up
+        return (aside + more) * at[0], (aside + more) * at[1], up + dome * square * up
+
+    def distance(at: Vector) -> Any:
+        square = at[0] * at[0] + at[1] * at[1]
+        out, up = ramp(np.sqrt(square + middle) - size), at[2] - clamped(at[2], half)
+        return np.sqrt(out * out + up * up + dome * square * up * up + TINY)
 
     def normal(at: Vector) -> Vector:
-        wide, out, up, far = beyond(at)
-        return out * at[0] / (wide * far), out * at[1] / (wide * far), up / far
+        way = pull(at)
+        return times(1.0 / np.sqrt(dot(way, way) + TINY), way)
 
-    def bend(at: Vector, way: Vector) -> Any:
-        wide, out, up, _ = beyond(at)
-        inward = (way[0] * at[0] + way[1] * at[1]) / wide * (out * out / (out * out + near))
-        aside = (way[1] * at[0] - way[0] * at[1]) / wide
-        return inward * inward + out / wide * aside * aside + way[2] * way[2] * (up * up / (up * up + near))
-
-    return Body(
-        "cylinder",
-        lambda at: beyond(at)[3],
-        normal,
-        bend,
-        True,
-        half,
-        radius,
-        (size, size, half),
-        2.0 * min(size, half),
-        (("size", size), ("half_length", half), ("rounding", radius)),
-    )
+    sizes = (("size", size), ("half_length", half), ("rounding", radius))
+    halves, thickness = (size, size, half), 2.0 * min(size, half)
+    return Body("dome" if domed else "cylinder", distance, normal, pull, radius, halves, thickness, sizes)
 
 
 def polyhedron(hull: Hull, centre: np.ndarray, radius: float) -> Body:
@@ -330,7 +314,7 @@ def polyhedron(hull: Hull, centre: np.ndarray, radius: float) -> Body:
 
     numbers = _numbers(corners, radius)
     halves = _halves(corners)
-    return Body("polyhedron", distance, normal, _flat, False, 0.0, radius, halves, 2.0 * hull.radius, numbers)
+    return Body("polyhedron", distance, normal, None, radius, halves, 2.0 * hull.radius, numbers)
 
 
 def faces(hull: Hull, centre: np.ndarray, radius: float) -> list[Body]:
@@ -353,16 +337,12 @@ def faces(hull: Hull, centre: np.ndarray, radius: float) -> list[Body]:
             return normal
 
         numbers = (("face", float(k)), *_numbers(corners, radius))
-        made = distance, upwards, _flat, False, 0.0, radius, _halves(corners), 2.0 * hull.radius, numbers
+        made = distance, upwards, None, radius, _halves(corners), 2.0 * hull.radius, numbers
         out.append(Body("face", *made))
     return out
 
 
 # ---- small parts -------------------------------------------------------------------------------------------------
-
-
-def _flat(_at: Vector, _way: Vector) -> Any:
-    return 0.0
 
 
 def _planes(hull: Hull, corners: np.ndarray) -> list[tuple[Vector, float]]:

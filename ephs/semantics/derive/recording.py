@@ -5,7 +5,7 @@ What branches on its arguments, or turns them into floats, cannot be recorded; t
 
 import math
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, final
@@ -145,7 +145,7 @@ class Recorded:
     def __init__(self, place: int, recorder: Recorder) -> None:
         self.place, self.recorder = place, recorder
 
-    def of(self, name: str, *places: int, number: float = 0.0) -> "Recorded":
+    def of(self, name: str, *places: int, number: Any = 0.0) -> "Recorded":
         """The result of an operation."""
         return Recorded(self.recorder.place(name, places, number), self.recorder)
 
@@ -201,6 +201,12 @@ class Recorded:
     def squared_turn(self, x: Any, y: Any, z: Any) -> "Recorded":
         """The squared angle of the rotation with this quaternion."""
         return self.of("squared turn", self.place, *(_place(each, self.recorder) for each in (x, y, z)))
+
+    def root(self, function: Callable[..., Any], low: Any, high: Any, given: Sequence[Any]) -> "Recorded":
+        """Where an increasing function of a number and of those given is zero, between two ends."""
+        found = record(lambda x, more: function(x, *more), {"x": None, "more": len(given)})
+        numbers = (low, high, *given, *found.parameters)
+        return self.of("root", *(_place(each, self.recorder) for each in numbers), number=found.tape)
 
     def hypot(self, other: Any) -> "Recorded":
         """The length of a vector, as NumPy's function of this name."""

@@ -9,19 +9,25 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, TypeVar, final
+from typing import Any, Final, TypeVar, final
 
 import numpy as np
 
 from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS, turn
-from ephs.semantics.derive.slopes import Entries, Slope, Slopes, lifted
+from ephs.semantics.derive.roots import root
+from ephs.semantics.derive.slopes import Entries, Slope, Slopes, combined, lifted
+from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Real
+from ephs.semantics.stage.taped import Taped
 
 T = TypeVar("T")
-Operation = tuple[str, tuple[int, ...], float]
-"""The name of an operation, the places of its arguments on the tape, a number: of ``"input"`` and ``"parameter"`` which
-one, of ``"constant"`` its value, of ``"power"`` the exponent, a multiple of 1/4."""
+Operation = tuple[str, tuple[int, ...], Any]
+"""The name of an operation, the places of its arguments on the tape, and what shapes it: of ``"input"`` and
+``"parameter"`` which one, of ``"constant"`` its value, of ``"power"`` the exponent, a multiple of 1/4, of ``"root"``
+the tape of the function."""
+SHAPED: Final = ("power", "root")
+"""Operations with a shape beside their arguments."""
 
 
 @final
@@ -57,7 +63,7 @@ class Tape:
         Parameters
         ----------
         table
-            Name of an operation -> function of its arguments; of ``"power"`` also of the exponent.
+            Name of an operation -> function of its arguments, and of what shapes it (`SHAPED`).
         """
         values: list[T] = []
         for name, places, number in self.operations:
@@ -67,8 +73,8 @@ class Tape:
                 values.append(parameters[int(number)])
             elif name == "constant":
                 values.append(constant(number))
-            elif name == "power":
-                values.append(table[name](values[places[0]], number))
+            elif name in SHAPED:
+                values.append(table[name](*(values[i] for i in places), number))
             else:
                 values.append(table[name](*(values[i] for i in places)))
         return [values[i] for i in self.outputs]
@@ -101,7 +107,7 @@ def over_step(on: Slopes, tape: Tape, inputs: Sequence[Real], parameters: Sequen
         arguments = [values[i] for i in places]
         if name in given:
             found = lifted(given[name](number))
-        elif name == "power":
+        elif name in SHAPED:
             found = lifted(OPERATIONS[name](on, *arguments, number))
         else:
             found = lifted(OPERATIONS[name](on, *arguments))
@@ -169,6 +175,44 @@ def _squared_turn(on: Evaluator, *q: Real) -> Real:
     return angle * angle
 
 
+def _root(on: Evaluator, low: Real, high: Real, *rest: Any) -> Real:
+    """Where a function on a tape is zero; it changes with the other arguments by the rule of implicit functions."""
+    *given, tape = rest
+    if isinstance(on, Slopes):
+        ends = [lifted(x) for x in (low, high, *given)]
+        start = _root(on.base, *(x.start for x in ends), tape)
+        moved = [k for k, x in enumerate(ends[2:]) if x.slopes]
+        if not moved:
+            return lifted(start)
+        end = _root(on.base, *(x.end for x in ends), tape)
+        own = [Slope(x.start, x.end, {k: 1.0} if x.slopes else {}) for k, x in enumerate(ends[2:])]
+        value = over_step(on, tape, [Slope(start, end, {-1: 1.0}), *own[: tape.inputs - 1]], own[tape.inputs - 1 :])
+        by = -1.0 / value.slopes[-1]
+        entries: Entries = {}
+        for k in moved:
+            if k in value.slopes:
+                entries = combined(entries, 1.0, ends[2 + k].slopes, by * value.slopes[k])
+        return Slope(start, end, entries)
+    if isinstance(on, Duals | Taped):
+        below = [on.bare(x) for x in (low, high, *given)]
+        at = _root(on.base, *below, tape)
+        _, slope = _along(on.base, tape, at, below[2:])
+        here = on.constant(at)
+        return here - _value(on, tape, here, given) / on.constant(slope)  # the derivatives; the value is rounded away
+    return root(on, lambda x: _along(on, tape, x, given), low, high)
+
+
+def _value(on: Evaluator, tape: Tape, at: Real, given: Sequence[Real]) -> Real:
+    return evaluate(on, tape, [at, *given[: tape.inputs - 1]], given[tape.inputs - 1 :])[0]
+
+
+def _along(on: Evaluator, tape: Tape, at: Real, given: Sequence[Real]) -> tuple[Real, Real]:
+    """The value of a function on a tape, and its derivative by the first input."""
+    duals = Duals(on)
+    found = duals.dual(_value(duals, tape, duals.along(at, 0), [duals.dual(x) for x in given]))
+    return found.value, found.slopes[0]
+
+
 def _operations() -> Mapping[str, Callable[..., Real]]:
     one: dict[str, Callable[[Evaluator, Real], Real]] = {"negative": lambda _, a: -a, "sign": _sign}
     one |= {name: _function(name) for name in FUNCTIONS}
@@ -181,7 +225,7 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
         "atan2": lambda on, a, b: on.atan2(a, b),
     }
     power: dict[str, Callable[[Evaluator, Real, float], Real]] = {"power": _power}
-    more: dict[str, Callable[..., Real]] = {"choose": _choose, "squared turn": _squared_turn}
+    more: dict[str, Callable[..., Real]] = {"choose": _choose, "squared turn": _squared_turn, "root": _root}
     return MappingProxyType(one | dict(COMPOSED) | two | power | more)
 
 
@@ -207,7 +251,7 @@ class Recorder:
         self.parameters: list[float] = []
         self._places: dict[Operation, int] = {}
 
-    def place(self, name: str, arguments: tuple[int, ...] = (), number: float = 0.0) -> int:
+    def place(self, name: str, arguments: tuple[int, ...] = (), number: Any = 0.0) -> int:
         """Position of an operation on the tape."""
         operation = name, arguments, number
         found = self._places.get(operation)

@@ -165,6 +165,14 @@ class Duals(Evaluator):
             return number
         return Dual(number, (0.0,) * self.directions if slopes is None else slopes, self.level)
 
+    def bare(self, number: Real) -> Real:
+        """Return the base's number of one."""
+        return number.value if isinstance(number, Dual) and number.level == self.level else number
+
+    def constant(self, number: Real) -> Real:
+        """Return a number of the base as a constant."""
+        return self.dual(number)
+
     def along(self, value: Real, direction: int, slope: float = 1.0) -> Dual:
         """Return a number that changes with one direction."""
         return self.dual(value, tuple(slope if k == direction else 0.0 for k in range(self.directions)))

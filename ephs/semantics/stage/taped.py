@@ -130,6 +130,10 @@ class Taped(Evaluator):
         """Return a number of the base as a constant."""
         return Traced(self, value, ())
 
+    def bare(self, number: Real) -> Real:
+        """Return the base's number of one."""
+        return _split(number)[0]
+
     def traced(self, value: Real, terms: Terms) -> Real:
         """Return a number; a row is written where its terms are many, and a constant is one of the base."""
         merged: dict[int, tuple[Integer, Real]] = {}
