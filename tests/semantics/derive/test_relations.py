@@ -16,10 +16,15 @@ from ephs.semantics.derive.slopes import Slope, Slopes
 from ephs.semantics.derive.tape import OPERATIONS, evaluate
 from ephs.semantics.primitives import midpoint
 from ephs.semantics.spaces import codes, manifold
+from ephs.semantics.special import root
 from ephs.semantics.stage import PLAIN
 
 EPS = np.finfo(float).eps
 seeds = st.integers(0, 2**20)
+
+def _rising(x, a, b):
+    return (1.0 + b) * x**3 + np.sqrt((x - a) ** 2 + 0.1) + 2.0 * x
+
 
 ENERGIES = {
     "number": ({"q": Q.displacement}, lambda q: 0.3 * q**4 + np.sin(q) + abs(q) ** 3),
@@ -34,6 +39,10 @@ ENERGIES = {
     "pose": (
         {"q": Q.pose},
         lambda q: 0.5 * (np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2) - 0.7) ** 2 + q[5] * q[1] * q[0],
+    ),
+    "root": (
+        {"a": Q.displacement, "b": Q.charge},
+        lambda a, b: root(_rising, -1.0, 1.0, np.sin(a), 1.0 / (1.0 + b * b)) ** 2 + np.sin(a + b),
     ),
     "direct": ({"q": Q.direct_pose}, lambda q: q[4] ** 2 * q[0] ** 2 + np.arctan2(q[6], 9.0 + q[5])),
 }
