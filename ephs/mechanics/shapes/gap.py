@@ -173,15 +173,19 @@ def _capsules(name: str, sizes: tuple[float, float, float, float], parallel: flo
         axes = quaternion_to_matrix(pose[:4])
         x, y, z = axes[0][2], axes[1][2], axes[2][2]
         aside, level = x * pose[4] + y * pose[5], x * x + y * y
-        along, weight = aside + z * pose[6], bend * radii
-        for _ in range(passes):
+        along = aside + z * pose[6]
+
+        def nearest(weight: Any) -> tuple[Vector, Any, Any, Any]:
             one = clamped((level * pose[6] - z * aside) / (level + weight), half1)
             two = clamped(one * z - along, half2)
             one = clamped((pose[6] + two * z) / (1.0 + weight), half1)
             away = pose[4] + two * x, pose[5] + two * y, pose[6] + two * z - one
-            length = np.sqrt(dot(away, away) + TINY)
-            weight = bend * length
-        return away, length, one, two
+            return away, np.sqrt(dot(away, away) + TINY), one, two
+
+        found = nearest(bend * radii)
+        for _ in range(passes - 1):
+            found = nearest(bend * found[1])
+        return found
 
     def distance(pose: Any) -> Any:
         _, length, at, _ = least(pose)
