@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.mechanics.constraints.redundancy import explain
+from ephs.mechanics.methods.options import options_of
 from ephs.mechanics.methods.registry import METHODS, Method, chosen
 from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.motion.motion import SceneMotion
@@ -180,12 +181,7 @@ def simulate(
     order, unit = chosen_method.order, problem.seconds
     control = control_of(problem, order, rtol, atol, step, min_step, max_step, max_steps, (start / unit, end / unit))
     told_apart(start / unit, end / unit, control.step)
-    if options is not None and not isinstance(options, Mapping):
-        raise OptionError("options", options, "a mapping from names to values")
-    if unknown := [key for key in options or {} if key not in chosen_method.options]:
-        known = ", ".join(chosen_method.options) or "none"
-        near = nearest_of(unknown[0], chosen_method.options)
-        raise OptionError("options", unknown[0], f"options of {chosen_method.name}: {known}{near}")
+    own = options_of(chosen_method, problem, options)
     times, watched = times_of(save_at, start, end), events_of(events)
     declared = np.unique(np.concatenate([jumps_of(jumps, inputs, start, end), *(one.times for one in held)]))
     asked = {
@@ -204,7 +200,7 @@ def simulate(
         breakpoints.enter(start / unit, lambda: problem.initial)
         problem.inputs(start / unit, problem.initial)
     watched, told = seen_from(problem, watched, guarded(progress))
-    course = Course(problem, chosen_method, start / unit, end / unit, control, dict(options or {}))
+    course = Course(problem, chosen_method, start / unit, end / unit, control, own)
     repeatable = not (held or any(each.stateful for each in functions))
     again = course.again(breakpoints) if repeatable else None
     bounds = Bounds.of(

@@ -20,6 +20,10 @@ UPRIGHT: Final = 1e-3
 """Inclination in rad below which a circle counts as flat: its gap is larger by this part of the radius at the most."""
 PARALLEL: Final = 1e-6
 """Square of the sine of an angle below which segments count as parallel: any of their nearest points is taken."""
+CROSSED: Final = 1e-15
+"""The same of edges, which do not act where they are parallel."""
+PASSES: Final = 3
+"""Passes to the nearest points of two segments, of lengths up to twenty radii to rounding."""
 CROSSING: Final = 1.0 / 32.0
 """Square of the way aside, in radii of edges, that edges part by from where they cross to a corner, below which they
 count as parallel: the gap at the corner is then larger by half of this part of a radius at the most."""
@@ -156,32 +160,61 @@ def into(pose: Any, vector: Vector) -> Vector:
 def segments(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
     """Gap between two capsules about the z axes of C1 and C2: segments of these half lengths, with radii.
 
-    Where they are parallel, the contact is at one of the points that are nearest.
+    The gap is the least of |x₂ − x₁| + ½ κ a² − r₁ − r₂ over points x₁ = a z of the first segment and x₂ of the second.
+    So it is smooth where segments are parallel, larger than the distance by at most `PARALLEL` half₁²/(8 (r₁ + r₂)).
+    Since κ is constant, its slope is that of |x₂ − x₁| where both points stay on their segments (envelope theorem): the
+    wrench of the normal at x₂, but for what `PASSES` leave, κ a da q² |g|/|x₂ − x₁| with q = κ half₁²/|x₂ − x₁|.
     """
+    return _capsules("segments", (half1, radius1, half2, radius2), PARALLEL, PASSES)
 
-    def beyond(pose: Any) -> tuple[Vector, Any, Any]:
+
+def _capsules(name: str, sizes: tuple[float, float, float, float], parallel: float, passes: int) -> Gap:
+    half1, radius1, half2, radius2 = sizes
+    radii = radius1 + radius2
+    bend = 0.25 * parallel / radii
+    """κ."""
+
+    def least(pose: Any) -> tuple[Vector, Any, Any, Any]:
+        """x₂ − x₁ with its length, and both points' places along the segments.
+
+        A pass finds the least |x₂ − x₁|² + k a², k the weight; wanted is that with k = κ |x₂ − x₁|. Passes begin with
+        the length of a touch, off by g. A length changes with k by a²/|x₂ − x₁| or less, so each pass leaves a part q
+        of what it is off by; the slope is off by κ − k/|x₂ − x₁|, times a da.
+        """
         axes = quaternion_to_matrix(pose[:4])
         x, y, z = axes[0][2], axes[1][2], axes[2][2]
-        along = dot((pose[4], pose[5], pose[6]), (x, y, z))
-        one = clamped((pose[6] - z * along) / (x * x + y * y + PARALLEL), half1)
-        two = clamped(one * z - along, half2)
-        one = clamped(pose[6] + two * z, half1)
-        away = pose[4] + two * x, pose[5] + two * y, pose[6] + two * z - one
-        return away, np.sqrt(dot(away, away) + TINY), two
+        aside, level = x * pose[4] + y * pose[5], x * x + y * y
+        along = aside + z * pose[6]
+
+        def nearest(weight: Any) -> tuple[Vector, Any, Any, Any]:
+            one = clamped((level * pose[6] - z * aside) / (level + weight), half1)
+            two = clamped(one * z - along, half2)
+            one = clamped((pose[6] + two * z) / (1.0 + weight), half1)
+            away = pose[4] + two * x, pose[5] + two * y, pose[6] + two * z - one
+            return away, np.sqrt(dot(away, away) + TINY), one, two
+
+        found = nearest(bend * radii)
+        for _ in range(passes - 1):
+            found = nearest(bend * found[1])
+        return found
+
+    def distance(pose: Any) -> Any:
+        _, length, at, _ = least(pose)
+        return length + 0.5 * bend * (at * at) - radii
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
-        away, length, at = beyond(pose)
+        away, length, _, at = least(pose)
         x, y, z = times(1.0 / length, into(pose, away))
         return (x, y, z), (-radius2 * x, -radius2 * y, at - radius2 * z)
 
     return Gap(
-        "segments",
-        lambda pose: beyond(pose)[1] - (radius1 + radius2),
+        name,
+        distance,
         contact,
         radius2,
         (("half1", half1), ("radius1", radius1), ("half2", half2), ("radius2", radius2)),
-        apart((0.0, 0.0, half1), (0.0, 0.0, half2), radius1 + radius2),
-        2.0 * (radius1 + radius2),
+        apart((0.0, 0.0, half1), (0.0, 0.0, half2), radii),
+        2.0 * radii,
     )
 
 
@@ -189,9 +222,10 @@ def edges(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
     """Gap between two edges of bodies whose corners meet the other body, too: `segments` that cross.
 
     Edges that are parallel within `CROSSING` touch along a line, whose ends are corners. The gap is
-    larger there by up to the lengths, so that no force jumps from end to end of a line when it tilts.
+    larger there by up to the lengths, so that no force jumps from end to end of a line when it tilts; by how much
+    depends on the angle alone, so that the slope has a moment about the common normal beside the force at the contact.
     """
-    whole, length = segments(half1, radius1, half2, radius2), half1 + half2
+    whole, length = _capsules("edges", (half1, radius1, half2, radius2), CROSSED, 1), half1 + half2
     square = CROSSING * min(radius1, radius2) * (radius1 + radius2) / max(half1, half2) ** 2
 
     def distance(pose: Any) -> Any:
@@ -202,7 +236,7 @@ def edges(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
 
     wide = whole.support.margin
     support = replace(whole.support, parallel=square * max(0.0, 1.0 - math.sqrt(wide / length)))
-    return replace(whole, name="edges", distance=distance, support=support)
+    return replace(whole, distance=distance, support=support)
 
 
 def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from ephs.mechanics.methods import registry
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve import loop
@@ -111,6 +112,74 @@ def test_an_option_that_there_is_not_is_refused():
     for method in ("rk87", "auto", "radau"):
         with pytest.raises(ephs.OptionError, match="'energy and momenta'"):
             run(scene, method, {"keep": "momenta"})
+
+
+HEAD = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n"
+BALL = """
+[bodies.{name}]
+mass = 1.0
+inertia = [4e-3, 4e-3, 4e-3]
+position = [{place}, 0.0, 0.0]
+velocity = [{speed}, 0.1, 0.0]
+[surfaces.{name}]
+body = "{name}"
+shape = {{ sphere = 0.1 }}
+"""
+PAIR = """
+[bodies.one]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+[bodies.two]
+mass = 1.0
+inertia = [0.01, 0.01, 0.01]
+position = [0.5, 0.0, 0.0]
+[joints.pin]
+type = "revolute"
+bodies = ["one", "two"]
+at = [0.3, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+rate = 1.0
+limits = [-0.1, 0.1]
+"""
+
+
+def meeting(folder, what, law):
+    """Two free bodies whose surfaces, or the stops of whose joint, meet after 0.1 s."""
+    balls = [
+        BALL.format(name=name, place=place, speed=-5.0 * place) + law for name, place in (("a", -0.15), ("b", 0.15))
+    ]
+    file = folder / "meeting.toml"
+    file.write_text(HEAD + ("\n".join(balls) if what == "surfaces" else PAIR + law), encoding="utf-8")
+    return ephs.load(file)
+
+
+@pytest.mark.parametrize("method", [*(name for name, one in registry.METHODS.items() if one.impacts), "auto"])
+@pytest.mark.parametrize(
+    ("what", "law", "path"),
+    [("surfaces", "restitution = 0.5", r"contacts\.a_b"), ("stops", "limit_restitution = 0.5", r"joints\.pin")],
+)
+def test_momenta_are_refused_beside_impulses_before_anything_is_done(what, law, path, method, tmp_path):
+    """And what is hard is named."""
+    scene, journal = meeting(tmp_path, what, law), tmp_path / "run.journal"
+    with pytest.raises(ephs.OptionError, match=rf"'keep'\] is 'energy and momenta', expected 'energy': {path}"):
+        ephs.simulate(scene, 0.2, method=method, options=BOTH, journal=journal)
+    assert not journal.exists()
+
+
+@pytest.mark.parametrize(("what", "law"), [("surfaces", "restitution = 0.5"), ("stops", "limit_restitution = 0.5")])
+def test_the_balance_alone_is_kept_beside_impulses(what, law, tmp_path):
+    sol = run(meeting(tmp_path, what, law), "rk54", {"keep": "energy"})
+    assert any(event.name.endswith("strikes") for event in sol.events) and sol.energy_error.max() <= ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("what", "law"), [("surfaces", "stiffness = 1e3\nloss = 0.2"), ("stops", "limit_stiffness = 100.0")]
+)
+def test_momenta_are_kept_through_elastic_blows(what, law, tmp_path):
+    scene = meeting(tmp_path, what, law)
+    sol = run(scene, "rk54", BOTH)
+    assert sol.potential.max() > 0.0  # they meet
+    assert sol.stats["momenta"] == 6 and drift(scene, sol) <= ROUNDING and sol.energy_error.max() <= ROUNDING
 
 
 CART = """format = 1

@@ -1,0 +1,35 @@
+"""Options of a method's run: those that the method has, and that the problem lets it honour."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from ephs.mechanics.methods.registry import Method
+from ephs.mechanics.tree.equations.accounts import KEEP
+from ephs.mechanics.tree.finding.roles import strikes
+from ephs.solve.errors import OptionError, nearest_of
+from ephs.solve.problem import Problem
+
+
+def options_of(method: Method, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The options of a run.
+
+    Raises
+    ------
+    OptionError
+        They are no mapping, the method has no such option, or steps with impulses cannot keep what is asked for.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise OptionError("options", given, "a mapping from names to values")
+    if unknown := [key for key in given if key not in method.options]:
+        known = ", ".join(method.options) or "none"
+        raise OptionError(
+            "options", unknown[0], f"options of {method.name}: {known}{nearest_of(unknown[0], method.options)}"
+        )
+    energy, both = KEEP
+    hard = strikes(problem.descriptor.components)
+    if hard is not None and given.get("keep") == both:
+        expected = f"{energy!r}: {hard} acts by impulses, beside which steps keep no momenta"
+        raise OptionError("options['keep']", both, expected)
+    return dict(given)

@@ -1,0 +1,145 @@
+"""Gaps of plain shapes: their exact slopes are wrenches of the normal at the contact point, parallel axes included."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ephs.mechanics.elements.contact import lever
+from ephs.mechanics.shapes.gap import (
+    CROSSED,
+    CROSSING,
+    PARALLEL,
+    PASSES,
+    edges,
+    plane_rim,
+    plane_sphere,
+    rounded_box_sphere,
+    segments,
+    sphere_rounded_box,
+)
+from ephs.semantics.derive.recording import record
+from ephs.semantics.derive.slopes import Slope, Slopes
+from ephs.semantics.derive.tape import over_step
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.stage.plain import PLAIN
+
+SEEDS = st.integers(0, 2**32 - 1)
+ROUNDING = 4e-13
+"""Of some two hundred operations, relative to the lengths that they begin with: 8 n ε."""
+ROUND = {
+    "plane_sphere": plane_sphere(0.1),
+    "plane_rim": plane_rim(0.2),
+    "sphere_rounded_box": sphere_rounded_box(0.1, (0.2, 0.1, 0.3), 0.05),
+    "rounded_box_sphere": rounded_box_sphere((0.2, 0.0, 0.3), 0.05, 0.1),
+}
+
+
+def slope(gap, pose):
+    """(6,) the derivative of a gap along twists of C2, by the program's own rules at a step of no length."""
+    found = record(gap.distance, {"pose": 7})
+    given = [Slope(np.float64(x), np.float64(x), {i: np.float64(1.0)}) for i, x in enumerate(pose)]
+    whole = over_step(Slopes(PLAIN), found.tape, given, [np.float64(x) for x in found.parameters]).slopes
+    (w, x, y, z), turn = pose[:4], quaternion_to_matrix(pose[:4])
+    quaternions = 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+    by = np.array([whole.get(i, 0.0) for i in range(7)])
+    return np.concatenate([by[:4] @ quaternions, by[4:] @ turn])
+
+
+def wrench(gap, pose):
+    """(6,) of a unit force along the normal at the contact point."""
+    return np.array(lever(*gap.contact(pose)))
+
+
+def tilted(rng, angle):
+    """A rotation whose z axis is off that of the ground by an angle of this size; any, where it is 1 or more."""
+    turn = rng.normal(size=4) if angle >= 1.0 else np.array([1.0, *(0.5 * angle * rng.normal(size=2)), rng.normal()])
+    return turn / np.linalg.norm(turn)
+
+
+def beside(rng, turn, half1, half2, far):
+    """Pose of a segment that is so far from another one: across both, or anywhere around the points that face."""
+    axis = quaternion_to_matrix(turn)[:, 2]
+    way = np.cross([0.0, 0.0, 1.0], axis)
+    if np.linalg.norm(way) < 1e-12 or rng.random() < 0.3:
+        way = rng.normal(size=3)
+    one, other = np.clip(rng.uniform(-1.3, 1.3, 2), -1.0, 1.0) * [half1, half2]
+    return np.concatenate([turn, [0.0, 0.0, one] + far * way / np.linalg.norm(way) - other * axis])
+
+
+def drawn(rng, slender):
+    """Sizes of two segments, the longer up to so many radii long, and a pose in which they nearly touch."""
+    radii = rng.uniform(0.02, 0.2, 2)
+    half1, half2 = rng.uniform(0.1, 1.0, 2) * slender * radii.sum()
+    pose = beside(rng, tilted(rng, 10.0 ** rng.uniform(-8, 0.5)), half1, half2, radii.sum() * rng.uniform(0.5, 1.5))
+    return (half1, radii[0], half2, radii[1]), pose
+
+
+@pytest.mark.parametrize("name", ROUND)
+@given(seed=SEEDS)
+@settings(max_examples=15, deadline=None)
+def test_slopes_of_round_shapes_are_wrenches(name, seed):
+    rng, gap = np.random.default_rng(seed), ROUND[name]
+    pose = np.concatenate([tilted(rng, 10.0 ** rng.uniform(-8, 0.5)), rng.normal(size=3)])
+    assert np.abs(slope(gap, pose) - wrench(gap, pose)).max() <= ROUNDING * (1.0 + np.abs(pose).sum())
+
+
+def errors(sizes, pose, length, parallel, passes):
+    """What the slopes of `segments` are off by at most: by rounding, and by passes, as its docstring says."""
+    half1, radius1, half2, radius2 = sizes
+    radii, (x, y, _) = radius1 + radius2, quaternion_to_matrix(pose[:4])[:, 2]
+    bend, reach = 0.25 * parallel / radii, half1 + half2 + radii
+    # the place a is a quotient: of its numerator no derivative is above 4 (1 + reach), of its denominator above 2
+    place = (4.0 * (1.0 + reach) + 2.0 * half1) / (x * x + y * y + bend * length)
+    left = bend * half1 * place * (bend * half1**2 / length) ** (passes - 1) * abs(length - radii) / length
+    return ROUNDING * (1.0 + reach) ** 2 / length, left
+
+
+@pytest.mark.parametrize("slender", [1.0, 10.0, 50.0])
+@given(seed=SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_slopes_of_segments_are_wrenches(slender, seed):
+    """To rounding where they are not slender, whatever their angle."""
+    sizes, pose = drawn(np.random.default_rng(seed), slender)
+    gap = segments(*sizes)
+    length = float(gap.distance(pose)) + sizes[1] + sizes[3]
+    rounding, left = errors(sizes, pose, length, PARALLEL, PASSES)
+    assert np.abs(slope(gap, pose) - wrench(gap, pose)).max() <= rounding + (left if slender > 1.0 else 0.0)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_slopes_of_edges_are_wrenches_and_moments_about_the_common_normal(seed):
+    """Moments only where they are nearly parallel, which lengthens the gap."""
+    sizes, pose = drawn(np.random.default_rng(seed), 10.0)
+    half1, radius1, half2, radius2 = sizes
+    gap, axes = edges(*sizes), quaternion_to_matrix(pose[:4])
+    sine = float(np.hypot(axes[0, 2], axes[1, 2]))
+    square = CROSSING * min(radius1, radius2) * (radius1 + radius2) / max(half1, half2) ** 2
+    if sine**2 < 0.25 * square:
+        return  # too parallel to act
+    length = float(segments(*sizes).distance(pose)) + radius1 + radius2
+    rest, most = slope(gap, pose) - wrench(gap, pose), sum(errors(sizes, pose, length, CROSSED, 1))
+    assert np.abs(rest[3:]).max() <= most
+    if sine**2 >= square:
+        assert np.abs(rest).max() <= most
+    else:
+        moment = 4.0 * (half1 + half2) * sine / square
+        assert np.abs(np.array([axes[2], [0.0, 0.0, 1.0]]) @ rest[:3]).max() <= most + ROUNDING * moment
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None)
+def test_gaps_of_segments_change_by_no_more_than_their_points_move(seed):
+    """So they are continuous, where axes come to be parallel, too."""
+    rng = np.random.default_rng(seed)
+    sizes, pose = drawn(rng, 10.0)
+    gap, twist = segments(*sizes), rng.normal(size=6)
+    if rng.random() < 0.5:
+        twist[:2] = -2.0 * pose[1:3] / pose[0]  # to where they are parallel, nearly
+    size = 10.0 ** rng.uniform(-9, 0)
+    after = SE3.compose(pose, SE3.exp(size * twist))
+    moved = size * (np.linalg.norm(twist[3:]) + np.linalg.norm(twist[:3]) * (sizes[2] + np.linalg.norm(twist[3:])))
+    reach = sum(sizes)
+    assert abs(float(gap.distance(after)) - float(gap.distance(pose))) <= moved + ROUNDING * reach
