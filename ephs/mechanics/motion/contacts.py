@@ -106,12 +106,14 @@ def contact_poses(scene: Scene, read: Moving) -> Iterator[tuple[Path, Path | Non
         bodies, touches = contact_points(scene, of)
         one, other = (read.poses(body) for body in bodies)
         before: dict[bytes, Path] = {}
+        into: dict[bytes, Array] = {}
         for i, (frame1, frame2, _) in enumerate(touches):
             path = component_path("contacts", name) / f"point{i}" / "pe" / "q_r"
-            axes = frame1[:4].tobytes() + frame2[:4].tobytes()
-            ends = (compose(pose, np.broadcast_to(o, pose.shape)) for pose, o in ((one, frame1), (other, frame2)))
-            first, second = ends
-            yield path, before.get(axes), compose(inverse(first), second)[:, 4:]
+            axes, key = frame1[:4].tobytes() + frame2[:4].tobytes(), frame1.tobytes()
+            if key not in into:  # points on a plane share it
+                into[key] = inverse(compose(one, np.broadcast_to(frame1, one.shape)))
+            end = other[:, 4:] + turned(other, np.broadcast_to(frame2[4:], (len(other), 3)))
+            yield path, before.get(axes), into[key][:, 4:] + turned(into[key], end)
             before.setdefault(axes, path)
 
 
