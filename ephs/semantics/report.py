@@ -74,12 +74,15 @@ def check_structure(system: System) -> CheckItem:
     count = 0
     slow: list[str] = []
     searched: list[Path] = []
+    known: set[int] = set()  # of values that fill several boxes, which the system keeps alive
     for path, primitive in system.leaves():
         count += 1
         if primitive.kernel is None:
             slow.append(f"{path} ({obstacle(primitive)})")
         try:
-            search(primitive, PROBES)
+            if id(primitive) not in known:
+                search(primitive, PROBES)
+                known.add(id(primitive))
             if primitive.verdict != "proved":
                 searched.append(path)
         except SemanticsError as error:

@@ -165,6 +165,10 @@ class Motion(Protocol):
         mechanism's length."""
         ...
 
+    def contact_poses(self) -> Iterable[tuple[Path, Path | None, Array]]:
+        """States that follow from others up to rounding: path, a path before with the same rotation, place (n, 3)."""
+        ...
+
     def leaps(self, h: float) -> Iterable[tuple[Path, int, float]]:
         """Contacts passed in a step of at most h s: path, instant after it, distance of the step in thicknesses."""
         ...

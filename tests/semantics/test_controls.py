@@ -154,19 +154,23 @@ def test_a_route_that_takes_a_state_from_elsewhere_is_not_natural(monkeypatch):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda pattern: Subspace(np.eye(power_form(pattern).shape[0])), "dimension"),
-        (lambda pattern: Subspace(np.eye(len(power_form(pattern)))[:, : len(power_form(pattern)) // 2]), "conserved"),
+        (lambda n: Subspace(np.eye(n)), "dimension"),
+        (lambda n: Subspace(np.eye(n)[:, : n // 2]), "conserved"),
     ],
 )
 def test_power_that_is_not_conserved_or_too_many_freedoms_fail_for_patterns(monkeypatch, wrong, words):
-    monkeypatch.setattr(laws, "pattern_relation", wrong)
+    def whole(pattern):
+        n = len(power_form(pattern))
+        return [(list(range(n)), wrong(n))]
+
+    monkeypatch.setattr(laws, "junction_relations", whole)
     verdict = system_law("Tellegen")(random_probe(system()))
     assert not verdict.holds and words in verdict.detail
 
 
 def test_a_wrong_dimension_is_told_with_the_right_one(monkeypatch):
     alone = as_system(lib.spring(k=1.0))
-    monkeypatch.setattr(laws, "pattern_relation", lambda pattern: Subspace(np.eye(4)))
+    monkeypatch.setattr(laws, "junction_relations", lambda pattern: [([0, 1, 2, 3], Subspace(np.eye(4)))])
     assert system_law("Tellegen")(random_probe(alone)) == Verdict(np.inf, 0.0, ".: dimension 4, expected 2")
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.semantics.spaces import PAIRS, pair
+from ephs.solve.result import file, guard
 from ephs.solve.result.labels import freedoms, labels_of
 from ephs.testing import mechanisms, systems
 
@@ -143,11 +144,128 @@ def test_files_of_format_2_are_read(tmp_path):
     same(ephs.load_solution(tmp_path / "old.nc"), sol)
 
 
-@pytest.mark.parametrize("found", [1, 4, None])
+FALLING = """
+format = 1
+name = "falling"
+[bodies.box]
+mass = 2.0
+inertia = [0.1, 0.2, 0.3]
+position = [0.0, 0.0, 0.15]
+angular_velocity = [1.0, 0.5, 0.0]
+[bodies.ball]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.05, 0.0, 1.0]
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+[surfaces.box]
+body = "box"
+shape = { box = [0.2, 0.3, 0.2] }
+stiffness = 1e4
+[surfaces.ball]
+body = "ball"
+shape = { sphere = 0.1 }
+stiffness = 1e4
+"""
+
+RESTING = """
+format = 1
+name = "resting"
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.stone]
+mass = 2.0
+inertia = [0.1, 0.2, 0.3]
+position = [0.0, 0.0, 2.0]
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+[surfaces.stone]
+body = "stone"
+shape = {{ points = {corners} }}
+stiffness = 1e4
+"""
+
+
+def falling(folder, text=FALLING):
+    (folder / "falling.toml").write_text(text)
+    return ephs.load(folder / "falling.toml")
+
+
+@pytest.mark.parametrize(
+    "options", [{"step": 1e-3}, {"method": "rk54"}, {"method": "semi", "rtol": 1e-3}, {"method": "radau"}]
+)
+def test_contacts_come_back_bit_by_bit_though_a_file_lacks_what_follows(tmp_path, options):
+    """Poses of points follow from those of bodies; ledgers of what is out of reach are zero."""
+    sol = ephs.simulate(falling(tmp_path), 0.2, audit="off", **options)
+    assert sol.contact("floor_box").gap.min() < 0.0 < sol.contact("floor_ball").gap.min()
+    same(through_a_file(sol, tmp_path), sol)
+    with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
+        names = {str(name) for name in data.variables}
+        rest = data["relative_pose_rest"].values
+    assert not [name for name in names if name.startswith("state:contacts") and name.endswith("q_r")]
+    assert "storages:contacts.floor_ball.point0.pe" not in names
+    assert any(name.startswith("storages:contacts.floor_box.") for name in names)
+    assert np.abs(rest[:, 3:]).max() <= 1e-9  # what follows up to rounding, and drift of natural steps
+
+
+def test_a_pose_that_does_not_follow_is_written(tmp_path):
+    """It may differ from the bodies' poses by more than a difference can tell, as after a turn."""
+    sol = ephs.simulate(falling(tmp_path), 0.01, step=1e-3)
+    path = ephs.operad.Path.of("contacts.floor_box.point1.pe.q_r")
+    sol.states[path][:] = np.random.default_rng(1).standard_normal(sol[path].shape) * 1e-30
+    same(through_a_file(sol, tmp_path), sol)
+
+
+def test_a_file_is_never_so_dense_that_readers_refuse_it(tmp_path, monkeypatch):
+    """Most of the file is zero: many points of a body at rest."""
+    corners = np.random.default_rng(2).standard_normal((60, 3))
+    corners /= np.linalg.norm(corners, axis=1)[:, None]
+    sol = ephs.simulate(falling(tmp_path, RESTING.format(corners=corners.tolist())), 0.5, step=1e-3, audit="off")
+    sizes = []
+    for most in (guard.MOST, 2):
+        for module in (guard, file):
+            monkeypatch.setattr(module, "MOST", most)
+        same(through_a_file(sol, tmp_path), sol)
+        sizes.append((tmp_path / "sol.nc").stat().st_size)
+    assert sizes[0] < 0.5 * sizes[1]
+
+
+def test_files_of_format_3_are_read(tmp_path):
+    """They had everything."""
+    sol = ephs.simulate(falling(tmp_path), 0.01, step=1e-3)
+    data = sol.to_xarray()
+    data.attrs["ephs_format"] = 3
+    data.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    same(ephs.load_solution(tmp_path / "old.nc"), sol)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: data.drop_vars("state:bodies.box.pe.q"), "bodies.box.pe.q"),
+        (lambda data: data.isel({"relative pose component": slice(0, 3)}), "has the shape"),
+        (
+            lambda data: data.assign_coords({"relative pose": [f"a{i}" for i in range(data.sizes["relative pose"])]}),
+            "a0",
+        ),
+        (lambda data: data.assign_coords({"relative pose": np.arange(data.sizes["relative pose"])}), "expected text"),
+    ],
+)
+def test_files_that_lack_what_poses_follow_from_are_refused(tmp_path, change, words):
+    ephs.simulate(falling(tmp_path), 0.01, step=1e-3).save(tmp_path / "sol.nc")
+    with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
+        change(data.load()).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
+    with pytest.raises(ValueError, match=words):
+        ephs.load_solution(tmp_path / "less.nc")
+
+
+@pytest.mark.parametrize("found", [1, 5, None])
 def test_other_formats_are_refused(tmp_path, found):
     data = xr.Dataset({}, {}, {} if found is None else {"ephs_format": found})
     data.to_netcdf(tmp_path / "sol.nc", engine="h5netcdf")
-    with pytest.raises(ValueError, match=rf"sol\.nc: ephs_format is {found}, expected one of 2, 3"):
+    with pytest.raises(ValueError, match=rf"sol\.nc: ephs_format is {found}, expected one of 2, 3, 4"):
         ephs.load_solution(tmp_path / "sol.nc")
 
 

@@ -1,6 +1,6 @@
 """Frames at constant offsets from those of bodies, as components."""
 
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 CARRIED: Final = Linear("frame_change")
+KEPT: Final = 4096
+"""Components that are shared by their offset: points of contact with one surface have the same frame there."""
 
 
 def frame_change(offset: "ArrayLike", inner: str, outer: str) -> Reversible:
@@ -23,7 +25,12 @@ def frame_change(offset: "ArrayLike", inner: str, outer: str) -> Reversible:
 
     inner.e = Ad_{o⁻¹} outer.e, outer.f = −Ad*_{o⁻¹} inner.f.
     """
-    pose = tuple(np.asarray(offset, dtype=float).tolist())
+    return _frame_change(np.asarray(offset, dtype=float).tobytes(), inner, outer)
+
+
+@lru_cache(maxsize=KEPT)
+def _frame_change(offset: bytes, inner: str, outer: str) -> Reversible:
+    pose = tuple(np.frombuffer(offset).tolist())
     structure = partial(_carrying, pose)
     return Reversible(
         "frame_change",

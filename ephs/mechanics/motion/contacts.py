@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from ephs.mechanics.elements.contact import lever, losses
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, inverse, turned
 from ephs.mechanics.motion.moving import Moving
-from ephs.mechanics.scene.build import contact_points
+from ephs.mechanics.scene.build import component_path, contact_points
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.scene.surfaces import Contact
 from ephs.mechanics.shapes.gap import Gap, ramp
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
+from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import SPANNED
 
@@ -96,6 +97,24 @@ def contact_motion(scene: Scene, of: Contact, read: Pressed) -> ContactMotion:
         forces.transpose(1, 0, 2),
         *_masks(of, read, len(points), len(touching)),
     )
+
+
+def contact_poses(scene: Scene, read: Moving) -> Iterator[tuple[Path, Path | None, Array]]:
+    """Relative poses of points of contacts by the poses of the bodies: the path of the state, that of a point of this
+    contact before with equal axes, if any, and the place (n, 3) in m."""
+    for name, of in scene.all_contacts():
+        bodies, touches = contact_points(scene, of)
+        one, other = (read.poses(body) for body in bodies)
+        before: dict[bytes, Path] = {}
+        into: dict[bytes, Array] = {}
+        for i, (frame1, frame2, _) in enumerate(touches):
+            path = component_path("contacts", name) / f"point{i}" / "pe" / "q_r"
+            axes, key = frame1[:4].tobytes() + frame2[:4].tobytes(), frame1.tobytes()
+            if key not in into:  # points on a plane share it
+                into[key] = inverse(compose(one, np.broadcast_to(frame1, one.shape)))
+            end = other[:, 4:] + turned(other, np.broadcast_to(frame2[4:], (len(other), 3)))
+            yield path, before.get(axes), into[key][:, 4:] + turned(into[key], end)
+            before.setdefault(axes, path)
 
 
 def _masks(of: Contact, read: Pressed, points: int, instants: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

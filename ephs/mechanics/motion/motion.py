@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, included, rotations
 from ephs.mechanics.motion.beams import BeamMotion, beam_motion
-from ephs.mechanics.motion.contacts import ContactMotion, contact_motion
+from ephs.mechanics.motion.contacts import ContactMotion, contact_motion, contact_poses
 from ephs.mechanics.motion.gaps import open_by, span_of
 from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.moving import ByPath, Moving
@@ -181,6 +181,10 @@ class SceneMotion:
     def contact(self, name: str) -> ContactMotion:
         """Gap, force, slip and heat of a contact."""
         return contact_motion(self._scene, _of_name("contact", name, dict(self._scene.all_contacts())), self)
+
+    def contact_poses(self) -> Iterator[tuple[Path, Path | None, Array]]:
+        """Relative poses of points of contacts by the poses of the bodies; see `contacts.contact_poses`."""
+        return contact_poses(self._scene, self)
 
     def beam(self, name: str) -> BeamMotion:
         """Nodes, strains, forces and moments of a beam."""

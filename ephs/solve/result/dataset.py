@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from ephs.solve.result.solution import Solution
 
-FORMAT = 3
+FORMAT = 4
 _LEDGERS = {
     "kinetic": ("J", "energy of what holds momenta or fluxes"),
     "potential": ("J", "energy of what holds neither momenta nor entropies"),

@@ -11,33 +11,44 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.problem import Problem
-from ephs.solve.result.dataset import FORMAT, TIME, Variable, content
+from ephs.solve.result.dataset import FORMAT, TIME, Content, Variable, content
 from ephs.solve.result.durable import durable
-from ephs.solve.result.guard import name_for_file, name_from_file
+from ephs.solve.result.guard import MOST, name_for_file, name_from_file
 from ephs.solve.result.labels import Labels, labels_of
 from ephs.solve.result.ledger import Ledgers
+from ephs.solve.result.omitted import AXES, REST, restored, shortened, with_zeros
 from ephs.solve.result.solution import Solution
 
-READ = (2, FORMAT)
+READ = (2, 3, FORMAT)
 Inputs = Mapping[Path, Array]
 
 
 def save(solution: Solution, path: File, *, wrenches: bool) -> None:
     """Write a solution; an older file of that name stays whole until the new one is."""
+
+    found = shortened(solution, content(solution, wrenches=wrenches))
+    with durable(path) as temporary:
+        _write(found, temporary, "gzip")
+        if sum(variable.values.nbytes for variable in found.variables.values()) > MOST / 2 * temporary.stat().st_size:
+            _write(found, temporary, None)  # readers refuse what grows beyond measure
+
+
+def _write(found: Content, path: File, compression: str | None) -> None:
     import h5netcdf
     import h5py
 
-    found = content(solution, wrenches=wrenches)
     text = h5py.string_dtype()
-    with durable(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    with h5netcdf.File(path, "w") as file:
         file.dimensions = {"t": found.t.size, **{name_for_file(axis): len(names) for axis, names in found.axes.items()}}
         for axis, names in found.axes.items():
             file.create_variable(name_for_file(axis), (name_for_file(axis),), data=np.array(names, object), dtype=text)
         file.create_variable("t", ("t",), data=found.t).attrs.update(TIME)
         for name, variable in found.variables.items():
             dimensions = tuple(map(name_for_file, variable.dimensions))
-            values = np.asarray(variable.values)
-            written = file.create_variable(name_for_file(name), dimensions, data=values, dtype=values.dtype)
+            values, options = np.asarray(variable.values), {}
+            if name == REST and compression is not None:
+                options = {"compression": compression, "compression_opts": 1, "shuffle": True}
+            written = file.create_variable(name_for_file(name), dimensions, data=values, dtype=values.dtype, **options)
             written.attrs.update(variable.attributes)
         file.attrs.update(found.attributes)
 
@@ -64,7 +75,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
             if found not in READ:
                 raise ValueError(f"{file}: ephs_format is {found}, expected one of {', '.join(map(str, READ))}")
             groups = _groups(file, opened)
-            t = _values(opened["t"])
+            t, rest = _values(opened["t"]), _rest(file, opened)
     except OSError as error:
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
     states = groups.get("state", {})
@@ -72,22 +83,24 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         path: Variable.of(each.values, each.labels, str(each.attributes["long_name"]))
         for path, each in groups.get("input", {}).items()
     }
-    model = attributes["model"]
+    model, temperature = attributes["model"], float(attributes["reference_temperature"])
     problem = problem_of(model, t, {path: given.values for path, given in inputs.items()}) if model else None
     if problem is not None:
         labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
     else:
         labels = {path: each.labels for path, each in states.items()}
-    return Solution(
-        attributes["name"],
-        t,
-        {path: each.values for path, each in states.items()},
-        _ledgers(groups, float(attributes["reference_temperature"])),
-        _stats(json.loads(attributes["stats"]), problem),
-        problem,
-        labels,
-        inputs,
-    )
+    known, books = {path: each.values for path, each in states.items()}, _ledgers(groups, temperature)
+    if problem is not None and problem.motion is not None:
+        short = Solution(attributes["name"], t, known, books, {}, problem, labels, inputs)
+        if rest:
+            try:
+                known = restored(known, rest, problem.motion(short).contact_poses())
+            except KeyError as error:
+                raise ValueError(f"{file}: {REST} or a state is of another model: {error.args[0]}") from error
+        known = {slot.path: known[slot.path] for slot in problem.descriptor.states if slot.path in known}
+        books = with_zeros(books, problem, t.size)
+    stats = _stats(json.loads(attributes["stats"]), problem)
+    return Solution(attributes["name"], t, known, books, stats, problem, labels, inputs)
 
 
 @final
@@ -109,6 +122,19 @@ class _Stored:
         size = self.values.shape[1]
         each = units.split(", ")
         return Labels(self.dimension, self.names, tuple(each if len(each) == size else each * size) or ("1",))
+
+
+def _rest(file: File, opened: Any) -> dict[Path, Array]:
+    """What is left of relative poses, by their paths."""
+    if REST not in opened:
+        return {}
+    array = opened[REST]
+    if array.ndim != 3 or array.shape[:2] != (opened["t"].size, len(AXES)) or not len(array.dims[2]):
+        raise ValueError(f"{file}: {REST} has the shape {array.shape}, expected instants, {len(AXES)}, and named poses")
+    names, values = array.dims[2][0], _values(array)
+    if names.dtype.kind != "O":
+        raise ValueError(f"{file}: {REST} has poses named by {names.dtype}, expected text")
+    return {Path.of(path): values[:, :, i] for i, path in enumerate(map(str, names.asstr()[...]))}
 
 
 def _groups(file: File, opened: Any) -> dict[str, dict[Path, _Stored]]:
