@@ -57,11 +57,12 @@ def root(function: Callable[..., Any], low: Any, high: Any, *given: Any) -> Any:
     recorded = next((each for each in (low, high, *given) if isinstance(each, Recorded)), None)
     if recorded is not None:
         return recorded.root(function, low, high, given)
+    middle = 0.5 * (low + high)
     for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
         above = function(middle, *given) > 0.0
-        low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return 0.5 * (low + high)
+        low, high = choose(above, low, middle), choose(above, middle, high)
+        middle = 0.5 * (low + high)
+    return middle
 
 
 def squared_turn(q: Any) -> Any:

@@ -102,7 +102,10 @@ def _points(draft: Draft, name: str) -> Array | None:
         draft.leave("contacts with meshes that are neither STL nor OBJ", name)
         return None
     try:
-        return readers[file.suffix.lower()](file)
+        points = readers[file.suffix.lower()](file)
+        if not len(points) or not np.all(np.isfinite(points)):
+            raise ValueError("a number that is not finite" if len(points) else "no points")
+        return points
     except (ValueError, OSError) as error:
         draft.leave("contacts with meshes that cannot be read", f"{name} ({error})")
         return None

@@ -225,7 +225,8 @@ def _disc(centre: Vector, axis: Vector, size: float, pull: Callable[[Vector], Ve
 
     sine, cosine = turned(root(rising, -1.0, 1.0, along, abs(aside), centre[2], lean, rise))
     across, upon = size * rise * sine, clamped(-aside, size * cosine)
-    return centre[0] + x * across - y * upon, centre[1] + y * across + x * upon, centre[2] - size * lean * sine
+    off = x * across - y * upon, y * across + x * upon, -size * lean * sine
+    return moved(moved(centre, 1.0, off), -dot(off, axis), axis)  # chords are in the disc but for `LEANING`
 
 
 # ---- bodies ------------------------------------------------------------------------------------------------------

@@ -204,7 +204,11 @@ class Recorded:
 
     def root(self, function: Callable[..., Any], low: Any, high: Any, given: Sequence[Any]) -> "Recorded":
         """Where an increasing function of a number and of those given is zero, between two ends."""
-        found = record(lambda x, more: function(x, *more), {"x": None, "more": len(given)})
+
+        def called(x: Any, more: Sequence[Any]) -> Any:
+            return function(x, *more)
+
+        found = record(called, {"x": None, "more": len(given)})
         numbers = (low, high, *given, *found.parameters)
         return self.of("root", *(_place(each, self.recorder) for each in numbers), number=found.tape)
 

@@ -207,6 +207,8 @@ URDF_NOTES = {
     "no file": (robot(collision('<mesh filename="none.stl"/>')), "meshes that are no readable file.*: none.stl"),
     "dae": (robot(collision('<mesh filename="x.dae"/>')), "contacts with meshes that are neither STL nor OBJ: x.dae"),
     "broken": (robot(collision('<mesh filename="broken.stl"/>')), r"contacts with meshes that cannot be read: broken"),
+    "empty": (robot(collision('<mesh filename="empty.obj"/>')), r"contacts with .* read: empty.obj \(no points\)"),
+    "infinite": (robot(collision('<mesh filename="inf.obj"/>')), r"contacts with .* read: inf.obj \(a number that"),
     "flat": (robot(collision('<mesh filename="flat.obj"/>')), "contacts with meshes that have no volume: l0"),
     "concave": (
         robot(collision('<mesh filename="dent.obj"/>')), r"contacts inside of convex hulls: l0 \(0.25 m deep\)",
@@ -233,6 +235,8 @@ def test_what_is_lost_of_a_urdf_is_said_by_name(kind, tmp_path):
     text, said = URDF_NOTES[kind]
     (tmp_path / "x.dae").write_text("<COLLADA/>", encoding="utf-8")
     (tmp_path / "broken.stl").write_text("vertex 1 2", encoding="utf-8")
+    (tmp_path / "empty.obj").write_text("# cut off", encoding="utf-8")
+    (tmp_path / "inf.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 inf\n", encoding="utf-8")
     (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n", encoding="utf-8")
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     dent = [*corners.tolist(), [0.5, 0.5, 0.75]]

@@ -11,6 +11,7 @@ from ephs.mechanics.shapes.gap import (
     CROSSING,
     PARALLEL,
     PASSES,
+    UPRIGHT,
     edges,
     plane_rim,
     plane_sphere,
@@ -18,6 +19,7 @@ from ephs.mechanics.shapes.gap import (
     segments,
     sphere_rounded_box,
 )
+from ephs.mechanics.shapes.solids import LEANING, cylinder, meeting, point, rim, segment
 from ephs.semantics.derive.recording import record
 from ephs.semantics.derive.slopes import Slope, Slopes
 from ephs.semantics.derive.tape import over_step
@@ -83,6 +85,45 @@ def test_slopes_of_round_shapes_are_wrenches(name, seed):
     rng, gap = np.random.default_rng(seed), ROUND[name]
     pose = np.concatenate([tilted(rng, 10.0 ** rng.uniform(-8, 0.5)), rng.normal(size=3)])
     assert np.abs(slope(gap, pose) - wrench(gap, pose)).max() <= ROUNDING * (1.0 + np.abs(pose).sum())
+
+
+def touched(rng, feature, body, *, first):
+    """A gap of a feature and a body, and a pose in which they touch: any, or with axes nearly parallel or crossing."""
+    gap, way = meeting(feature, body, first=first), rng.normal(size=3)
+    turn = NEARLY[rng.integers(3)] + 10.0 ** rng.uniform(-6.0, 1.0) * rng.normal(size=4)
+    near, far = 0.0, 5.0
+    for _ in range(30):
+        middle = 0.5 * (near + far)
+        pose = np.concatenate([turn / np.linalg.norm(turn), middle * way / np.linalg.norm(way)])
+        near, far = (middle, far) if float(gap.distance(pose)) < 0.0 else (near, middle)
+    return gap, pose
+
+
+NEARLY = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
+FOUND = {
+    "rim on a cap": (rim(0.3, 0.03), cylinder(0.25, 0.2, 0.02, 0.05), 0.25),
+    "edge on a cylinder": (segment(0.4, 0.03), cylinder(0.25, 0.2, 0.02), 0.4),
+    "point on a cylinder": (point(0.03), cylinder(0.25, 0.2, 0.02), 0.0),
+}
+"""Feature, body, and the length over which the gap is longer by `UPRIGHT` at the most."""
+
+
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize("name", FOUND)
+@given(seed=SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_slopes_of_features_are_along_wrenches(name, first, seed):
+    """The points that are searched are stationary, so nothing but the size of the slope differs.
+
+    Chords of a disc are off by `LEANING`, and their nearest point moves along the disc by its size where it tilts by
+    `UPRIGHT`.
+    """
+    feature, body, length = FOUND[name]
+    gap, pose = touched(np.random.default_rng(seed), feature, body, first=first)
+    found, expected = slope(gap, pose), wrench(gap, pose)
+    size = found @ expected / (expected @ expected)
+    assert np.abs(found - size * expected).max() <= LEANING / UPRIGHT
+    assert abs(size - 1.0) <= UPRIGHT * length / (feature.radius + body.radius) + LEANING
 
 
 def errors(sizes, pose, length, parallel, passes):

@@ -22,6 +22,7 @@ from ephs.semantics.stage import PLAIN
 EPS = np.finfo(float).eps
 seeds = st.integers(0, 2**20)
 
+
 def _rising(x, a, b):
     return (1.0 + b) * x**3 + np.sqrt((x - a) ** 2 + 0.1) + 2.0 * x
 
