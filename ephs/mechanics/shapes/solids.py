@@ -190,10 +190,10 @@ def side(size: float, half: float, radius: float) -> Feature:
         along = clamped(crossing + (clamped(high, body.halves[2]) - high) * axis[2], half)
         inside = moved(centre, along, axis)
         square = inside[0] * inside[0] + inside[1] * inside[1] + TINY
-        far, beyond = np.sqrt(square), along - crossing
+        far, beyond, over = np.sqrt(square), along - crossing, inside[2] - clamped(inside[2], body.halves[2])
         nearer = 1.0 - size / far
         at = nearer * inside[0], nearer * inside[1], inside[2]
-        return at, np.sqrt(square + barrel * along * along) - far + beyond * beyond / radius
+        return at, np.sqrt(square + barrel * along * along) - far + (beyond * beyond + over * over) / radius
 
     numbers = (("size", size), ("half", half), ("radius", radius))
     return Feature("side", spot, radius, (size, size, half), numbers)
