@@ -1,8 +1,7 @@
 """Gaps between features and solid bodies: points, segments and rims against polyhedra and cylinders.
 
 A body gives the distance of points from its core; its surface is as far from the core as its radius says. A feature
-gives its points that may be nearest to a body. The gap is the least distance less both radii; each of these points
-bounds it from above, whether it is the nearest one or not.
+gives its point that is nearest to a body. The gap is the distance of this point less both radii.
 """
 
 import math
@@ -259,7 +258,7 @@ def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> Bod
         way = pull(at)
         return times(1.0 / np.sqrt(dot(way, way) + TINY), way)
 
-    sizes = (("size", size), ("half_length", half), ("rounding", radius))
+    sizes = (("size", size), ("half_length", half), ("rounding", radius), *((("domed", domed),) if domed else ()))
     halves, thickness = (size, size, half), 2.0 * min(size, half)
     return Body("dome" if domed else "cylinder", distance, normal, pull, radius, halves, thickness, sizes)
 
