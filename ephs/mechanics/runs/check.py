@@ -139,7 +139,7 @@ def _motion(problem: Problem, given: Collection[str]) -> Iterator[CheckItem]:
     yield CheckItem("mobility", True, f"{motions} in this configuration")
     yield from _redundancy(problem, found.redundant)
     try:
-        start, left = run_of_touching(problem, touching, _few_steps)
+        start, left = run_of_touching(problem, touching, _few_steps) if touching else (_few_steps(problem), 0)
     except (SolveError, RuntimeError) as error:
         yield CheckItem("motion", False, str(error))
         return
