@@ -12,6 +12,7 @@ import ephs
 from ephs.mechanics.imports import convert
 from ephs.mechanics.imports.collisions import SINKING
 from ephs.mechanics.imports.mjcf_contacts import LOSS
+from ephs.mechanics.shapes.gap import UPRIGHT
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
 
@@ -138,7 +139,8 @@ def test_distances_are_those_of_mujoco(kind, data, tmp_path_factory):
         own = model.mesh_vert[model.mesh_vertadr[m] :][: model.mesh_vertnum[m]]
         turned = own @ state.geom_xmat[g["it"]].reshape(3, 3).T + state.geom_xpos[g["it"]]
         height = turned[:, 2].min() + 3.0
-    assert distance(scene, "floor", "it") == pytest.approx(height, abs=10 * SINGLE)
+    late = UPRIGHT * scene.surfaces["it"].shape["cylinder"][0] if kind == "cylinder" else 0.0  # of a rim that is tilted
+    assert -10 * SINGLE <= distance(scene, "floor", "it") - height <= late + 10 * SINGLE
 
 
 def ring(count, height=0.1):
