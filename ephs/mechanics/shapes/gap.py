@@ -23,7 +23,7 @@ PARALLEL: Final = 1e-6
 CROSSED: Final = 1e-15
 """The same of edges, which do not act where they are parallel."""
 PASSES: Final = 3
-"""Passes to the nearest points of two segments, of lengths up to twenty radii to rounding."""
+"""Fixed-point passes for the nearest points of two segments: exact to rounding up to half lengths of ten radii."""
 CROSSING: Final = 1.0 / 32.0
 """Square of the way aside, in radii of edges, that edges part by from where they cross to a corner, below which they
 count as parallel: the gap at the corner is then larger by half of this part of a radius at the most."""
@@ -114,15 +114,15 @@ def plane_sphere(radius: float) -> Gap:
 
 
 def rounded(level: Any, upright: Any) -> tuple[Any, Any]:
-    """How far a circle's lowest point is from its axis, by the sine of its inclination, and below its centre; in radii.
+    """Contact point of a circle with a plane, by its radius: distance from the axis over the sine, depth below the centre.
 
-    The point is nearly that of an ellipsoid as flat as `UPRIGHT`, so it goes through the centre where the circle comes
-    to lie flat. It is as high as that of the circle where this lies flat, and where it stands.
+    The point is nearly that of an ellipsoid with the axis ratio `UPRIGHT`: it moves through the centre when the circle
+    comes to lie flat. The depth is exact at inclinations of 0 and 90 degrees, and smaller than the circle's between.
 
     Parameters
     ----------
     level, upright
-        Squares of the sine and the cosine.
+        Squares of the sine and the cosine of the inclination.
     """
     length = np.sqrt(level + UPRIGHT**2 * upright)
     return (1.0 - UPRIGHT**2) / length + 4.0 * UPRIGHT * upright, length - UPRIGHT * upright * upright

@@ -159,7 +159,7 @@ def segment(half: float, radius: float) -> Feature:
 def rim(size: float, radius: float) -> Feature:
     """A circle of a radius ``size``, rounded, and the disc in it: one point.
 
-    On a face it is as on a plane (`rounded`); where it lies flat on a cap, it is near the axis of that.
+    Its contact with a face is that with a plane (`rounded`); flat on a cap, it is near the axis of the other cylinder.
     """
 
     def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
@@ -237,8 +237,8 @@ def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> Bod
     Parameters
     ----------
     domed
-        Distance in m that points on its edges are further by than they are, by half of `UPRIGHT` of the radius: so what
-        lies flat on a cap touches near the axis. 0: none.
+        Distance in m from the core at which the edges of the caps count as lower by half of `UPRIGHT` times the radius,
+        so that a flat disc has its contact point near the axis; 0 for flat caps.
     """
     middle, dome = (MIDDLE * size) ** 2, UPRIGHT / (size * domed) if domed else 0.0
 

@@ -203,7 +203,7 @@ class Recorded:
         return self.of("squared turn", self.place, *(_place(each, self.recorder) for each in (x, y, z)))
 
     def root(self, function: Callable[..., Any], low: Any, high: Any, given: Sequence[Any]) -> "Recorded":
-        """Where an increasing function of a number and of those given is zero, between two ends."""
+        """The root of an increasing function between two ends; the function takes the unknown and the given numbers."""
 
         def called(x: Any, more: Sequence[Any]) -> Any:
             return function(x, *more)

@@ -176,7 +176,7 @@ def _squared_turn(on: Evaluator, *q: Real) -> Real:
 
 
 def _root(on: Evaluator, low: Real, high: Real, *rest: Any) -> Real:
-    """Where a function on a tape is zero; it changes with the other arguments by the rule of implicit functions."""
+    """The root of a function on a tape, with the derivatives and slopes of an implicit function."""
     *given, tape = rest
     if isinstance(on, Slopes):
         ends = [lifted(x) for x in (low, high, *given)]

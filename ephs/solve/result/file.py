@@ -125,7 +125,7 @@ class _Stored:
 
 
 def _rest(file: File, opened: Any) -> dict[Path, Array]:
-    """What is left of relative poses, by their paths."""
+    """Differences between relative poses and those computed from the bodies, by path."""
     if REST not in opened:
         return {}
     array = opened[REST]

@@ -1,7 +1,7 @@
-"""What files of solutions leave out, since readers find it again: ledgers that are zero, and poses of contacts.
+"""Ledgers and states that solution files omit and readers compute: zero ledgers, relative poses of contact points.
 
-Each point of a contact has a relative pose that follows from those of its bodies up to rounding, and is out of reach
-most of the time. A file has what is left to the bits of the pose, which is next to nothing.
+The relative pose of a contact point follows from the poses of its bodies up to rounding. A file has the difference,
+which is zero or a few last bits, so that readers return the same bits.
 """
 
 from collections.abc import Iterable, Mapping
