@@ -114,7 +114,7 @@ def plane_sphere(radius: float) -> Gap:
 
 
 def rounded(level: Any, upright: Any) -> tuple[Any, Any]:
-    """Contact point of a circle with a plane, by its radius: distance from the axis over the sine, depth below the centre.
+    """Contact point of a circle and a plane, in radii: distance from the axis by the sine, and depth below the centre.
 
     The point is nearly that of an ellipsoid with the axis ratio `UPRIGHT`: it moves through the centre when the circle
     comes to lie flat. The depth is exact at inclinations of 0 and 90 degrees, and smaller than the circle's between.
