@@ -37,11 +37,13 @@ demo: $(VENV)/.installed-viz
 	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE)
 	@echo 'The report: out/$(SCENE)/report.html (open it in a browser; it needs no network)'
 
+# The short tests are run by programs that are compiled in a tenth of the time and run slower; those that look at
+# optimised code itself, and the long ones, by programs as users have them.
 test: $(VENV)/.installed-dev
-	$(PYTEST) -n $(CORES) -m 'not long'
+	EPHS_LLVM_LEVEL=0 $(PYTEST) -n $(CORES) -m 'not long and not optimised'
 
 laws: $(VENV)/.installed-dev
-	$(PYTEST) -n $(CORES) -m long
+	$(PYTEST) -n $(CORES) -m 'long or optimised'
 
 real: $(VENV)/.installed-real
 	$(PYTEST) -n $(CORES) tests_real

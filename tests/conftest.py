@@ -1,4 +1,4 @@
-"""Hypothesis profiles: ci repeats exactly, dev explores, fuzz explores for long, mutate looks for one failure."""
+"""Which examples are drawn: the same on every machine; `fuzz` draws anew for long, `mutate` looks for one failure."""
 
 import os
 
@@ -6,10 +6,15 @@ import os
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
+import importlib  # noqa: E402
+import pkgutil  # noqa: E402
+
 import pytest  # noqa: E402
 from hypothesis import HealthCheck, Phase, settings  # noqa: E402
 
-from tests.durations import function_of, long_tests  # noqa: E402
+import benchmarks  # noqa: E402
+import ephs  # noqa: E402
+from tests.durations import Durations, function_of, long_tests  # noqa: E402
 from tests.show.browser import browser  # noqa: E402
 
 # The suite of somebody else's package: test_downstream.py runs it, in a process of its own.
@@ -22,6 +27,12 @@ def pytest_report_header() -> str:
     return f"browser: {browser() or 'none, so tests of pages in it are left out'}"
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Measure the tests, unless that is what runs them."""
+    if not any(isinstance(plugin, Durations) for plugin in config.pluginmanager.get_plugins()):
+        config.pluginmanager.register(Durations())
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests that are long; `make test` leaves them to `make laws`."""
     long = long_tests()
@@ -30,14 +41,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.long)
 
 
+# Hypothesis also draws constants that it reads in modules of the checkout that are loaded. With all of them loaded a
+# file draws the same examples alone, in the whole suite, and in any order.
+for package in (ephs, benchmarks):
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+
 COMPILING = [HealthCheck.too_slow]  # programs are compiled while mechanisms of a new class are drawn
 settings.register_profile(
-    "ci", derandomize=True, deadline=None, max_examples=50, print_blob=True, suppress_health_check=COMPILING
+    "same", derandomize=True, deadline=None, max_examples=50, print_blob=True, suppress_health_check=COMPILING
 )
-settings.register_profile("dev", deadline=None, max_examples=50, suppress_health_check=COMPILING)
 # A broken law is enough; which of its counterexamples is smallest does not matter.
 settings.register_profile(
     "mutate", derandomize=True, deadline=None, max_examples=20, database=None, phases=[Phase.explicit, Phase.generate]
 )
-settings.register_profile("fuzz", deadline=None, max_examples=5000)
-settings.load_profile("ci" if os.environ.get("CI") else "dev")
+settings.register_profile("fuzz", deadline=None, max_examples=5000, suppress_health_check=COMPILING)
+settings.load_profile("same")

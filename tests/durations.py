@@ -1,22 +1,28 @@
-"""Which tests are long: `python -m tests.durations` runs them all in one process and writes down those.
+"""Which tests are long: `python -m tests.durations` measures the short tests anew and writes down those that are not.
 
-What is written there is run by `make laws`, the rest by `make test`. Time is the processor's, of child processes too,
-and that of all parameters of a test together, so that what else the machine does counts little.
+A long test is run by `make laws`, all others by `make test`. Time is the processor's, of child processes too, and that
+of all parameters of a test together, so that what else the machine does counts little. Programs that a test compiles
+count, at the level of optimisation that `make test` has; what several tests share is paid by the first of them.
+`python -m tests.durations --all` measures the long tests too, and names those that have become short.
 """
 
+import json
 import os
 import sys
 from collections import defaultdict
 from pathlib import Path
-from typing import Any, final
+from tempfile import TemporaryDirectory
+from typing import Any, Final, final
 
 import pytest
 
-__all__ = ["FILE", "LONG", "function_of", "long_tests"]
+__all__ = ["ALLOWED", "FILE", "LONG", "Durations", "function_of", "long_tests"]
 
-FILE = Path(__file__).with_name("long.txt")
-LONG = 1.5
+FILE: Final = Path(__file__).with_name("long.txt")
+LONG: Final = 1.5
 """Processor time in s from which on a test is long."""
+ALLOWED: Final = 4 * LONG
+"""Processor time in s at which `make test` fails: other machines are slower, and another order shares other parts."""
 
 
 def function_of(nodeid: str) -> str:
@@ -31,31 +37,68 @@ def long_tests() -> frozenset[str]:
 
 @final
 class Durations:
-    """Adds up the processor time of tests."""
+    """Adds up the processor time of tests, also where workers run them, and fails a session of slow short tests."""
 
-    def __init__(self) -> None:
+    def __init__(self, allowed: float = ALLOWED) -> None:
+        self.allowed = allowed
         self.seconds: dict[str, float] = defaultdict(float)
+        self._last = 0.0
+
+    def pytest_runtest_logstart(self) -> None:
+        """Start the clock of one item."""
+        self._last = sum(os.times()[:4])
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Any:
-        """Add one."""
-        before = sum(os.times()[:4])
-        try:
-            return (yield)
-        finally:
-            self.seconds[function_of(item.nodeid)] += sum(os.times()[:4]) - before
+    def pytest_runtest_makereport(self) -> Any:
+        """Write the time of one phase into its report, which workers send on."""
+        report = yield
+        now = sum(os.times()[:4])
+        report.processor, self._last = now - self._last, now
+        return report
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        """Add the time of one phase."""
+        self.seconds[function_of(report.nodeid)] += report.processor
+
+    def slow(self, limit: float) -> dict[str, float]:
+        """The short tests that took more than a limit."""
+        long = long_tests()
+        return {name: time for name, time in sorted(self.seconds.items()) if time > limit and name not in long}
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Fail where a short test is slow."""
+        if self.slow(self.allowed) and session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        """Name the slow ones."""
+        for name, time in self.slow(self.allowed).items():
+            terminalreporter.line(
+                f"{name} took {time:.1f} s of processor time, at most {self.allowed} s are allowed: "
+                "make it cheaper, or measure anew by python -m tests.durations",
+                red=True,
+            )
 
 
-def main() -> int:
-    """Measure, and write the file where all tests pass."""
-    found = Durations()
-    code = pytest.main(["-q", "-n", "0", "-m", "", *sys.argv[1:]], plugins=[found])
+def main(arguments: list[str]) -> int:
+    """Measure in one process with nothing compiled, and write the file where all tests pass."""
+    found, known = Durations(allowed=float("inf")), long_tests()
+    kept = "long" if "--all" in arguments else ""
+    rest = [one for one in arguments if one != "--all"]
+    with TemporaryDirectory() as cache:
+        os.environ |= {"XDG_CACHE_HOME": cache, "EPHS_LLVM_LEVEL": "0"}
+        code = pytest.main(["-q", "-n", "0", "-m", "" if kept else "not long", *rest], plugins=[found])
     if code == 0:
-        named = sorted(name for name, seconds in found.seconds.items() if seconds > LONG)
-        FILE.write_text("\n".join(named) + "\n", encoding="utf-8")
-        print(f"{FILE}: {len(named)} of {len(found.seconds)} tests take more than {LONG} s")
+        longer = {name for name, time in found.seconds.items() if time > LONG}
+        named = longer | {name for name in known if name not in found.seconds}
+        FILE.write_text("\n".join(sorted(named)) + "\n", encoding="utf-8")
+        print(json.dumps(dict(sorted(found.seconds.items(), key=lambda item: -item[1])[:100]), indent=1))
+        print(f"{FILE}: {len(named)} tests take more than {LONG} s; {sum(found.seconds.values()):.0f} s in all")
     return int(code)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from tests import durations  # the module whose class tests/conftest.py knows
+
+    sys.exit(durations.main(sys.argv[1:]))

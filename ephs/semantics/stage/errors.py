@@ -29,6 +29,7 @@ TEXTS: Final = {
     "unrolled": "{where}: {what} is not known while unrolling; give the numbers that it depends on, or hand the array "
     "over as an argument.",
     "entries": "program {where}: found {found}, expected at least one function, each under a Python name.",
+    "level": "{where}: an optimisation level is {found}, expected one of {expected}.",
     "machine": "{where}: LLVM refuses the program: {found}",
     "reached": "{where}: a function that is called by its address takes {expected}, found {found}.",
     "unreached": "{where}: a function is called by its address with {what}; only machine code and the float run can, "

@@ -8,6 +8,7 @@ from typing import Any, Final, final
 from ephs.semantics.stage.errors import StageError
 
 LEVEL: Final = 2
+"""Optimisation level of LLVM for code that is kept or shipped."""
 
 
 @final
@@ -71,16 +72,16 @@ def _foreign() -> None:
     llvm.initialize_all_asmprinters()
 
 
-def _machine(target: Target) -> Any:
+def _machine(target: Target, level: int = LEVEL) -> Any:
     if target != host():
         _foreign()
     made = _llvm().Target.from_triple(target.triple)
     return made.create_target_machine(
-        cpu=target.processor, features=target.features, opt=LEVEL, reloc="pic", codemodel="default"
+        cpu=target.processor, features=target.features, opt=level, reloc="pic", codemodel="default"
     )
 
 
-def compile_text(text: str, target: Target | None = None) -> bytes:
+def compile_text(text: str, target: Target | None = None, level: int = LEVEL) -> bytes:
     """Compile assembly text to object code.
 
     Parameters
@@ -89,20 +90,22 @@ def compile_text(text: str, target: Target | None = None) -> bytes:
         A module of LLVM.
     target
         The machine to compile for; left out, this one.
+    level
+        Optimisation level, 0 to 3.
 
     Raises
     ------
     StageError
         LLVM does not accept the text.
     """
-    llvm, machine = _llvm(), _machine(target or host())
+    llvm, machine = _llvm(), _machine(target or host(), level)
     try:
         module = llvm.parse_assembly(text)
         module.verify()
     except RuntimeError as error:
         raise StageError("machine", where="compile_text", found=error) from error
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
-    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=level)
     passes = llvm.create_pass_builder(machine, tuning)
     passes.getModulePassManager().run(module, passes)
     return bytes(machine.emit_object(module))

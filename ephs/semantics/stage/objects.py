@@ -1,15 +1,19 @@
 """Object code of modules: from the package, from the store or from LLVM, for this machine or for another."""
 
 import hashlib
+import os
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
 
+from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.llvm import LEVEL, Library, Target, compile_text, host, load, version
 from ephs.semantics.stage.shipping import shipped
 from ephs.semantics.stage.store import STORE
 
+LEVELS: Final = ("0", "1", "2", "3")
+"""Values of the environment variable ``EPHS_LLVM_LEVEL``."""
 TARGETS: Final = {
     "linux-x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", ""),
     "linux-x86-64-v3": Target("x86_64-unknown-linux-gnu", "x86-64-v3", ""),
@@ -28,9 +32,26 @@ FITTING: Final = {
 """Targets shipped with the package, the best first: architecture and required processor features."""
 
 
-def name_of(text: str, target: Target) -> str:
+def level() -> int:
+    """Return the optimisation level of programs compiled for this process: ``EPHS_LLVM_LEVEL``, else `LEVEL`.
+
+    Level 0 compiles in a tenth of the time. Its programs give the same bits and run several times slower, so it suits
+    short tests; no sum or product is reordered or fused at any level.
+
+    Raises
+    ------
+    StageError
+        The variable is no level of LLVM.
+    """
+    given = os.environ.get("EPHS_LLVM_LEVEL", str(LEVEL))
+    if given not in LEVELS:
+        raise StageError("level", where="EPHS_LLVM_LEVEL", found=repr(given), expected=", ".join(LEVELS))
+    return int(given)
+
+
+def name_of(text: str, target: Target, level: int = LEVEL) -> str:
     """Return the name of a module's object code: a digest of its text, the target, LLVM's version and the settings."""
-    key = "\0".join([text, target.triple, target.processor, target.features, version(), str(LEVEL)])
+    key = "\0".join([text, target.triple, target.processor, target.features, version(), str(level)])
     return f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.o"
 
 
@@ -66,11 +87,12 @@ def compiled(text: str, name: str = "program") -> Library:
     code = shipped(text, fitting(target))
     if code is not None:
         return load(code)
-    file = name_of(text, target)
+    optimisation = level()
+    file = name_of(text, target, optimisation)
     code = STORE.read(file)
     if code is None:
         _tell(name)
-        code = compile_text(text, target)
+        code = compile_text(text, target, optimisation)
         _tell("")
         STORE.write(file, code)
     return load(code)

@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ephs.semantics.stage import Entry, Program, llvm, objects, store, vector
+from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.objects import TARGETS, compiled, emitted, fitting, telling
 from ephs.semantics.stage.store import STORE, ObjectCacheWarning
 from tests.semantics.stage.arm import Arm
@@ -38,9 +39,9 @@ def compilations(monkeypatch):
     """The modules that LLVM compiles."""
     texts: list[str] = []
 
-    def counted(text, target=None):
+    def counted(text, *rest):
         texts.append(text)
-        return llvm.compile_text(text, target)
+        return llvm.compile_text(text, *rest)
 
     monkeypatch.setattr(objects, "compile_text", counted)
     return texts
@@ -62,6 +63,22 @@ def test_targets_and_texts_have_names_of_their_own():
     texts = (SMALL.text(), PROGRAM.text())
     names = {objects.name_of(text, target) for text in texts for target in (*TARGETS.values(), llvm.host())}
     assert len(names) == len(texts) * (len(TARGETS) + 1)
+
+
+def test_levels_of_optimisation_are_compiled_apart_and_give_the_same_value(folder, compilations, monkeypatch):
+    values = []
+    for level in objects.LEVELS:
+        monkeypatch.setenv("EPHS_LLVM_LEVEL", level)
+        values.append(value(compiled(SMALL.text())))
+    assert values == [2.0] * len(objects.LEVELS)
+    assert len(compilations) == len(list(folder.iterdir())) == len(objects.LEVELS)
+
+
+@pytest.mark.parametrize("given", ["", "4", "fast"])
+def test_another_level_is_refused_by_name(folder, monkeypatch, given):
+    monkeypatch.setenv("EPHS_LLVM_LEVEL", given)
+    with pytest.raises(StageError, match=f"EPHS_LLVM_LEVEL: an optimisation level is {given!r}, expected one of 0, 1"):
+        compiled(SMALL.text())
 
 
 @given(data=st.data())

@@ -159,9 +159,9 @@ def delivered(tmp_path, monkeypatch):
     monkeypatch.setattr(STORE, "usable", True)
     taken: list[str] = []
 
-    def counted(text, target=None):
+    def counted(text, *rest):
         taken.append(text)
-        return llvm.compile_text(text, target)
+        return llvm.compile_text(text, *rest)
 
     monkeypatch.setattr(objects, "compile_text", counted)
     monkeypatch.setattr(objects, "shipped", lambda text, targets: shipped(text, targets, tmp_path))
