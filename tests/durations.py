@@ -84,11 +84,11 @@ class Durations:
 def main(arguments: list[str]) -> int:
     """Measure in one process with nothing compiled, and write the file where all tests pass."""
     found, known = Durations(allowed=float("inf")), long_tests()
-    kept = "long" if "--all" in arguments else ""
+    kept = "" if "--all" in arguments else " and not long"
     rest = [one for one in arguments if one != "--all"]
     with TemporaryDirectory() as cache:
         os.environ |= {"XDG_CACHE_HOME": cache, "EPHS_LLVM_LEVEL": "0"}
-        code = pytest.main(["-q", "-n", "0", "-m", "" if kept else "not long", *rest], plugins=[found])
+        code = pytest.main(["-q", "-n", "0", "-m", "not optimised" + kept, *rest], plugins=[found])
     if code == 0:
         longer = {name for name, time in found.seconds.items() if time > LONG}
         named = longer | {name for name in known if name not in found.seconds}

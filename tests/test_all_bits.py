@@ -11,6 +11,8 @@ from ephs import Pattern, library
 from ephs.semantics.stage.elementary import COMPOSED
 from tests.watch import watching
 
+pytestmark = pytest.mark.optimised
+
 HEAD = 'format = 1\nname = "few"\n[world]\ngravity = [0.0, 0.0, -9.81]\n'
 BALL = """
 [bodies.ball]

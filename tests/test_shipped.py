@@ -26,6 +26,8 @@ from tests.semantics.linear.test_rows import Solved, problems
 from tests.semantics.stage.arm import Arm
 from tests.semantics.stage.test_elementary import EDGES
 
+pytestmark = pytest.mark.optimised
+
 PROGRAMS = {program.name: program for program in programs()}
 RUNS = ["compiled", *fitting(llvm.host()), "linux-arm64 in an emulator"]
 

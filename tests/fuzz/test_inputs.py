@@ -3,7 +3,6 @@
 The corpus holds what was found to be neither, made small.
 """
 
-import os
 from pathlib import Path
 
 import pytest
@@ -38,7 +37,7 @@ def test_seeds_are_read(kind, judge):
     assert "model" in outcomes and "defect" not in outcomes
 
 
-@settings(max_examples=20 if os.environ.get("CI") else 40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32))
 def test_mutated_inputs_are_models_or_clear_errors(seed, judge):
     for number in range(50):

@@ -20,6 +20,8 @@ from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluat
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
 
+pytestmark = pytest.mark.optimised
+
 SCENES = ("slider-crank", "heavy-top")
 """A closed loop with friction, heat and a drive in a plane; a ball joint in space."""
 OWN = ("accelerations", "move", "rows", "poses", "fit", "gaps", "fold", "dependent", "unfold", "resolve", "spread",

@@ -22,6 +22,8 @@ from ephs.solve.methods.records import DONE, parts_of
 from ephs.solve.methods.scheme import STAGES
 from ephs.solve.model import Model, compile_model
 
+pytestmark = pytest.mark.optimised
+
 ROOT = Path(__file__).resolve().parents[2]
 seeds = st.integers(0, 2**32 - 1)
 

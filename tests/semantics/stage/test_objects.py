@@ -22,6 +22,8 @@ from ephs.semantics.stage.store import STORE, ObjectCacheWarning
 from tests.semantics.stage.arm import Arm
 from tests.semantics.stage.test_elementary import PROGRAM, inputs, same
 
+pytestmark = pytest.mark.optimised
+
 SMALL = Program("small", total=Entry(lambda on, x: x[0] * on.exp(x[1]), x=vector(2)))
 
 
