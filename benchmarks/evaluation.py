@@ -2,7 +2,8 @@
 
 Repeats are interleaved, so that what else the machine does falls on all alike, and the median counts. The states change
 from evaluation to evaluation, so that none is answered from a cache. Pinocchio's trees are evaluated in batches in
-compiled code; its closed loops one by one from Python, less the time of such a call for a pendulum. MuJoCo takes Euler
+compiled code; its closed loops one by one from Python, less the time of such a call for a pendulum, by both of its
+algorithms: constraintDynamics, and lcaba, whose time is linear in the number of loops. MuJoCo takes Euler
 steps in compiled code, which costs it little more than the accelerations; its loops are soft constraints.
 """
 
@@ -26,7 +27,7 @@ from ephs.show.charts.peer_scene import PeerError, peer_scene
 
 __all__ = ["ENGINES", "own", "report"]
 
-SIZES = {"revolute-chain": (1, 4, 16, 64, 256), "spherical-chain": (1, 4, 16, 64, 256), "four-bar-windows": (1, 10, 40)}
+SIZES = {"revolute-chain": (1, 4, 16, 64, 256), "spherical-chain": (1, 4, 16, 64, 256), "four-bar-windows": (1, 10, 40, 80)}
 REPEATS = 9
 BLOCK = 0.02
 """Seconds that a repeat takes at least."""
@@ -60,7 +61,7 @@ def _pin(scene: Scene) -> tuple[Block, int]:
     pin, rng = model.pin, np.random.default_rng(0)
     nv = int(model.model.nv)
     if model.loops:
-        return _pin_loops(model), 1
+        return _pin_loops(model, "constraintDynamics"), 1
     count = max(16, 4096 // nv)
     at = model.start[: model.nq]
     q = np.asfortranarray([pin.integrate(model.model, at, 0.1 * rng.standard_normal(nv)) for _ in range(count)]).T
@@ -77,7 +78,14 @@ def _pin(scene: Scene) -> tuple[Block, int]:
     return block, count
 
 
-def _pin_loops(model: PinModel) -> Block:
+def _pin_lcaba(scene: Scene) -> tuple[Block, int]:
+    model = PinModel(peer_scene(scene))
+    if not model.loops:
+        raise PeerError("a tree, which aba evaluates")
+    return _pin_loops(model, "lcaba"), 1
+
+
+def _pin_loops(model: PinModel, algorithm: str) -> Block:
     pin, rng = model.pin, np.random.default_rng(0)
     nv = int(model.model.nv)
     at, speed = model.start[: model.nq], model.start[model.nq :]
@@ -89,14 +97,18 @@ def _pin_loops(model: PinModel) -> Block:
     still = one.start[:1].copy()
 
     def calls(of: PinModel, arguments: list[tuple[Any, Any]], rounds: int) -> float:
-        evaluate, wanted = pin.constraintDynamics, (of.constraints, of.workspace, of.settings)
+        evaluate, wanted = getattr(pin, algorithm), (of.constraints, of.workspace, of.settings)
         begin = time.perf_counter()
         for i in range(rounds):
             q, v = arguments[i % len(arguments)]
             evaluate(of.model, of.data, q, v, of.force, *wanted)
         return time.perf_counter() - begin
 
-    pin.initConstraintDynamics(one.model, one.data, one.constraints, one.workspace)
+    for each in (model, one):
+        if algorithm == "lcaba":
+            pin.computeJointMinimalOrdering(each.model, each.data, each.constraints)
+        else:
+            pin.initConstraintDynamics(each.model, each.data, each.constraints, each.workspace)
 
     def block(rounds: int) -> float:
         return max(calls(model, states, rounds) - calls(one, [(still, still)], rounds), 0.0)
@@ -118,7 +130,12 @@ def _mujoco(scene: Scene) -> tuple[Block, int]:
     return block, count
 
 
-ENGINES: dict[str, Callable[[Scene], tuple[Block, int]]] = {"ephs": own, "pin": _pin, "mujoco": _mujoco}
+ENGINES: dict[str, Callable[[Scene], tuple[Block, int]]] = {
+    "ephs": own,
+    "pin": _pin,
+    "pin lcaba": _pin_lcaba,
+    "mujoco": _mujoco,
+}
 
 
 def measure(scene: Scene, repeats: int = REPEATS) -> dict[str, float | None]:

@@ -112,6 +112,18 @@ def test_points_at_the_floor_of_the_reference_are_marked():
         assert point.floor is floor
 
 
+def test_points_that_the_audit_refuses_are_marked(tmp_path):
+    """Steps of 0.05 s do not resolve the spin of the top: the audit refuses the run, a fine one it lets pass."""
+    points = work_precision(ephs.load(TOP), 0.5, ["rk87"], tolerances=(), steps=(10, 500), repeats=1)
+    coarse, fine = points
+    assert "energy" in coarse.flagged or "accuracy" in coarse.flagged
+    assert not fine.flagged
+    files = draw_work_precision(points, "top", tmp_path, "wp")
+    with files[2].open(newline="") as stream:
+        assert [bool(row["flagged"]) for row in csv.DictReader(stream)] == [True, False]
+    assert "refused by the audit" in files[1].read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_gives_a_motion_or_says_why_not(method, tmp_path):
     scene = ephs.load(TOP)

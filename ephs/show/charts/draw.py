@@ -56,6 +56,12 @@ _DPI = 150
 _DEFECTS = (1e-16, 1e-2)
 """Defects of energy from the lightest colour to the darkest."""
 _UNKNOWN = "#d1d5db"
+_MARKED: dict[str, dict[str, Any]] = {
+    "floor": {"color": INK, "marker": "x", "markersize": 4.0},
+    "flagged": {"color": RED, "marker": "o", "markersize": 9.0, "markerfacecolor": "none"},
+}
+"""Looks of marks on points, by the field of `Point` that they show."""
+_MEANINGS = {"floor": "near the reference's own error", "flagged": "refused by the audit"}
 _EMPTY = (1e-6, 1.0)
 """Limits of logarithmic axes without curves."""
 _LINE = 0.13
@@ -67,7 +73,7 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
     """Error against time, evaluations, and the tolerance asked for; and against time, coloured by the defect of energy.
 
     Written as PNG, SVG, CSV and JSON of this name. Methods over tolerances have filled marks and full lines, over steps
-    hollow marks and dashed lines. Failed runs are counted at the right edge, their reasons are listed below.
+    hollow marks and dashed lines; runs that their audit refuses are ringed. Failed runs are counted at the right edge, their reasons are listed below.
     """
     from matplotlib import rc_context
 
@@ -106,11 +112,12 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
         extra, said = middle.get_legend_handles_labels()
         more = [(h, text) for h, text in zip(extra, said, strict=True) if text not in labels]
         handles, labels = [*handles, *(h for h, _ in more)], [*labels, *(text for _, text in more)]
-        if any(point.floor for point in points):
-            from matplotlib.lines import Line2D
+        for field, look in _MARKED.items():
+            if any(getattr(point, field) for point in points):
+                from matplotlib.lines import Line2D
 
-            handles.append(Line2D([], [], color=INK, marker="x", markersize=4.0, linestyle="none"))
-            labels.append("near the reference's own error")
+                handles.append(Line2D([], [], linestyle="none", **look))
+                labels.append(_MEANINGS[field])
         for handle, label in zip(handles, labels, strict=True):
             handle.set_label(label)
         _legend(figure, handles, 6, found, 150)
@@ -258,9 +265,9 @@ def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: s
         linewidth=1.1,
         label=f"{method}{', steps' if hollow and _both(method) else ''}",
     )
-    floor = [p for p in done if p.floor]
-    if floor:
-        axes.plot([getattr(p, key) for p in floor], [p.error for p in floor], "x", color=INK, markersize=4.0)
+    for field, look in _MARKED.items():
+        those = [p for p in done if getattr(p, field)]
+        axes.plot([getattr(p, key) for p in those], [p.error for p in those], linestyle="none", **look)
 
 
 def _defects(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) -> None:

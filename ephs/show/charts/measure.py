@@ -1,7 +1,7 @@
 """Work and precision of methods."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -42,6 +42,8 @@ class Point:
         Of the balance of energy at the end, relative to what was turned over; NaN where it is not known.
     floor
         Whether the error is too near that of the reference to be known.
+    flagged
+        Findings of the run's audit, which refuses the result unless told otherwise; empty where there are none.
     """
 
     method: str
@@ -54,6 +56,7 @@ class Point:
     message: str = ""
     defect: float = np.nan
     floor: bool = False
+    flagged: str = ""
 
     @property
     def tolerance(self) -> float:
@@ -146,7 +149,9 @@ def _own(
         stats, error = first.solution.stats, float(Motion.of(first.solution).off(truth.motion)[-1])
         count = int(stats.get("evaluations", stats.get("iterations", 0)))
         defect = float(first.solution.energy_error[-1])
-        yield _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)
+        point = _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)
+        audit = first.solution.audit
+        yield point if audit.passed else replace(point, flagged=str(audit))
         if first.wall > limit / 4.0:
             return
 
