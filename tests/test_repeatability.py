@@ -127,14 +127,14 @@ def test_any_thread_takes_one_thread_of_linear_algebra_and_restores_it():
         assert threads() == {2}
 
 
-@pytest.mark.parametrize(("file", "method"), [("motor-four-bar", "rk87"), ("motor-four-bar", "radau")])
-def test_runs_in_several_threads_at_once_are_those_of_one(file, method):
+@pytest.mark.parametrize(("method", "until"), [("rk87", 0.5), ("radau", 0.05)])
+def test_runs_in_several_threads_at_once_are_those_of_one(method, until):
     """Engines of one mechanism share tables; memory is each one's own, that of attached circuits, too."""
-    scene = ephs.load(ROOT / f"scenes/{file}.toml")
+    scene = ephs.load(ROOT / "scenes/motor-four-bar.toml")
 
     def run():
-        return digest(contents(ephs.simulate(scene, 2.0, method=method, rtol=1e-8)))
+        return digest(contents(ephs.simulate(scene, until, method=method, rtol=1e-8)))
 
     with ThreadPoolExecutor(4) as pool:
-        found = {each.result() for each in [pool.submit(run) for _ in range(12)]}
+        found = {each.result() for each in [pool.submit(run) for _ in range(8)]}
     assert found == {run()}

@@ -73,7 +73,8 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
     """Error against time, evaluations, and the tolerance asked for; and against time, coloured by the defect of energy.
 
     Written as PNG, SVG, CSV and JSON of this name. Methods over tolerances have filled marks and full lines, over steps
-    hollow marks and dashed lines; runs that their audit refuses are ringed. Failed runs are counted at the right edge, their reasons are listed below.
+    hollow marks and dashed lines; runs that their audit refuses are ringed. Failed runs
+    are counted at the right edge, their reasons are listed below.
     """
     from matplotlib import rc_context
 

@@ -169,13 +169,14 @@ def _relate(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
         def held(q: Integer) -> None:
             scale.value = on.maximum(scale.value, on.absolute(m.jac[j * width + n + q]) * force.value)
 
-        def warm(q: Integer) -> None:
-            whole = on.absolute(z[part.balance(q)] + t.intensive[part.effort(q)])
-            scale.value = on.maximum(scale.value, on.absolute(m.jac[j * width + q]) * whole)
+        def term(q: Integer) -> None:
+            # of what is irreversible the temperatures count, whose differences vanish near equilibrium
+            known = on.select(on.same(t.kind[part.i], IRREVERSIBLE), t.intensive[part.effort(q)], 0.0)
+            size = on.absolute(m.jac[j * width + q] * (z[part.balance(q)] + known))
+            scale.value = on.maximum(scale.value, size)
 
         on.loop(k, held)
-        # near equilibrium a flow is a difference of large terms: temperatures, not their differences
-        on.when(on.same(t.kind[part.i], IRREVERSIBLE), lambda: on.loop(n, warm))
+        on.loop(n, term)  # a flow may be a small difference of large terms: p × v of a body that does not turn
         m.scale[balance] = scale.value
         m.flows[part.e_at + j] = m.f[j]
 

@@ -72,13 +72,14 @@ def test_its_force_is_in_the_wrench_of_the_joint(hoist):
 
 
 def test_a_stiff_belt_moves_as_a_gear_does(hoist):
+    """What it stretches by falls as one over its stiffness, once its damping has ended the ringing."""
     ends = []
-    for stiffness in (0.0, 1e4, 1e6):
-        belt = replace(hoist.gears["rope"], stiffness=stiffness, damping=0.1)
+    for stiffness in (0.0, 1e3, 1e5):
+        belt = replace(hoist.gears["rope"], stiffness=stiffness, damping=10.0)
         sol = ephs.simulate(replace(hoist, gears={"rope": belt}), 0.4, method="radau", rtol=1e-9)
         assert sol.energy_error.max() < 1e-11
         ends.append(sol.joint("rail").rate[-1, 0])
-    assert 10.0 < abs(ends[1] - ends[0]) / abs(ends[2] - ends[0]) < 1000.0
+    assert np.isclose((ends[1] - ends[0]) / (ends[2] - ends[0]), 1e5 / 1e3, rtol=1e-2)
 
 
 def test_units_text_and_parameters_of_gears(hoist):

@@ -1,5 +1,7 @@
 """Laws of elements that are stated as one function: exact energies over steps, exact Jacobians, the same bits."""
 
+from functools import cache
+
 import mpmath
 import numpy as np
 import pytest
@@ -86,7 +88,9 @@ def run(function, relation, a):
     return function(np.array(relation.dimensions), *out.values()), out
 
 
+@cache
 def made(name):
+    """The storage of an energy, built once for all examples, and the energy."""
     ports, energy = ENERGIES[name]
     return ephs.storage(ports, energy), energy
 
