@@ -27,7 +27,11 @@ from ephs.show.charts.peer_scene import PeerError, peer_scene
 
 __all__ = ["ENGINES", "own", "report"]
 
-SIZES = {"revolute-chain": (1, 4, 16, 64, 256), "spherical-chain": (1, 4, 16, 64, 256), "four-bar-windows": (1, 10, 40, 80)}
+SIZES = {
+    "revolute-chain": (1, 4, 16, 64, 256),
+    "spherical-chain": (1, 4, 16, 64, 256),
+    "four-bar-windows": (1, 10, 40, 80),
+}
 REPEATS = 9
 BLOCK = 0.02
 """Seconds that a repeat takes at least."""
