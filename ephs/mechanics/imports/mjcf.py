@@ -5,8 +5,9 @@ Source: the MuJoCo documentation, "XML Reference" and "Computation". Joints are 
 
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
@@ -20,9 +21,13 @@ from ephs.mechanics.imports.mjcf_shapes import shapes
 from ephs.mechanics.imports.mjcf_source import Source
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 
-Inertias = dict[int, tuple[float, Any]]
+LEAST = 2e-15
+"""Least mass in kg and moment of inertia in kg m² that MuJoCo takes of a moving body, with some room."""
+ROUNDED = 1e-12
+"""Share of a moment of inertia that is lost to rounding in its principal axes."""
 DIMENSIONS = {"free": 6, "spherical": 3, "prismatic": 1, "revolute": 1}
 READ = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
@@ -40,6 +45,16 @@ READ = (
     *("geom_pos", "geom_quat", "geom_size", "mesh_pos", "mesh_quat", "mesh_scale"),
     *("geom_solref", "geom_friction", "geom_solmix", "pair_solref", "pair_friction", "mesh_vert"),
 )
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Inertia:
+    """A mass, and an inertia (3, 3) in the axes of its body, or else in those of the inertial frame."""
+
+    mass: float
+    tensor: Array
+    in_body: bool
 
 
 def read_mjcf(root: Any, draft: Draft) -> None:
@@ -60,9 +75,9 @@ def read_mjcf(root: Any, draft: Draft) -> None:
             warnings.simplefilter("ignore")  # deprecated elements of the format
             spec = mujoco.MjSpec.from_string(source.text, assets=source.assets)
             spec.compiler.fusestatic = False
-            given = _own_inertias(spec)
+            given = _impossible_inertias(spec, draft)
             model = spec.compile()
-            own: Inertias = {int(body.id): inertia for body, inertia in given}
+            own = {int(body.id): inertia for body, inertia in given}
             keys = Keys.of(spec, draft)
     except (ValueError, RuntimeError) as error:  # MuJoCo's own errors among them
         words = " ".join(str(error).split())
@@ -92,12 +107,12 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     keys.note_options()
 
 
-def _numbers(model: Any, own: Inertias) -> Iterator[Any]:
+def _numbers(model: Any, own: Mapping[int, Inertia]) -> Iterator[Any]:
     """All that is read of a compiled model."""
     yield model.opt.gravity
-    for mass, inertia in own.values():
-        yield mass
-        yield inertia
+    for inertia in own.values():
+        yield inertia.mass
+        yield inertia.tensor
     for name in READ:
         yield getattr(model, name)
 
@@ -111,32 +126,60 @@ def _directions(model: Any) -> Iterator[Any]:
     yield model.eq_data[model.eq_type == int(mujoco.mjtEq.mjEQ_WELD), 6:10]
 
 
-def _own_inertias(spec: Any) -> list[tuple[Any, tuple[float, Any]]]:
-    """The numerical inertias of bodies, replaced by valid ones because MuJoCo refuses impossible ones.
+def _impossible_inertias(spec: Any, draft: Draft) -> list[tuple[Any, Inertia]]:
+    """Inertias that MuJoCo refuses, each with its body, to which the nearest possible one is given for compilation.
 
     Left alone are models that change them as they are compiled.
     """
-    c, found = spec.compiler, list[tuple[Any, tuple[float, Any]]]()
+    c, found = spec.compiler, list[tuple[Any, Inertia]]()
     if c.balanceinertia or c.boundmass > 0.0 or c.boundinertia > 0.0 or c.settotalmass > 0.0 or c.inertiafromgeom == 1:
         return found
-    for body in spec.bodies[1:]:
-        if body.explicitinertial:
-            whole = np.isfinite(body.fullinertia).all()
-            found.append((body, (float(body.mass), np.array(body.fullinertia if whole else body.inertia))))
-            body.mass, body.inertia = 1.0, np.ones(3)
-            body.fullinertia = np.array([np.nan, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for number, body in enumerate(spec.bodies[1:], 1):
+        if not body.explicitinertial:
+            continue
+        whole = bool(np.isfinite(body.fullinertia).all())
+        given = Inertia(float(body.mass), _tensor(body.fullinertia) if whole else np.diag(body.inertia), whole)
+        if not (np.isfinite(given.mass) and np.isfinite(given.tensor).all()):  # the check of all numbers refuses them
+            body.mass, body.inertia, body.fullinertia = 1.0, np.ones(3), [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+            found.append((body, given))
+            continue
+        moments, axes = np.linalg.eigh(given.tensor) if whole else (np.array(body.inertia), np.eye(3))
+        largest = moments.max()
+        lacking = 2.0 * largest - moments.sum()
+        if given.mass >= LEAST and moments.min() >= LEAST and lacking <= -ROUNDED * largest:
+            continue
+        found.append((body, given))
+        # The two smaller moments grow equally until their sum is the largest.
+        more = max(0.5 * (lacking + 2.0 * ROUNDED * abs(largest)), 0.0)
+        order = np.argsort(moments)
+        moments[order[:2]] += more
+        moments = np.maximum(moments, LEAST)
+        body.mass = max(given.mass, LEAST)
+        if whole:
+            near = axes @ np.diag(moments) @ axes.T
+            body.fullinertia = near[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        else:
+            body.inertia = moments
+        if lacking > ROUNDED * largest:
+            what = "the impossible inertia, in what MuJoCo derives of it (dampratio, springdamper), of"
+            draft.leave(what, body.name or f"body_{number}")
     return found
 
 
-def _body(model: Any, b: int, own: Inertias, names: Names, draft: Draft) -> None:
-    mass, moments = own.get(b, (float(model.body_mass[b]), np.array(model.body_inertia[b])))
-    if moments.shape == (6,):
-        xx, yy, zz, xy, xz, yz = moments
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+def _tensor(entries: Any) -> Array:
+    """The tensor (3, 3) of its entries xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _body(model: Any, b: int, own: Mapping[int, Inertia], names: Names, draft: Draft) -> None:
+    principal = pose(rotation=model.body_iquat[b])[:4]
+    if b in own:
+        mass, tensor = own[b].mass, own[b].tensor
+        tensor = tensor if own[b].in_body else turned_tensor(principal, tensor)
     else:
-        tensor = np.diag(moments)
-    rotation = pose(rotation=model.body_iquat[b])[:4]
-    draft.body(names.bodies[b], mass, turned_tensor(rotation, tensor), model.body_ipos[b])
+        mass, tensor = float(model.body_mass[b]), turned_tensor(principal, np.diag(model.body_inertia[b]))
+    draft.body(names.bodies[b], mass, tensor, model.body_ipos[b])
 
 
 def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], keys: Keys, draft: Draft) -> None:

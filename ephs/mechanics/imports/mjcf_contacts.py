@@ -44,7 +44,7 @@ def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
         return
     shapes = {g: _shape(model, g) for pair in pairs for g in pair}
     surfaces: dict[int, tuple[str, Array]] = {}
-    mass = float(np.sum(model.body_mass[1:]))
+    mass = draft.mass
     for (one, other), parameters in pairs.items():
         kinds = (shapes[one] or ("",))[0], (shapes[other] or ("",))[0]
         told = f"{_named(model, names, one)} and {_named(model, names, other)}"
