@@ -208,7 +208,8 @@ class Draft:
         found: dict[str, Any] = {"tendon": tendon, "ratio": ratio}
         if isinstance(ratio, Mapping):
             found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
-        more = {} if limits is None or limits[0] >= limits[1] else {"limits": list(map(float, limits))}
+        bounded = limits is not None and bool(np.all(np.isfinite(limits)))
+        more = {"limits": _plain(limits)} if limits is not None and bounded else {}
         others = {each: table for each, table in self._tendons.items() if each != tendon}
         self._actuators[self._own(name, self._actuators | others)] = found | more
 

@@ -123,7 +123,8 @@ def _directions(model: Any) -> Iterator[Any]:
     for name in ("body_quat", "body_iquat", "geom_quat", "site_quat", "mesh_quat"):
         yield getattr(model, name)
     yield model.jnt_axis[model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)]
-    yield model.eq_data[model.eq_type == int(mujoco.mjtEq.mjEQ_WELD), 6:10]
+    welds = (model.eq_type == int(mujoco.mjtEq.mjEQ_WELD)) & (model.eq_objtype == int(mujoco.mjtObj.mjOBJ_BODY))
+    yield model.eq_data[welds, 6:10]
 
 
 def _impossible_inertias(spec: Any, draft: Draft) -> list[tuple[Any, Inertia]]:

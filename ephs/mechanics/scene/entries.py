@@ -56,6 +56,7 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "list_type": lambda ctx: ("type", "a list"),
     "numbers": lambda ctx: ("type", "a number or a list of numbers"),
     "limits": lambda ctx: ("range", "[lower, upper], lower < upper, nan for none"),
+    "ordered": lambda ctx: ("range", "[lower, upper], lower ≤ upper"),
     "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
     "rotation": lambda ctx: ("range", FORMS),
     "rotation_type": lambda ctx: ("type", f"a unit quaternion [w, x, y, z], or a table with {FORMS}"),

@@ -133,7 +133,8 @@ HEAVY = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1"/>
   <inertial pos="0.1 0 0" mass="{mass}" {given}/></body>
 <body name="door" pos="3 0 9"><joint name="leaf" axis="0 0 1" springdamper="0.2 0.5"/>
   <inertial pos="0 0 0" mass="{mass}" {given}/></body>
-<body name="ball" pos="0 5 0.1"><freejoint/><inertial pos="0 0 0" mass="{mass}" {given}/><geom name="s" size="0.1"/></body>
+<body name="ball" pos="0 5 0.1"><freejoint/><inertial pos="0 0 0" mass="{mass}" {given}/>
+  <geom name="s" size="0.1"/></body>
 {more}</worldbody><actuator><position name="servo" joint="hinge" kp="100" dampratio="0.7"/></actuator></mujoco>"""
 ODD = """<body name="odd" pos="0 0 20"><joint name="o"/><inertial pos="1 0 0" mass="1" diaginertia="1 1 5"/></body>"""
 
