@@ -11,10 +11,11 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.imports.collisions import STOP_LOSS
 from ephs.mechanics.imports.draft import Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.mjcf_actuators import actuators, tendons
-from ephs.mechanics.imports.mjcf_contacts import contacts
-from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Keys, disabled
+from ephs.mechanics.imports.mjcf_contacts import contacts, rate_and_ratio
+from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Compiled, disabled
 from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
 from ephs.mechanics.imports.mjcf_names import Names, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
@@ -76,17 +77,17 @@ def read_mjcf(root: Any, draft: Draft) -> None:
             spec = mujoco.MjSpec.from_string(source.text, assets=source.assets)
             spec.compiler.fusestatic = False
             given = _impossible_inertias(spec, draft)
-            model = spec.compile()
+            raw = spec.compile()
             own = {int(body.id): inertia for body, inertia in given}
-            keys = Keys.of(spec, draft)
+            model = Compiled(spec, raw, draft)
     except (ValueError, RuntimeError) as error:  # MuJoCo's own errors among them
         words = " ".join(str(error).split())
         draft.faults.append(fault("not compiled", "", f"that MuJoCo says: {words}"))
         return
     finally:
         mujoco.set_mju_user_warning(before)
-    sizes = [float(np.abs(values).max(initial=0.0)) for values in _numbers(model, own)]
-    lengths = [np.linalg.norm(rows, axis=1) for rows in _directions(model)]
+    sizes = [float(np.abs(values).max(initial=0.0)) for values in _numbers(raw, own)]
+    lengths = [np.linalg.norm(rows, axis=1) for rows in _directions(raw)]
     if not all(size <= LARGEST for size in sizes) or not all(np.all(np.abs(n - 1.0) < 0.1) for n in lengths):
         draft.faults.append(fault("large", "", "a compiled model with other numbers, or none", most=LARGEST))
         return
@@ -95,16 +96,17 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     names = Names(model)
     draft.gravity = [0.0, 0.0, 0.0] if disabled(model, "GRAVITY") else list(model.opt.gravity)
     threads = screws(model, names)
+    model.pass_by("bodies", 0)
     for b in range(1, model.nbody):
         _body(model, b, own, names, draft)
-        keys.note("bodies", b, names.bodies[b])
-        _joints(model, b, names, threads, keys, draft)
+        model.name("bodies", b, names.bodies[b])
+        _joints(model, b, names, threads, draft)
         shapes(model, b, names.bodies[b], source, draft)
-    contacts(model, names, keys, draft)
-    actuators(model, names, tendons(model, names, keys, draft), keys, draft)
+    contacts(model, names, draft)
+    actuators(model, names, tendons(model, names, draft), draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
-    keys.note_options()
+    model.leave_unread()
 
 
 def _numbers(model: Any, own: Mapping[int, Inertia]) -> Iterator[Any]:
@@ -173,17 +175,14 @@ def _tensor(entries: Any) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _body(model: Any, b: int, own: Mapping[int, Inertia], names: Names, draft: Draft) -> None:
+def _body(model: Compiled, b: int, own: Mapping[int, Inertia], names: Names, draft: Draft) -> None:
     principal = pose(rotation=model.body_iquat[b])[:4]
-    if b in own:
-        mass, tensor = own[b].mass, own[b].tensor
-        tensor = tensor if own[b].in_body else turned_tensor(principal, tensor)
-    else:
-        mass, tensor = float(model.body_mass[b]), turned_tensor(principal, np.diag(model.body_inertia[b]))
-    draft.body(names.bodies[b], mass, tensor, model.body_ipos[b])
+    given = own.get(b, Inertia(float(model.body_mass[b]), np.diag(model.body_inertia[b]), in_body=False))
+    tensor = given.tensor if given.in_body else turned_tensor(principal, given.tensor)
+    draft.body(names.bodies[b], given.mass, tensor, model.body_ipos[b])
 
 
-def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], keys: Keys, draft: Draft) -> None:
+def _joints(model: Compiled, b: int, names: Names, threads: Mapping[int, Thread], draft: Draft) -> None:
     """The chain from a body's parent to it."""
     body, before = names.bodies[b], names.bodies[int(model.body_parentid[b])]
     at = pose(model.body_pos[b], model.body_quat[b])
@@ -199,9 +198,10 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], key
             j = thread.hinge
             draft.rename(names.joints[thread.slide], names.joints[j])
         kind, last = names.kinds[j], not rest
-        frame = pose(model.jnt_pos[j] if kind in ("revolute", "spherical") else (0.0, 0.0, 0.0))
+        centre, axis = model.jnt_pos[j], model.jnt_axis[j]
+        frame = pose(centre if kind in ("revolute", "spherical") else (0.0, 0.0, 0.0))
         if kind in ("revolute", "prismatic"):
-            turned = along(model.jnt_axis[j], frame)
+            turned = along(axis, frame)
             assert turned is not None  # MuJoCo makes axes unit vectors
             frame = turned
         after = body if last else draft.frame_without_mass(names.between(b, j))
@@ -213,33 +213,45 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], key
                 entries[key] += thread.pitch**2 * slide[key]
             entries |= draft.dry(names.joints[j], _dry(model, j) + abs(thread.pitch) * _dry(model, thread.slide), 1)
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
-        limited = bool(model.jnt_limited[j]) and not disabled(model, "LIMIT", "CONSTRAINT")
-        stopped = limited and kind in ("revolute", "prismatic")
-        if stopped:
-            draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
-        elif limited:
-            draft.leave("limits of", names.joints[j])
-        pointless = SOFT_STOPS if not (stopped and draft.contact) else ()
         for each in (j,) if thread is None else (thread.hinge, thread.slide):
-            keys.note("joints", each, names.joints[each], (*pointless, *(() if _dry(model, each) else SOFT_DRY)))
+            model.name("joints", each, names.joints[each])
+            _stops(model, each, names, draft, of_screw=thread is not None and each == thread.slide)
+            if not _dry(model, each):
+                model.pass_by("joints", each, *SOFT_DRY)
         before, at = after, pose()
 
 
-def _dry(model: Any, j: int) -> float:
-    off = disabled(model, "FRICTIONLOSS", "CONSTRAINT")
-    return 0.0 if off else float(model.dof_frictionloss[model.jnt_dofadr[j]])
+def _stops(model: Compiled, j: int, names: Names, draft: Draft, *, of_screw: bool) -> None:
+    """Limits of a joint; their stiffness is the inertia that it moves by MuJoCo's stiffness per inertia."""
+    limits, name = np.array(model.jnt_range[j]), names.joints[j]
+    off = not bool(model.jnt_limited[j]) or disabled(model, "LIMIT", "CONSTRAINT")
+    lone = names.kinds[j] in ("revolute", "prismatic") and not of_screw
+    if off or not lone or not draft.contact:
+        model.pass_by("joints", j, *SOFT_STOPS)
+        if not off:
+            draft.leave("limits of", name)
+        return
+    rate, ratio = rate_and_ratio(model.jnt_solref[j])
+    stiffness = rate**2 / max(float(model.raw.dof_invweight0[model.jnt_dofadr[j]]), 1.0 / LARGEST)
+    law = {"limit_stiffness": min(stiffness, LARGEST), "limit_loss": min(STOP_LOSS * ratio, LARGEST)}
+    draft.limit(name, *(limits - model.qpos0[int(model.jnt_qposadr[j])]), **law)
 
 
-def _passive(model: Any, j: int, kind: str) -> dict[str, Any]:
+def _dry(model: Compiled, j: int) -> float:
+    loss = float(model.dof_frictionloss[model.jnt_dofadr[j]])
+    return 0.0 if disabled(model, "FRICTIONLOSS", "CONSTRAINT") else loss
+
+
+def _passive(model: Compiled, j: int, kind: str) -> dict[str, Any]:
     """Damping, stiffness, rest and armature; coordinates count from the reference configuration."""
-    entries: dict[str, Any] = {"friction": 0.0}
-    if kind in ("revolute", "prismatic"):
-        entries["armature"] = float(model.dof_armature[model.jnt_dofadr[j]])
-    if not disabled(model, "DAMPER"):
-        entries["friction"] = float(model.dof_damping[model.jnt_dofadr[j]])
+    dof, q, axial = model.jnt_dofadr[j], int(model.jnt_qposadr[j]), kind in ("revolute", "prismatic")
+    friction, stiffness = float(model.dof_damping[dof]), float(model.jnt_stiffness[j])
+    rest = float(model.qpos_spring[q] - model.qpos0[q])
+    entries: dict[str, Any] = {"friction": 0.0 if disabled(model, "DAMPER") else friction}
+    if axial:
+        entries["armature"] = float(model.dof_armature[dof])
     if not disabled(model, "SPRING"):
-        entries["stiffness"] = float(model.jnt_stiffness[j])
-        if kind in ("revolute", "prismatic") and entries["stiffness"]:
-            q = int(model.jnt_qposadr[j])
-            entries["rest"] = float(model.qpos_spring[q] - model.qpos0[q])
+        entries["stiffness"] = stiffness
+        if axial and stiffness:
+            entries["rest"] = rest
     return entries

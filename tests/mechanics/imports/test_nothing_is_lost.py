@@ -11,7 +11,7 @@ from collections import Counter
 import pytest
 
 import ephs
-from ephs.mechanics.imports import node
+from ephs.mechanics.imports import mjcf_keys, node
 from ephs.mechanics.imports.read import read_model
 
 USED, SILENT = object(), None
@@ -219,7 +219,8 @@ MJCF_ROWS = [
     ("joint", 'armature="1"', USED),
     ("joint", 'ref="0.5"', USED),
     ("joint", 'margin="1"', "margin of joints: j"),
-    ("joint", 'solreflimit="0.1 1"', "solreflimit of joints: j"),
+    ("joint", 'solreflimit="0.1 1"', USED),
+    ("joint", 'solreflimit="0.1 1" limited="false"', USED),
     ("joint", 'solimplimit="0.1"', "solimplimit of joints: j"),
     ("joint", 'solreffriction="0.1 1"', "solreffriction of joints: j"),
     ("joint", 'solimpfriction="0.1"', "solimpfriction of joints: j"),
@@ -399,3 +400,49 @@ def test_a_read_that_is_deleted_in_the_source_is_told(monkeypatch, tmp_path):
             finally:
                 gone.clear()
             assert len(after) > len(before), line
+
+
+WHOLE = """<mujoco><compiler autolimits="true" angle="radian"/><option gravity="0 0 -1"/><worldbody>
+<geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 3" quat="1 1 0 0">
+<inertial pos="1 0 0" quat="1 0 1 0" mass="2" diaginertia="1 2 2.5"/>
+<joint name="j" pos="0 0 1" axis="0 1 0" range="-1 1" frictionloss="0.1" damping="1" ref="0.5" stiffness="3"
+  springref="1" armature="1" solreflimit="0.1 1"/>
+<geom name="g" type="box" pos="0 0 1" quat="1 1 0 0" size="1 1 1" friction="2" condim="6" solref="0.1 1" solmix="2"
+  priority="1" contype="3" conaffinity="3"/></body>
+<body name="c" pos="9 0 3"><joint name="f" type="slide" axis="1 0 0"/>
+<geom name="h" size="1" contype="0" conaffinity="0"/></body></worldbody>
+<contact><pair name="p" geom1="floor" geom2="h" condim="4" friction="0.3 0.3" solref="0.1 1"/></contact>
+<equality><weld name="e" body1="b" body2="c" anchor="1 0 0" torquescale="0"/>
+<joint name="r" joint1="j" joint2="f" polycoef="0 2 0 0 0"/></equality>
+<tendon><fixed name="t" stiffness="1" damping="1" springlength="1"><joint joint="j" coef="1"/></fixed></tendon>
+<actuator><position name="a" joint="j" kp="3" kv="1" gear="3" ctrlrange="-1 1"/></actuator></mujoco>"""
+ATTRIBUTES = {
+    "bodies": "pos quat mass inertia ipos iquat",
+    "joints": "pos axis range frictionloss damping ref stiffness springref armature solreflimit type",
+    "geoms": "type pos quat size friction condim solref solmix priority contype conaffinity",
+    "pairs": "geomname1 geomname2 condim friction solref",
+    "tendons": "stiffness damping springlength",
+    "actuators": "target gear gainprm biasprm biastype ctrlrange",
+    "equalities": "type torquescale data name1 name2",
+}
+
+
+def test_an_mjcf_read_whole_leaves_nothing_and_a_read_that_is_deleted_is_told(monkeypatch, tmp_path):
+    """Each array of the compiled model in turn is read without a record of it: what is read there alone is named."""
+    fields, gone = dict[str, None](), [""]
+    original = mjcf_keys.Compiled.__getattr__
+
+    def read(self, field):
+        fields[field] = None
+        return getattr(self.raw, field) if field == gone[0] else original(self, field)
+
+    monkeypatch.setattr(mjcf_keys.Compiled, "__getattr__", read)
+    plain = told(tmp_path, WHOLE, "xml")[1]
+    assert plain == "not modelled: softness of equality constraints: e, r"
+    found = list[str]()
+    for field in list(fields):
+        gone[0] = field
+        found += told(tmp_path, WHOLE, "xml")[1].splitlines()
+    said = {line.removeprefix("not modelled: ").partition(":")[0] for line in found}
+    expected = {f"{word} of {kind}" for kind, words in ATTRIBUTES.items() for word in words.split()}
+    assert expected <= said, expected - said
