@@ -74,7 +74,7 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # deprecated elements of the format
-            spec = mujoco.MjSpec.from_string(source.text, assets=source.assets)
+            spec = mujoco.MjSpec.from_string(source.text, include=source.models, assets=source.assets)
             spec.compiler.fusestatic = False
             given = _impossible_inertias(spec, draft)
             raw = spec.compile()

@@ -239,7 +239,18 @@ FAULTS = {
     "what MuJoCo does not know": ("xml", mjcf("<bodi/>"), "", ["MuJoCo says", "unrecognized element"]),
     "a body without mass": ("xml", mjcf('<body name="a"><joint/></body>'), "", ["MuJoCo says", "mass and inertia"]),
     "two bodies of a name": ("xml", mjcf('<body name="a"/><body name="a"/>'), "", ["MuJoCo says", "repeated name"]),
-    "attached models": ("xml", mjcf('<body name="a"><attach model="m"/></body>'), "attach", ["without <attach>"]),
+    "an attached model outside": (
+        "xml",
+        mjcf('<body name="a"><attach model="m"/></body>', '<asset><model name="m" file="../x.xml"/></asset>'),
+        'model "../x.xml"',
+        ["folder of"],
+    ),
+    "a model attached to itself": (
+        "xml",
+        mjcf('<body name="a"><attach model="m"/></body>', '<asset><model name="m" file="model.xml"/></asset>'),
+        'model "model.xml"',
+        ["within itself"],
+    ),
     "an include outside": ("xml", '<mujoco><include file="../x.xml"/></mujoco>', 'include "../x.xml"', ["folder of"]),
 }  # fmt: skip
 

@@ -156,3 +156,38 @@ def test_what_follows_from_masses_follows_from_those_of_the_file(more, given, wr
     found = scene.body("arm").inertia
     assert np.abs(np.diag(found) - [x, y, z]).max() < 1e-14
     assert abs(found[0, 1] - (0.001 if "full" in given else 0.0)) < 1e-15
+
+
+HAND = """<mujoco model="sub"><compiler meshdir="parts" angle="degree"/><default><joint damping="0.3"/></default>
+<asset><mesh name="m" file="wedge.obj"/>{deeper}</asset><worldbody><body name="hand" pos="0 0 0.1">
+<joint name="k" axis="0 1 0" range="-30 30"/><geom type="mesh" mesh="m"/>{finger}</body></worldbody>
+<actuator><motor name="pull" joint="k" gear="2"/></actuator></mujoco>"""
+ARM = """<mujoco><compiler angle="radian"/><asset><model name="s" file="sub/hand.xml"/></asset><worldbody>
+<body name="arm"><joint name="h" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/>
+<frame pos="0.5 0 0"><attach model="s" body="hand" prefix="a_"/></frame>
+<frame pos="-0.5 0 0" euler="0 0 1"><attach model="s" body="hand" prefix="b_"/></frame></body></worldbody></mujoco>"""
+TIP = '<mujoco><worldbody><body name="tip"><joint name="t" axis="0 1 0"/><geom size="0.1"/></body></worldbody></mujoco>'
+
+
+def test_attached_models_move_as_in_mujoco(tmp_path):
+    (tmp_path / "sub/parts").mkdir(parents=True)
+    (tmp_path / "sub/parts/wedge.obj").write_text(OBJ)
+    deeper, finger = '<model name="d" file="tip.xml"/>', '<attach model="d" body="tip" prefix="f_"/>'
+    (tmp_path / "sub/tip.xml").write_text(TIP)
+    (tmp_path / "sub/hand.xml").write_text(HAND.format(deeper=deeper, finger=finger))
+    (tmp_path / "arm.xml").write_text(ARM)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(5)
+    data.qpos[:], data.qvel[:] = rng.standard_normal((2, model.nq))
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    mujoco.mj_forward(model, data)
+    scene = ephs.load(tmp_path / "arm.xml")
+    names = [model.joint(j).name for j in range(model.njnt)]
+    assert names == ["h", "a_k", "a_f_t", "b_k", "b_f_t"] == [*scene.joints]
+    assert set(scene.actuators) == {"a_pull", "b_pull"}
+    dynamics = ephs.dynamics(scene)
+    state = dynamics.state(*(dict(zip(names, x, strict=True)) for x in (data.qpos, data.qvel)))
+    rates = dynamics.acceleration(state)
+    found = np.concatenate([rates[name] for name in names])
+    assert np.abs(found - data.qacc).max() < 1e-10 * np.abs(data.qacc).max()
