@@ -37,7 +37,8 @@ def export(
     out
         File to write: .c or .o, with a header .h beside it; .wasm.
     inputs
-        Joints on which forces are given from outside, between commas: joints.waist,joints.elbow.
+        Joints on which forces, and actuators whose controls, are given from outside, between commas:
+        joints.waist,actuators.servo.
     parameters
         Numbers that may be changed at the start, between commas: bodies.rod.mass,joints.bearing.friction.
     method
@@ -87,7 +88,8 @@ def fmu(
     out
         File to write, that ends in .fmu.
     inputs
-        Joints on which forces are given from outside, between commas: joints.waist,joints.elbow.
+        Joints on which forces, and actuators whose controls, are given from outside, between commas:
+        joints.waist,actuators.servo.
     parameters
         Numbers that may be changed before the start, between commas: bodies.rod.mass,joints.bearing.friction.
     outputs

@@ -28,11 +28,12 @@ class Task:
     Parameters
     ----------
     inputs
-        Joints that are driven, as ``joints.hip``.
+        Joints that are driven, as ``joints.hip``, and actuators of the scene, as ``actuators.servo``.
     outputs
         Names of what is observed, or beginnings of such, as ``joints``.
     limits
-        Largest size of an action, in N or N m: one number, or one for each.
+        Largest size of an action, in N or N m for joints: one number, or one for each; by default the range of an
+        actuator that has one, and 1 elsewhere.
     period
         Time in s between actions.
     reward
@@ -61,7 +62,7 @@ class Task:
 
     def __init__(
         self, scene: Scene, *, inputs: Sequence[str], reward: Callable[[Array, Array], float],
-        outputs: Sequence[str] = ("joints",), limits: float | Sequence[float] = 1.0, period: float = 0.02,
+        outputs: Sequence[str] = ("joints",), limits: float | Sequence[float] | None = None, period: float = 0.02,
         done: Callable[[Array], bool] = lambda _: False, horizon: int = 500,
         parameters: Mapping[str, tuple[float, float]] | None = None, method: str = "rk54", rtol: float = RTOL,
         step: float | None = None,
@@ -79,8 +80,13 @@ class Task:
                 raise ExportError("output", found=name, expected=", ".join(each.name for each in self.made.outputs))
         self.names = tuple(each.name for each in seen)
         self.places = np.array([each.place for each in seen], dtype=int)
-        size = np.broadcast_to(np.asarray(limits, dtype=float), (len(self.made.inputs),)).copy()
-        self.action_space = gymnasium.spaces.Box(-size, size, dtype=np.float64)
+        if limits is None:
+            low, high = np.array([each.limits for each in self.made.inputs], dtype=float).reshape(-1, 2).T
+            low, high = np.where(np.isfinite(low), low, -1.0), np.where(np.isfinite(high), high, 1.0)
+        else:
+            high = np.broadcast_to(np.asarray(limits, dtype=float), (len(self.made.inputs),)).copy()
+            low = -high
+        self.action_space = gymnasium.spaces.Box(low, high, dtype=np.float64)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (len(seen),), dtype=np.float64)
 
     def drawn(self, rng: np.random.Generator) -> Array | None:

@@ -6,7 +6,8 @@ from ephs.operad.messages import TextError
 
 TEXTS: Final = {
     "method": "method {found!r} cannot be exported, expected {expected}",
-    "input": "input {found!r}: expected a joint with a free coordinate, one of {expected}",
+    "input": "input {found!r}: expected a joint with a free coordinate or an actuator, one of {expected}",
+    "input parameter": "parameter {found!r} belongs to the input {where!r}, expected a number of another element",
     "output": "output {found!r}: expected one of {expected}, or the beginning of such a name",
     "function": "the input at {where} is a Python function, expected a constant: name it as an input of the export",
     "python": "{where}: a component is evaluated by Python, expected staged functions",

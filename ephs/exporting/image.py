@@ -1,6 +1,7 @@
 """One mechanism's run as functions in machine code and the arrays of their arguments."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -11,6 +12,8 @@ from ephs.exporting.outputs import outputs_program
 from ephs.exporting.parameters import Dependence, dependence
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
+from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.build import component_path, tension_port
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.tree.equations.equations import Equations
@@ -31,21 +34,40 @@ MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")
 
 @final
 @dataclass(frozen=True, slots=True)
+class Share:
+    """What an input adds to the arrays of a run: ``ratio`` times its value, at a place of the forces on joints or, with
+    ``supplied``, of what is supplied to attachments, such as tensions of tendons."""
+
+    supplied: bool
+    place: int
+    ratio: float
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Variable:
     """An input or output number.
 
     Attributes
     ----------
     place
-        Of an input: its place in the array of given forces. Of an output: its place among the outputs.
+        Of an output or a parameter: its place among them.
     start
         Its value at the start.
+    shares, limits
+        Of an input: what it adds, and the range within which it does.
     """
 
     name: str
     unit: str
     place: int
     start: float
+    shares: tuple[Share, ...] = ()
+    limits: tuple[float, float] = (-math.inf, math.inf)
+
+    def clipped(self, value: float) -> float:
+        """A value within the limits."""
+        return min(max(value, self.limits[0]), self.limits[1])
 
 
 @final
@@ -59,8 +81,8 @@ class Image:
         Calls with all their arrays: many steps, outputs, rates of change of the state.
     control
         What chooses the steps.
-    drive
-        (forces,) given forces.
+    drive, supply
+        (forces,) given forces on joints, and what is supplied to attachments.
     q, y
         The state in the memory of the march.
     out
@@ -77,6 +99,7 @@ class Image:
     rates: Bound
     control: Table[Steering]
     drive: Array
+    supply: Array
     out: Array
     acceleration: tuple[Array, int, int]
     inputs: tuple[Variable, ...]
@@ -95,7 +118,8 @@ def image_of(
     Parameters
     ----------
     inputs
-        Names of joints, as ``joints.pin``, on whose free coordinates a force or torque is given from outside.
+        Names of joints, as ``joints.pin``, on whose free coordinates a force or torque is given from outside, and of
+        the scene's actuators, as ``actuators.servo``, whose controls are.
     parameters
         Paths of numbers of the model that may be changed, as of `ephs.sweep`.
     until
@@ -118,6 +142,10 @@ def image_of(
         return _started(changed(values), inputs, method, (rtol, atol, step), until)
 
     found = _started(model, inputs, method, (rtol, atol, step), until)
+    for path in parameters:
+        for name in inputs:
+            if name.startswith("actuators.") and path.startswith(f"{name}."):
+                raise ExportError("input parameter", found=path, where=name)
     if not parameters:
         return found
     start = {path: read(model, path) for path in parameters}
@@ -132,10 +160,10 @@ def _started(
     """Return the run without parameters."""
     (rtol, atol, step), given = steps, dict.fromkeys(inputs, 0.0)
     if isinstance(model, Scene):
-        joints = [f"joints.{name}" for name in model.joints]
+        known = [*(f"joints.{name}" for name in model.joints), *_actuators(model)]
         for name in inputs:
-            if name not in joints:
-                raise ExportError("input", found=name, expected=", ".join(joints))
+            if name not in known:
+                raise ExportError("input", found=name, expected=", ".join(known))
         problem = problem_of_scene(model, None, given)
     else:
         problem = problem_of_system(model)
@@ -151,10 +179,10 @@ def _started(
     leg = explicit.many(span)
     if leg is None:
         raise ExportError("python", where=problem.name)
-    return _image(problem, equations, leg, inputs)
+    return _image(problem, equations, leg, _inputs(equations, model, inputs))
 
 
-def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[str]) -> Image:
+def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[Variable]) -> Image:
     memory, control = leg.memory, leg.steering
     reduced = eq.reduced
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
@@ -175,8 +203,8 @@ def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[str]) -> 
     if found:
         eq.refuse(found, eq.engine.failed)
     return Image(
-        problem.name, leg.march, read, rates, control, eq.drive, out, (change, eq.nv, eq.n),
-        tuple(_inputs(eq, inputs)), tuple(_outputs(eq, out)), (), tuple(_numbers(parts)), (),
+        problem.name, leg.march, read, rates, control, eq.drive, eq.given.supply, out, (change, eq.nv, eq.n),
+        tuple(inputs), tuple(_outputs(eq, out)), (), tuple(_numbers(parts)), (),
     )  # fmt: skip
 
 
@@ -189,15 +217,46 @@ def _numbers(parts: Mapping[str, Any]) -> Iterator[Array]:
             yield part
 
 
-def _inputs(eq: Equations, names: Sequence[str]) -> list[Variable]:
-    t, out = eq.reduced.tables, []
+def _actuators(scene: Scene) -> dict[str, Actuator]:
+    """The actuators of a scene by the names of their controls."""
+    found = {f"{section}.{name}": each for section, name, each in scene.all_attachments()}
+    return {name: each for name, each in found.items() if isinstance(each, Actuator)}
+
+
+def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[Variable]:
+    t, out = eq.reduced.tables, list[Variable]()
+    actuators = _actuators(scene) if isinstance(scene, Scene) else {}
+
+    def driven(path: str) -> tuple[int, int]:
+        edge = next(i for i, edge in enumerate(eq.reduced.edges) if str(edge.path) == path)
+        return int(t.r_at[edge]), int(t.dim[edge])
+
     for name in names:
-        edge = next(i for i, edge in enumerate(eq.reduced.edges) if str(edge.path) == name)
-        first, size = int(t.r_at[edge]), int(t.dim[edge])
+        if name in actuators:
+            out.append(_control(eq, name, actuators[name], driven))
+            continue
+        first, size = driven(name)
         for k in range(size):
             whole = name if size == 1 else f"{name}.{k}"
-            out.append(Variable(whole, "", first + k, float(eq.drive[first + k])))
+            share = Share(supplied=False, place=first + k, ratio=1.0)
+            out.append(Variable(whole, "", first + k, float(eq.drive[first + k]), (share,)))
     return out
+
+
+def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tuple[int, int]]) -> Variable:
+    """The control of an actuator, with its forces on joints, or on the length of its tendon."""
+    shares: list[Share] = []
+    if of.tendon is None:
+        for joint, ratio in zip(of.joints, of.ratio.tolist(), strict=True):
+            shares.append(Share(False, driven(str(component_path("joints", joint)))[0], ratio))
+    else:
+        net, (ratio,) = eq.reduced.attaching.network, of.ratio.tolist()
+        for one in net.injections:
+            if one.port == tension_port(of.tendon):
+                rows = enumerate(one.row.tolist(), len(net.inputs))
+                shares += [Share(True, place, ratio * row) for place, row in rows if row]
+    limits = (-math.inf, math.inf) if of.limits is None else (float(of.limits[0]), float(of.limits[1]))
+    return Variable(name, "", 0, 0.0, tuple(shares), limits)
 
 
 def _outputs(eq: Equations, values: Array) -> list[Variable]:

@@ -3,6 +3,7 @@
 The memory of one instance is one block: real numbers first, then integers. Four functions work on it, see `header`.
 """
 
+import math
 import re
 import struct
 from dataclasses import dataclass
@@ -228,12 +229,34 @@ class _Writer:
 
     def _inputs(self, image: Image) -> str:
         lines: list[str] = []
-        kind, first = self.place(image.drive)
+        sums: dict[tuple[bool, int], list[tuple[str, float]]] = {}
         for k, each in enumerate(image.inputs):
             lines.append(f"  %i{k} = getelementptr double, ptr %values, i64 {k}")
             lines.append(f"  %x{k} = load double, ptr %i{k}")
-            where = self.pointer(kind, first + each.place, lines)
-            lines.append(f"  store double %x{k}, ptr {where}")
+            name = f"%x{k}"
+            for word, limit in zip(("ogt", "olt"), each.limits, strict=True):
+                if math.isfinite(limit):
+                    bound = _hexadecimal(limit)
+                    lines.append(f"  {name}{word} = fcmp {word} double {name}, {bound}")
+                    lines.append(f"  {name}.{word} = select i1 {name}{word}, double {name}, double {bound}")
+                    name = f"{name}.{word}"
+            for share in each.shares:
+                sums.setdefault((share.supplied, share.place), []).append((name, share.ratio))
+        for (supplied, place), terms in sums.items():
+            array = image.supply if supplied else image.drive
+            at = [(each.clipped(each.start), s) for each in image.inputs for s in each.shares]
+            base = float(array[place]) - sum(
+                s.ratio * value for value, s in at if (s.supplied, s.place) == (supplied, place)
+            )
+            total = _hexadecimal(base)
+            for name, ratio in terms:
+                count = len(lines)
+                lines.append(f"  %m{count} = fmul double {name}, {_hexadecimal(ratio)}")
+                lines.append(f"  %s{count} = fadd double {total}, %m{count}")
+                total = f"%s{count}"
+            kind, first = self.place(array)
+            where = self.pointer(kind, first + place, lines)
+            lines.append(f"  store double {total}, ptr {where}")
         return _function("void", f"{self.name}_inputs", "ptr %memory, ptr %values", [*lines, "  ret void"])
 
     def _parameters(self, image: Image) -> str:

@@ -41,7 +41,8 @@ def export(
     name
         Prefix of the names of its functions; default: the file's name.
     inputs
-        Joints, as ``joints.pin``, with inputs: forces in N or N m on their free coordinates.
+        Joints, as ``joints.pin``, with inputs: forces in N or N m on their free coordinates; actuators of the scene, as
+        ``actuators.servo``, with their controls.
     parameters
         Paths of numbers that can be changed at the start, as ``bodies.rod.mass``. The program's numbers must be
         polynomials of degree 2 in them, so that nothing is approximated.

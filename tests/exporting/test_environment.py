@@ -85,3 +85,15 @@ def test_what_is_not_there_is_refused_by_name():
 def test_it_is_an_environment_of_gymnasium(task):
     assert isinstance(Environment(task), gymnasium.Env)
     assert isinstance(Environments(task, 2), gymnasium.vector.VectorEnv)
+
+
+def test_actions_of_actuators_have_their_ranges(tmp_path):
+    file = tmp_path / "arm.toml"
+    file.write_text(
+        'format = 1\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.h]\ntype = "revolute"\n'
+        'bodies = ["ground", "arm"]\nat = [0.5, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n'
+        '[actuators.push]\njoints = ["h"]\nratio = 3.0\nlimits = [-0.5, 2.0]\n[actuators.free]\njoints = ["h"]\n'
+    )
+    names = ["actuators.push", "actuators.free", "joints.h"]
+    found = Task(ephs.load(file), inputs=names, reward=lambda *_: 0.0).action_space
+    assert (found.low.tolist(), found.high.tolist()) == ([-0.5, -1.0, -1.0], [2.0, 1.0, 1.0])

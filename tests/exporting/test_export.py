@@ -170,3 +170,65 @@ def test_webassembly_gives_the_same_bits(crank, tmp_path):
     assert calls["crank_advance"](store, base, 0.3) == 0
     assert calls["crank_outputs"](store, base, out) == 0
     np.testing.assert_array_equal(np.frombuffer(memory.read(store, out, out + expected.nbytes)), expected)
+
+
+CONTROLLED = {
+    # two joints by one control, and two controls of one joint, clipped
+    "joints": """format = 1
+[bodies.arm]
+mass = 1.0
+inertia = [0.01, 0.02, 0.02]
+position = [0.3, 0.0, 0.0]
+[bodies.hand]
+mass = 0.5
+inertia = [0.01, 0.01, 0.01]
+position = [0.6, 0.0, 0.0]
+[joints.h]
+type = "revolute"
+bodies = ["ground", "arm"]
+axis = [0.0, 1.0, 0.0]
+at = [0.0, 0.0, 0.0]
+friction = 0.1
+drive = 0.2
+[joints.k]
+type = "revolute"
+bodies = ["arm", "hand"]
+axis = [0.0, 1.0, 0.0]
+at = [0.5, 0.0, 0.0]
+[actuators.push]
+joints = ["h"]
+ratio = -3.0
+limits = [0.5, 2.0]
+[actuators.both]
+joints = ["h", "k"]
+ratio = [1.0, -2.0]
+limits = [-0.1, 0.1]
+""",
+}
+CONTROLLED["tendon"] = (
+    CONTROLLED["joints"].replace('joints = ["h", "k"]\nratio = [1.0, -2.0]', 'tendon = "cable"\nratio = -4.0')
+    + '[tendons.cable]\nbodies = ["ground", "arm", "hand"]\n'
+    "points = [[0.0, 0.0, 1.0], [0.1, 0.0, 0.1], [0.0, 0.0, 0.05]]\n"
+)
+
+
+@pytest.mark.parametrize("way", CONTROLLED)
+@pytest.mark.parametrize("controls", [(1.0, 0.05), (5.0, -7.0), (-3.0, 0.0)])
+def test_controls_of_actuators_are_inputs(way, controls, tmp_path):
+    (tmp_path / "arm.toml").write_text(CONTROLLED[way])
+    model, names = ephs.load(tmp_path / "arm.toml"), ["actuators.push", "actuators.both"]
+    run = Run(exported(image_of(model, inputs=names, until=0.2), "made"))
+    run.call("inputs", None, np.array(controls))
+    assert run.call("advance", ctypes.c_int64, 0.2) == 0
+    found = run.outputs()
+    same = ephs.simulate(model, 0.2, method="rk87", inputs=dict(zip(names, controls, strict=True)), save_at=[0.2])
+    for joint in ("h", "k"):
+        assert found[f"joints.{joint}.rate"] == pytest.approx(same.joint(joint).rate[-1, 0], rel=1e-7)
+
+
+def test_a_parameter_of_an_actuator_that_is_an_input_is_refused(tmp_path):
+    (tmp_path / "arm.toml").write_text(CONTROLLED["joints"])
+    with pytest.raises(ephs.ExportError, match=r"actuators\.push\.ratio"):
+        image_of(
+            ephs.load(tmp_path / "arm.toml"), inputs=["actuators.push"], parameters=["actuators.push.ratio"], until=0.2
+        )

@@ -11,6 +11,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Reference
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
+from ephs.solve.sampled import Sampled
 
 
 def dynamics(
@@ -27,8 +28,10 @@ def dynamics(
     scene
         With its drives, springs, friction and prescribed motions; its initial state is ``state0``. The names of bodies
         and joints of a system are the paths of their boxes.
-    initial, inputs, reference
+    initial, reference
         Of a system, as in `simulate`.
+    inputs
+        As in `simulate`; those of a scene are constants by the names of joints, bodies, markers or actuators.
 
     Raises
     ------
@@ -41,6 +44,9 @@ def dynamics(
     """
     if not isinstance(scene, Scene):
         return Dynamics(problem_of_system(scene, initial, inputs, reference))
-    if given := [name for name, of in (("initial", initial), ("inputs", inputs), ("reference", reference)) if of]:
+    if given := [name for name, of in (("initial", initial), ("reference", reference)) if of]:
         raise OptionError(given[0], "a value", "none: a scene has its own")
-    return Dynamics(problem_of_scene(scene))
+    for name, value in (inputs or {}).items():
+        if callable(value) or isinstance(value, Sampled):
+            raise OptionError(f"inputs[{name!r}]", value, "a number or numbers: dynamics have no time")
+    return Dynamics(problem_of_scene(scene, None, inputs))

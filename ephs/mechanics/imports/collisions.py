@@ -23,6 +23,8 @@ from ephs.semantics.bundle import Array
 
 LOSS, SLIP, FRICTION, SINKING = 1.0, 1e-2, 1.0, 0.02
 """Loss in s/m, slip velocity in m/s, coefficient of friction, and time constant τ in s."""
+STOP_LOSS = 10.0
+"""Loss of the stops of joints in s/rad or s/m: none rebounds at more than its inverse, 0.1 rad/s or m/s."""
 SOLIDS = ("sphere", "box", "cylinder", "capsule", "plane")
 CORNERS = {"capsule": 1, "cylinder": 2, "box": 8}
 """Corners of the shapes that meet meshes in pairs of edges."""

@@ -109,15 +109,15 @@ class Draft:
             self.leave("dry friction of joints with several degrees of freedom", name)
         return {"dry": {"coulomb": float(force)}} if force and freedoms == 1 else {}
 
-    def limit(self, name: str, lower: float, upper: float) -> None:
-        """Add stops to a joint of one degree of freedom, or a note of its limits."""
+    def limit(self, name: str, lower: float, upper: float, **law: float) -> None:
+        """Add stops to a joint of one degree of freedom, with keys of their law, or a note of its limits."""
         sides = [float(value) if abs(value) < UNLIMITED else np.nan for value in (lower, upper)]
         if np.all(np.isnan(sides)):
             return
         if not self.contact or lower >= upper:
             self.leave("limits of", name)
         else:
-            self._joints[self._joint_names[name]]["limits"] = sides
+            self._joints[self._joint_names[name]] |= {"limits": sides, **law}
 
     def surface(self, link: str, name: str, kind: str, value: Any, place: Array, **law: Any) -> str:
         """A surface of a link, with keys of its table; returns its name in the scene."""
@@ -140,7 +140,7 @@ class Draft:
     def hold(self, name: str) -> None:
         """Lock a joint of one degree of freedom."""
         entries = self._joints[self._joint_names[name]]
-        for key in ("armature", "dry", "limits"):
+        for key in ("armature", "dry", "limits", "limit_stiffness", "limit_loss"):
             entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
 
@@ -208,7 +208,8 @@ class Draft:
         found: dict[str, Any] = {"tendon": tendon, "ratio": ratio}
         if isinstance(ratio, Mapping):
             found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
-        more = {} if limits is None or limits[0] >= limits[1] else {"limits": list(map(float, limits))}
+        bounded = limits is not None and bool(np.all(np.isfinite(limits)))
+        more = {"limits": _plain(limits)} if limits is not None and bounded else {}
         others = {each: table for each, table in self._tendons.items() if each != tendon}
         self._actuators[self._own(name, self._actuators | others)] = found | more
 

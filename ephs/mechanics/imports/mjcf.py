@@ -5,24 +5,30 @@ Source: the MuJoCo documentation, "XML Reference" and "Computation". Joints are 
 
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.imports.collisions import STOP_LOSS
 from ephs.mechanics.imports.draft import Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.mjcf_actuators import actuators, tendons
-from ephs.mechanics.imports.mjcf_contacts import contacts
-from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Keys, disabled
+from ephs.mechanics.imports.mjcf_contacts import contacts, rate_and_ratio
+from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Compiled, disabled
 from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
 from ephs.mechanics.imports.mjcf_names import Names, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
 from ephs.mechanics.imports.mjcf_source import Source
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
+from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 
-Inertias = dict[int, tuple[float, Any]]
+LEAST = 2e-15
+"""Least mass in kg and moment of inertia in kg m² that MuJoCo takes of a moving body, with some room."""
+ROUNDED = 1e-12
+"""Share of a moment of inertia that is lost to rounding in its principal axes."""
 DIMENSIONS = {"free": 6, "spherical": 3, "prismatic": 1, "revolute": 1}
 READ = (
     *("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "qpos0", "qpos_spring"),
@@ -42,6 +48,16 @@ READ = (
 )
 
 
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Inertia:
+    """A mass, and an inertia (3, 3) in the axes of its body, or else in those of the inertial frame."""
+
+    mass: float
+    tensor: Array
+    in_body: bool
+
+
 def read_mjcf(root: Any, draft: Draft) -> None:
     """The bodies and joints of a model; several joints of a body get frames without mass between them."""
     source = Source(root, draft)
@@ -58,20 +74,20 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # deprecated elements of the format
-            spec = mujoco.MjSpec.from_string(source.text, assets=source.assets)
+            spec = mujoco.MjSpec.from_string(source.text, include=source.models, assets=source.assets)
             spec.compiler.fusestatic = False
-            given = _own_inertias(spec)
-            model = spec.compile()
-            own: Inertias = {int(body.id): inertia for body, inertia in given}
-            keys = Keys.of(spec, draft)
+            given = _impossible_inertias(spec, draft)
+            raw = spec.compile()
+            own = {int(body.id): inertia for body, inertia in given}
+            model = Compiled(spec, raw, draft)
     except (ValueError, RuntimeError) as error:  # MuJoCo's own errors among them
         words = " ".join(str(error).split())
         draft.faults.append(fault("not compiled", "", f"that MuJoCo says: {words}"))
         return
     finally:
         mujoco.set_mju_user_warning(before)
-    sizes = [float(np.abs(values).max(initial=0.0)) for values in _numbers(model, own)]
-    lengths = [np.linalg.norm(rows, axis=1) for rows in _directions(model)]
+    sizes = [float(np.abs(values).max(initial=0.0)) for values in _numbers(raw, own)]
+    lengths = [np.linalg.norm(rows, axis=1) for rows in _directions(raw)]
     if not all(size <= LARGEST for size in sizes) or not all(np.all(np.abs(n - 1.0) < 0.1) for n in lengths):
         draft.faults.append(fault("large", "", "a compiled model with other numbers, or none", most=LARGEST))
         return
@@ -80,24 +96,25 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     names = Names(model)
     draft.gravity = [0.0, 0.0, 0.0] if disabled(model, "GRAVITY") else list(model.opt.gravity)
     threads = screws(model, names)
+    model.pass_by("bodies", 0)
     for b in range(1, model.nbody):
         _body(model, b, own, names, draft)
-        keys.note("bodies", b, names.bodies[b])
-        _joints(model, b, names, threads, keys, draft)
+        model.name("bodies", b, names.bodies[b])
+        _joints(model, b, names, threads, draft)
         shapes(model, b, names.bodies[b], source, draft)
-    contacts(model, names, keys, draft)
-    actuators(model, names, tendons(model, names, keys, draft), keys, draft)
+    contacts(model, names, draft)
+    actuators(model, names, tendons(model, names, draft), draft)
     loops(model, names, {thread.equality for thread in threads.values()}, draft)
     noted(model, names, draft)
-    keys.note_options()
+    model.leave_unread()
 
 
-def _numbers(model: Any, own: Inertias) -> Iterator[Any]:
+def _numbers(model: Any, own: Mapping[int, Inertia]) -> Iterator[Any]:
     """All that is read of a compiled model."""
     yield model.opt.gravity
-    for mass, inertia in own.values():
-        yield mass
-        yield inertia
+    for inertia in own.values():
+        yield inertia.mass
+        yield inertia.tensor
     for name in READ:
         yield getattr(model, name)
 
@@ -108,38 +125,64 @@ def _directions(model: Any) -> Iterator[Any]:
     for name in ("body_quat", "body_iquat", "geom_quat", "site_quat", "mesh_quat"):
         yield getattr(model, name)
     yield model.jnt_axis[model.jnt_type >= int(mujoco.mjtJoint.mjJNT_SLIDE)]
-    yield model.eq_data[model.eq_type == int(mujoco.mjtEq.mjEQ_WELD), 6:10]
+    welds = (model.eq_type == int(mujoco.mjtEq.mjEQ_WELD)) & (model.eq_objtype == int(mujoco.mjtObj.mjOBJ_BODY))
+    yield model.eq_data[welds, 6:10]
 
 
-def _own_inertias(spec: Any) -> list[tuple[Any, tuple[float, Any]]]:
-    """The numerical inertias of bodies, replaced by valid ones because MuJoCo refuses impossible ones.
+def _impossible_inertias(spec: Any, draft: Draft) -> list[tuple[Any, Inertia]]:
+    """Inertias that MuJoCo refuses, each with its body, to which the nearest possible one is given for compilation.
 
     Left alone are models that change them as they are compiled.
     """
-    c, found = spec.compiler, list[tuple[Any, tuple[float, Any]]]()
+    c, found = spec.compiler, list[tuple[Any, Inertia]]()
     if c.balanceinertia or c.boundmass > 0.0 or c.boundinertia > 0.0 or c.settotalmass > 0.0 or c.inertiafromgeom == 1:
         return found
-    for body in spec.bodies[1:]:
-        if body.explicitinertial:
-            whole = np.isfinite(body.fullinertia).all()
-            found.append((body, (float(body.mass), np.array(body.fullinertia if whole else body.inertia))))
-            body.mass, body.inertia = 1.0, np.ones(3)
-            body.fullinertia = np.array([np.nan, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for number, body in enumerate(spec.bodies[1:], 1):
+        if not body.explicitinertial:
+            continue
+        whole = bool(np.isfinite(body.fullinertia).all())
+        given = Inertia(float(body.mass), _tensor(body.fullinertia) if whole else np.diag(body.inertia), whole)
+        if not (np.isfinite(given.mass) and np.isfinite(given.tensor).all()):  # the check of all numbers refuses them
+            body.mass, body.inertia, body.fullinertia = 1.0, np.ones(3), [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+            found.append((body, given))
+            continue
+        moments, axes = np.linalg.eigh(given.tensor) if whole else (np.array(body.inertia), np.eye(3))
+        largest = moments.max()
+        lacking = 2.0 * largest - moments.sum()
+        if given.mass >= LEAST and moments.min() >= LEAST and lacking <= -ROUNDED * largest:
+            continue
+        found.append((body, given))
+        # The two smaller moments grow equally until their sum is the largest.
+        more = max(0.5 * (lacking + 2.0 * ROUNDED * abs(largest)), 0.0)
+        order = np.argsort(moments)
+        moments[order[:2]] += more
+        moments = np.maximum(moments, LEAST)
+        body.mass = max(given.mass, LEAST)
+        if whole:
+            near = axes @ np.diag(moments) @ axes.T
+            body.fullinertia = near[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        else:
+            body.inertia = moments
+        if lacking > ROUNDED * largest:
+            what = "the impossible inertia, in what MuJoCo derives of it (dampratio, springdamper), of"
+            draft.leave(what, body.name or f"body_{number}")
     return found
 
 
-def _body(model: Any, b: int, own: Inertias, names: Names, draft: Draft) -> None:
-    mass, moments = own.get(b, (float(model.body_mass[b]), np.array(model.body_inertia[b])))
-    if moments.shape == (6,):
-        xx, yy, zz, xy, xz, yz = moments
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    else:
-        tensor = np.diag(moments)
-    rotation = pose(rotation=model.body_iquat[b])[:4]
-    draft.body(names.bodies[b], mass, turned_tensor(rotation, tensor), model.body_ipos[b])
+def _tensor(entries: Any) -> Array:
+    """The tensor (3, 3) of its entries xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], keys: Keys, draft: Draft) -> None:
+def _body(model: Compiled, b: int, own: Mapping[int, Inertia], names: Names, draft: Draft) -> None:
+    principal = pose(rotation=model.body_iquat[b])[:4]
+    given = own.get(b, Inertia(float(model.body_mass[b]), np.diag(model.body_inertia[b]), in_body=False))
+    tensor = given.tensor if given.in_body else turned_tensor(principal, given.tensor)
+    draft.body(names.bodies[b], given.mass, tensor, model.body_ipos[b])
+
+
+def _joints(model: Compiled, b: int, names: Names, threads: Mapping[int, Thread], draft: Draft) -> None:
     """The chain from a body's parent to it."""
     body, before = names.bodies[b], names.bodies[int(model.body_parentid[b])]
     at = pose(model.body_pos[b], model.body_quat[b])
@@ -155,9 +198,10 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], key
             j = thread.hinge
             draft.rename(names.joints[thread.slide], names.joints[j])
         kind, last = names.kinds[j], not rest
-        frame = pose(model.jnt_pos[j] if kind in ("revolute", "spherical") else (0.0, 0.0, 0.0))
+        centre, axis = model.jnt_pos[j], model.jnt_axis[j]
+        frame = pose(centre if kind in ("revolute", "spherical") else (0.0, 0.0, 0.0))
         if kind in ("revolute", "prismatic"):
-            turned = along(model.jnt_axis[j], frame)
+            turned = along(axis, frame)
             assert turned is not None  # MuJoCo makes axes unit vectors
             frame = turned
         after = body if last else draft.frame_without_mass(names.between(b, j))
@@ -169,33 +213,45 @@ def _joints(model: Any, b: int, names: Names, threads: Mapping[int, Thread], key
                 entries[key] += thread.pitch**2 * slide[key]
             entries |= draft.dry(names.joints[j], _dry(model, j) + abs(thread.pitch) * _dry(model, thread.slide), 1)
         draft.joint(names.joints[j], kind, before, after, SE3.compose(at, frame), frame, entries)
-        limited = bool(model.jnt_limited[j]) and not disabled(model, "LIMIT", "CONSTRAINT")
-        stopped = limited and kind in ("revolute", "prismatic")
-        if stopped:
-            draft.limit(names.joints[j], *(model.jnt_range[j] - model.qpos0[int(model.jnt_qposadr[j])]))
-        elif limited:
-            draft.leave("limits of", names.joints[j])
-        pointless = SOFT_STOPS if not (stopped and draft.contact) else ()
         for each in (j,) if thread is None else (thread.hinge, thread.slide):
-            keys.note("joints", each, names.joints[each], (*pointless, *(() if _dry(model, each) else SOFT_DRY)))
+            model.name("joints", each, names.joints[each])
+            _stops(model, each, names, draft, of_screw=thread is not None and each == thread.slide)
+            if not _dry(model, each):
+                model.pass_by("joints", each, *SOFT_DRY)
         before, at = after, pose()
 
 
-def _dry(model: Any, j: int) -> float:
-    off = disabled(model, "FRICTIONLOSS", "CONSTRAINT")
-    return 0.0 if off else float(model.dof_frictionloss[model.jnt_dofadr[j]])
+def _stops(model: Compiled, j: int, names: Names, draft: Draft, *, of_screw: bool) -> None:
+    """Limits of a joint; their stiffness is the inertia that it moves by MuJoCo's stiffness per inertia."""
+    limits, name = np.array(model.jnt_range[j]), names.joints[j]
+    off = not bool(model.jnt_limited[j]) or disabled(model, "LIMIT", "CONSTRAINT")
+    lone = names.kinds[j] in ("revolute", "prismatic") and not of_screw
+    if off or not lone or not draft.contact:
+        model.pass_by("joints", j, *SOFT_STOPS)
+        if not off:
+            draft.leave("limits of", name)
+        return
+    rate, ratio = rate_and_ratio(model.jnt_solref[j])
+    stiffness = rate**2 / max(float(model.raw.dof_invweight0[model.jnt_dofadr[j]]), 1.0 / LARGEST)
+    law = {"limit_stiffness": min(stiffness, LARGEST), "limit_loss": min(STOP_LOSS * ratio, LARGEST)}
+    draft.limit(name, *(limits - model.qpos0[int(model.jnt_qposadr[j])]), **law)
 
 
-def _passive(model: Any, j: int, kind: str) -> dict[str, Any]:
+def _dry(model: Compiled, j: int) -> float:
+    loss = float(model.dof_frictionloss[model.jnt_dofadr[j]])
+    return 0.0 if disabled(model, "FRICTIONLOSS", "CONSTRAINT") else loss
+
+
+def _passive(model: Compiled, j: int, kind: str) -> dict[str, Any]:
     """Damping, stiffness, rest and armature; coordinates count from the reference configuration."""
-    entries: dict[str, Any] = {"friction": 0.0}
-    if kind in ("revolute", "prismatic"):
-        entries["armature"] = float(model.dof_armature[model.jnt_dofadr[j]])
-    if not disabled(model, "DAMPER"):
-        entries["friction"] = float(model.dof_damping[model.jnt_dofadr[j]])
+    dof, q, axial = model.jnt_dofadr[j], int(model.jnt_qposadr[j]), kind in ("revolute", "prismatic")
+    friction, stiffness = float(model.dof_damping[dof]), float(model.jnt_stiffness[j])
+    rest = float(model.qpos_spring[q] - model.qpos0[q])
+    entries: dict[str, Any] = {"friction": 0.0 if disabled(model, "DAMPER") else friction}
+    if axial:
+        entries["armature"] = float(model.dof_armature[dof])
     if not disabled(model, "SPRING"):
-        entries["stiffness"] = float(model.jnt_stiffness[j])
-        if kind in ("revolute", "prismatic") and entries["stiffness"]:
-            q = int(model.jnt_qposadr[j])
-            entries["rest"] = float(model.qpos_spring[q] - model.qpos0[q])
+        entries["stiffness"] = stiffness
+        if axial and stiffness:
+            entries["rest"] = rest
     return entries

@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
-from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Keys, disabled
+from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Compiled, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.imports.mjcf_routes import Route, route_of
 
@@ -29,13 +29,14 @@ class Line:
     length: float
 
 
-def tendons(model: Any, names: Names, keys: Keys, draft: Draft) -> dict[int, str]:
+def tendons(model: Compiled, names: Names, draft: Draft) -> dict[int, str]:
     """Springs and dampers of fixed tendons, and of those from site to site; number -> name of the scene's tendons."""
     found: dict[int, str] = {}
     for t in range(model.ntendon):
         name, line, route = _named(model, t), _of_tendon(model, t), route_of(model, t)
-        stiffness = 0.0 if disabled(model, "SPRING") else float(model.tendon_stiffness[t].flat[0])
-        damping = 0.0 if disabled(model, "DAMPER") else float(model.tendon_damping[t].flat[0])
+        stiffness, damping = (float(x[t].flat[0]) for x in (model.tendon_stiffness, model.tendon_damping))
+        stiffness = 0.0 if disabled(model, "SPRING") else stiffness
+        damping = 0.0 if disabled(model, "DAMPER") else damping
         low, high = model.tendon_lengthspring[t].tolist()
         slack = route is not None and low == 0.0 < high
         taut = stiffness if low == high or slack else 0.0
@@ -53,11 +54,12 @@ def tendons(model: Any, names: Names, keys: Keys, draft: Draft) -> dict[int, str
             draft.leave("damping that is not linear of", name)
         if stiffness and not taut:
             draft.leave("slack of", name)
-        keys.note("tendons", t, name, (*SOFT_STOPS, *SOFT_DRY))
+        model.name("tendons", t, name)
+        model.pass_by("tendons", t, *SOFT_STOPS, *SOFT_DRY)
     return found
 
 
-def actuators(model: Any, names: Names, ropes: dict[int, str], keys: Keys, draft: Draft) -> None:
+def actuators(model: Compiled, names: Names, ropes: dict[int, str], draft: Draft) -> None:
     """Actuators on joints with one degree of freedom and on tendons; ``ropes``: number -> name of the scene's tendons,
     to which those are added that are needed.
     """
@@ -68,6 +70,7 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], keys: Keys, draft
         group = int(model.actuator_group[a])
         if disabled(model, "ACTUATION") or (0 <= group < GROUPS and model.opt.disableactuator >> group & 1):
             draft.leave("disabled actuators", name)
+            model.pass_by("actuators", a)
             continue
         kind, target, gear = int(model.actuator_trntype[a]), int(model.actuator_trnid[a, 0]), model.actuator_gear[a]
         lawful = (
@@ -86,12 +89,13 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], keys: Keys, draft
         known = route is not None or (line is not None and all(draft.knows(names.joints[j]) for j in line.joints))
         if not lawful or not known:
             draft.leave("actuators", name)
+            model.pass_by("actuators", a)
             continue
         by = float(gear[0])
         if line is not None:
             line = Line(line.joints, tuple(by * x for x in line.coefficients), by * line.length)
-        affine = int(model.actuator_biastype[a]) == biases.mjBIAS_AFFINE
-        constant, by_length, by_rate = (float(x) if affine else 0.0 for x in model.actuator_biasprm[a, :3])
+        affine, bias = int(model.actuator_biastype[a]) == biases.mjBIAS_AFFINE, model.actuator_biasprm[a]
+        constant, by_length, by_rate = (float(x) if affine else 0.0 for x in bias[:3])
         rest = -constant / by_length if by_length else 0.0
         if route is None:
             sprung = _pull(name, line, -by_length, rest, -by_rate, names, draft)
@@ -101,8 +105,8 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], keys: Keys, draft
         if not sprung or (constant and not by_length):
             draft.leave("bias of", name)
         gain = float(model.actuator_gainprm[a, 0])
-        clamped = model.actuator_ctrllimited[a] and not disabled(model, "CLAMPCTRL")
-        limits = model.actuator_ctrlrange[a].tolist() if clamped else None
+        clamped, reach = model.actuator_ctrllimited[a], model.actuator_ctrlrange[a].tolist()
+        limits = reach if clamped and not disabled(model, "CLAMPCTRL") else None
         if route is not None:
             if target not in ropes:
                 ropes[target] = route.tendon(_named(model, target), names, draft)
@@ -110,9 +114,10 @@ def actuators(model: Any, names: Names, ropes: dict[int, str], keys: Keys, draft
         elif line is not None:
             shares = {names.joints[j]: gain * x for j, x in zip(line.joints, line.coefficients, strict=True)}
             draft.actuate(name, shares, limits)
-        keys.note("actuators", a, name)
+        model.name("actuators", a, name)
         if int(model.actuator_dyntype[a]) != dynamics.mjDYN_NONE:
             draft.leave("activation of", name)
+            model.pass_by("actuators", a, "dynprm", "actdim", "actearly", "actrange")
 
 
 def _named(model: Any, t: int) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ephs.mechanics.imports.collisions import LOSS, MOST_FACETS, NO_CORNERS, SINKING, SLIP, hull, many, too_fine
 from ephs.mechanics.imports.draft import Draft, pose
-from ephs.mechanics.imports.mjcf_keys import Keys, disabled
+from ephs.mechanics.imports.mjcf_keys import Compiled, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
@@ -35,16 +35,19 @@ class Parameters:
     condim: int
 
 
-def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
+def contacts(model: Compiled, names: Names, draft: Draft) -> None:
     """Surfaces and contacts of a model, or a note of its contacts."""
     pairs = {} if disabled(model, "CONTACT", "CONSTRAINT") else _pairs(model, names, draft)
     if not draft.contact:
         for b in sorted({int(model.geom_bodyid[g]) for pair in pairs for g in pair}):
             draft.leave("contacts of", names.bodies[b] or "the world")
+        for kind, count in (("geoms", model.ngeom), ("pairs", model.npair)):
+            for number in range(count):
+                model.pass_by(kind, number)
         return
     shapes = {g: _shape(model, g) for pair in pairs for g in pair}
     surfaces: dict[int, tuple[str, Array]] = {}
-    mass = float(np.sum(model.body_mass[1:]))
+    mass = draft.mass
     for (one, other), parameters in pairs.items():
         kinds = (shapes[one] or ("",))[0], (shapes[other] or ("",))[0]
         told = f"{_named(model, names, one)} and {_named(model, names, other)}"
@@ -62,11 +65,17 @@ def contacts(model: Any, names: Names, keys: Keys, draft: Draft) -> None:
             draft.leave("contacts between shapes with many edges", told)
         elif surfaces[one][0] and surfaces[other][0]:
             draft.touch((surfaces[one][0], surfaces[other][0]), _law(parameters, mass))
-    for g in sorted({g for pair in pairs for g in pair}):
-        keys.note("geoms", g, _named(model, names, g))
-    for p in range(model.npair) if pairs else ():
+    met = {g for pair in set(pairs) - _own(model) for g in pair}
+    for g in range(model.ngeom):
+        model.name("geoms", g, _named(model, names, g))
+        if g not in met:  # the numbers of its pairs, if there are any, are its contacts'
+            model.pass_by("geoms", g)
+    for p in range(model.npair):
         ends = " and ".join(_named(model, names, int(g[p])) for g in (model.pair_geom1, model.pair_geom2))
-        keys.note("pairs", p, ends)
+        model.name("pairs", p, ends)
+        if not pairs:
+            model.pass_by("pairs", p)
+            continue
         if np.any(model.pair_friction[p, [0, 3]] != model.pair_friction[p, [1, 4]]):
             draft.leave("friction that depends on the direction, of", ends)
     overridden = import_module("mujoco").mjtEnableBit.mjENBL_OVERRIDE
@@ -90,6 +99,7 @@ def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Para
         one, other = sorted((int(model.pair_geom1[p]), int(model.pair_geom2[p])))
         if model.geom_bodyid[one] == model.geom_bodyid[other]:
             draft.leave("contacts within a body", f"{_named(model, names, one)} and {_named(model, names, other)}")
+            model.pass_by("pairs", p)
             continue
         friction = model.pair_friction[p, [0, 2, 3]]
         found[one, other] = Parameters(model.pair_solref[p], friction, int(model.pair_dim[p]))
@@ -101,28 +111,34 @@ def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Para
 def _mixed(model: Any, one: int, other: int) -> Parameters:
     """MuJoCo's rule (`mj_contactParam`): the geom of higher priority decides; of equal ones the larger friction and
     ``condim``, and ``solref`` weighed by ``solmix``."""
-    if model.geom_priority[one] != model.geom_priority[other]:
-        g = one if model.geom_priority[one] > model.geom_priority[other] else other
-        return Parameters(model.geom_solref[g], model.geom_friction[g], int(model.geom_condim[g]))
-    weights, solref = model.geom_solmix[[one, other]], model.geom_solref[[one, other]]
+    both = [one, other]
+    weights, solref, friction = model.geom_solmix[both], model.geom_solref[both], model.geom_friction[both]
+    condim, priority = model.geom_condim[both].tolist(), model.geom_priority[both].tolist()
+    if priority[0] != priority[1]:
+        k = int(priority[1] > priority[0])
+        return Parameters(solref[k], friction[k], condim[k])
     share = weights / weights.sum() if weights.sum() > 0.0 else np.array([0.5, 0.5])
     mixed = share @ solref if np.all(solref[:, 0] > 0.0) else solref.min(axis=0)
-    friction = np.maximum(model.geom_friction[one], model.geom_friction[other])
-    return Parameters(mixed, friction, max(int(model.geom_condim[one]), int(model.geom_condim[other])))
+    return Parameters(mixed, friction.max(axis=0), max(condim))
+
+
+def _own(model: Compiled) -> set[tuple[int, int]]:
+    """The pairs that the model names, lower number first."""
+    ends = zip(model.pair_geom1, model.pair_geom2, strict=True)
+    return {(min(pair), max(pair)) for one, other in ends for pair in [(int(one), int(other))]}
 
 
 def _meeting(model: Any) -> Iterator[tuple[int, int]]:
     loose = disabled(model, "FILTERPARENT")
     excluded = {(int(s) >> 16, int(s) & 0xFFFF) for s in model.exclude_signature}
+    bits, masks = model.geom_contype[:].tolist(), model.geom_conaffinity[:].tolist()
+    carrier, welded, parent = (x[:].tolist() for x in (model.geom_bodyid, model.body_weldid, model.body_parentid))
     for one, other in combinations(range(model.ngeom), 2):
-        if not (
-            model.geom_contype[one] & model.geom_conaffinity[other]
-            or model.geom_contype[other] & model.geom_conaffinity[one]
-        ):
+        if not (bits[one] & masks[other] or bits[other] & masks[one]):
             continue
-        bodies = int(model.geom_bodyid[one]), int(model.geom_bodyid[other])
-        first, second = (int(model.body_weldid[b]) for b in bodies)
-        above = [int(model.body_weldid[int(model.body_parentid[b])]) for b in (first, second)]
+        bodies = carrier[one], carrier[other]
+        first, second = (welded[b] for b in bodies)
+        above = [welded[parent[b]] for b in (first, second)]
         parental = first and second and (above[0] == second or above[1] == first)
         if first != second and (loose or not parental) and not {bodies, bodies[::-1]} & excluded:
             yield one, other
@@ -161,15 +177,19 @@ def _corners(model: Any, m: int) -> Array:
     return np.array(model.mesh_vert[own + numbers], dtype=float)
 
 
-def _law(given: Parameters, mass: float) -> dict[str, float]:
-    first, second = map(float, given.solref)
+def rate_and_ratio(solref: Array) -> tuple[float, float]:
+    """The rate 1/(τ ζ) in 1/s and the damping ratio ζ of ``solref``, which may be stiffness and damping per mass."""
+    first, second = map(float, solref)
     if (first > 0.0) != (second > 0.0) or not first:  # MuJoCo takes its default for a mixture of both formats
         first, second = SINKING, 1.0
     if first > 0.0:
-        rate, ratio = 1.0 / max(first * second, 1.0 / LARGEST), second
-    else:  # stiffness and damping per mass, with the sign reversed
-        rate = np.sqrt(-first)
-        ratio = -second / (2.0 * rate)
+        return 1.0 / max(first * second, 1.0 / LARGEST), second
+    rate = float(np.sqrt(-first))  # stiffness and damping have their signs reversed
+    return rate, -second / (2.0 * rate)
+
+
+def _law(given: Parameters, mass: float) -> dict[str, float]:
+    rate, ratio = rate_and_ratio(given.solref)
     law = {"stiffness": float(mass * rate**2), "loss": float(LOSS * ratio), "slip": SLIP}
     for key, value, least in zip(("friction", "spinning", "rolling"), given.friction, (3, 4, 6), strict=True):
         if given.condim >= least:

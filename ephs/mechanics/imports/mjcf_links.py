@@ -8,7 +8,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, pose
-from ephs.mechanics.imports.mjcf_keys import disabled
+from ephs.mechanics.imports.mjcf_keys import TORQUE_SCALE, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 
 ROUNDED_COSINE = 1e-12
@@ -61,11 +61,14 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
     for e in range(model.neq):
         kind, data = int(model.eq_type[e]), np.array(model.eq_data[e])
         first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-        name = model.equality(e).name or f"equality_{e + 1}"
+        name = model.raw.equality(e).name or f"equality_{e + 1}"
+        model.name("equalities", e, name)
+        model.pass_by("equalities", e, "solref", "solimp")  # softness, which is noted
         if e in screwed:
             draft.leave("softness of equality constraints", name)
         elif not _active(model, e):
             draft.leave("inactive equality constraints", name)
+            model.pass_by("equalities", e)
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             if int(model.eq_objtype[e]) == sites:
                 ends = [
@@ -75,7 +78,8 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
                 ends = [(first, pose(data[:3])), (second, pose(data[3:6]))]
             else:
                 ends = [(first, pose(data[3:6], data[6:10])), (second, pose(data[:3]))]
-            pair = "spherical" if kind == kinds.mjEQ_CONNECT else "fixed"
+            turns = kind == kinds.mjEQ_CONNECT or model.eq_data[e, TORQUE_SCALE] == 0.0
+            pair = "spherical" if turns else "fixed"
             (b1, at1), (b2, at2) = ends
             draft.joint(name, pair, names.bodies[b1], names.bodies[b2], at1, at2, {})
             draft.leave("softness of equality constraints", name)
@@ -87,6 +91,7 @@ def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
             draft.leave("softness of equality constraints", name)
         else:
             draft.leave("equality constraints that are neither lower pairs nor constant ratios", name)
+            model.pass_by("equalities", e)
 
 
 def _active(model: Any, e: int) -> bool:

@@ -74,8 +74,8 @@ def route_of(model: Any, t: int) -> Route | None:
     """
     mujoco: Any = import_module("mujoco")
     kinds, first = mujoco.mjtWrap, int(model.tendon_adr[t])
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = mujoco.MjData(model.raw)
+    mujoco.mj_kinematics(model.raw, data)
     constant, divisor, before = 0.0, 1.0, -1
     spots, moving = list[tuple[int, Array]](), list[tuple[int, int, float, float]]()
     for w in range(first, first + int(model.tendon_num[t])):

@@ -23,9 +23,8 @@ _SECTIONS = {
 _DRIVES = ("general", "motor", "position", "velocity", "cylinder", "damper")
 _TARGETS = ("joint", "jointinparent", "tendon")
 _SILENT = ("visual", "statistic", "custom", "size", "compiler-plugin")
-_ASSETS = ("texture", "material", "hfield", "skin", "model")
+_ASSETS = ("texture", "material", "hfield", "skin")
 _UNSUPPORTED = {
-    "attach": "write the other model's bodies into this one",
     "flexcomp": "take it out: bodies are rigid",
     "composite": "write its bodies out: mujoco's compile command does",
 }
@@ -66,24 +65,59 @@ class Source:
         The model, without what a scene cannot have.
     assets
         The meshes that it names, by the names that it has for them.
+    models
+        The texts of models that it attaches, prepared likewise, by the names that it has for them.
+    size
+        Number of its elements, with all copies.
     """
 
-    def __init__(self, root: Element, draft: Draft) -> None:
+    def __init__(self, root: Element, draft: Draft, above: "Source | None" = None, file: Path | None = None) -> None:
         self._draft = draft
         self._read: set[Path] = set()
-        self.assets: dict[str, bytes] = {}
-        self._files: dict[str, str] = {}
+        self._above: tuple[Path, ...] = () if above is None or file is None else (*above._above, file)
+        self._folder = "" if file is None else file.parent.relative_to(draft.folder.resolve()).as_posix()
+        self.assets: dict[str, bytes] = {} if above is None else above.assets
+        self.models: dict[str, bytes] = {} if above is None else above.models
+        self._files: dict[str, str] = {} if above is None else above._files
         self._gone: set[str] = set()
+        self._sizes: dict[str, int] = {}
+        self.text, self.size = "", 0
         self._include(root, draft.folder, 0, 0)
         if draft.faults:
-            self.text = ""
             return
-        draft.name = root.get("model") or draft.name
+        if above is None:
+            draft.name = root.get("model") or draft.name
+        self._models(root)
         self._refuse(root)
         self._strip(root)
         self._refuse_nan(root)
         self._meshes(root)
         self.text = tostring(root, encoding="unicode")
+
+    def _inside(self, name: str) -> Path | None:
+        return self._draft.file_inside(f"{self._folder}/{name}" if self._folder else name)
+
+    def _models(self, root: Element) -> None:
+        """Prepare the models that are attached."""
+        for model in [model for assets in root.findall("asset") for model in assets.findall("model")]:
+            name = model.get("file", "")
+            key, file, faults = f'model "{name}"', self._inside(name), self._draft.faults
+            if file is None or file in self._above or len(self._above) >= _MOST_INCLUDES:
+                found = "no file there" if file is None else "a model within itself"
+                faults.append(fault("outside" if file is None else "twice", key, found))
+                continue
+            inner = read_tree(file, faults, key)
+            if inner is None:
+                continue
+            if inner.tag != "mujoco":
+                faults.append(fault("root element", key, f"<{inner.tag}>", known="<mujoco>"))
+                continue
+            source = Source(inner, self._draft, self, file)
+            own = model.get("name") or inner.get("model") or file.stem
+            model.set("name", own)
+            model.set("file", f"{len(self.models)}.xml")
+            self._sizes[own] = source.size
+            self.models[f"{len(self.models)}.xml"] = source.text.encode()
 
     def file_of(self, asset: str) -> str:
         """File, relative to the model's folder, of a MuJoCo asset."""
@@ -101,7 +135,7 @@ class Source:
                 continue
             name = child.get("file", "")
             key = f'include "{name}"'
-            file = self._draft.file_inside(name)
+            file = self._inside(name)
             element.remove(child)
             if file is None:
                 self._draft.faults.append(fault("outside", key, "no file there"))
@@ -122,7 +156,8 @@ class Source:
                 name = element.get("name") or element.get("model") or element.tag
                 what, hint = f"<{element.tag}>", _UNSUPPORTED[element.tag]
                 self._draft.faults.append(fault("not supported", element.tag, f'"{name}"', what=what, hint=hint))
-        if self._copies(root) > _MOST_COPIES:
+        self.size = self._copies(root)
+        if self.size > _MOST_COPIES:
             self._draft.faults.append(fault("copies", "replicate", "more", most=_MOST_COPIES))
 
     def _refuse_nan(self, root: Element) -> None:
@@ -134,7 +169,7 @@ class Source:
 
     def _copies(self, element: Element) -> int:
         """Number of elements after repetition."""
-        inner = 1 + sum(map(self._copies, element))
+        inner = 1 + sum(map(self._copies, element)) + self._sizes.get(element.get("model") or "", 0)
         if element.tag != "replicate":
             return inner
         count = numbers(element.get("count"), 1, "replicate.count", self._draft.faults)[0]
@@ -196,7 +231,7 @@ class Source:
                     continue
                 mesh.set("name", mesh.get("name") or Path(name).stem)
                 path = Path(folders[-1] or "", name).as_posix() if folders else name
-                file = self._draft.file_inside(path)
+                file = self._inside(path)
                 if file is None:
                     self._draft.leave("meshes that are no readable file in the model's folder", path)
                     lost.add(str(mesh.get("name")))
@@ -215,7 +250,7 @@ class Source:
                     self._draft.leave("contacts between", " and ".join(ends))
                     section.remove(pair)
         for element in root.iter():  # whatever else names a file
-            if element.get("file") not in self.assets:
+            if element.get("file") not in self.assets.keys() | self.models.keys():
                 element.attrib.pop("file", None)
 
     def _remove_geom(self, parent: Element, geom: Element) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ephs.mechanics.imports.draft import Draft
+from ephs.mechanics.imports.node import Node
 from ephs.mechanics.imports.sdf import read_sdf
 from ephs.mechanics.imports.urdf import read_urdf
 from ephs.mechanics.imports.xml import read_tree
@@ -38,10 +39,13 @@ def read_model(
     count = len(faults)
     draft = Draft(path.stem, path.parent, faults, contact=contact)
     match root.tag:
-        case "robot":
-            read_urdf(root, draft, base)
-        case "sdf":
-            read_sdf(root, draft)
+        case "robot" | "sdf":
+            node = Node(root)
+            if root.tag == "sdf":
+                read_sdf(node, draft)
+            else:
+                read_urdf(node, draft, base)
+            node.leave_unread(draft)
         case _:
             from ephs.mechanics.imports.mjcf import read_mjcf
 

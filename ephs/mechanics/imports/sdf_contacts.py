@@ -5,12 +5,11 @@ Two surfaces have the stiffness ``kp`` of both in series and the lesser ``mu``, 
 
 from collections.abc import Iterator, Mapping
 from typing import Any
-from xml.etree.ElementTree import Element
 
 from ephs.mechanics.imports.collisions import FRICTION, collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along
-from ephs.mechanics.imports.keys import note_unknown
-from ephs.mechanics.imports.sdf_frames import read_pose
+from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.sdf_frames import Scope, is_true, read_pose
 from ephs.mechanics.imports.sdf_keys import COLLISION
 from ephs.mechanics.imports.xml import numbers
 from ephs.mechanics.scene.errors import fault
@@ -22,17 +21,17 @@ RIGID = 1e12
 _TRUE = ("true", "1")
 
 
-def solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any, Array]]:
+def solids(element: Node, key: str, draft: Draft) -> Iterator[tuple[str, Any, Array]]:
     """Kind, sizes and pose of the solids of a visual or collision element; a mesh has a file and a scale."""
     geometry, faults = element.find("geometry"), draft.faults
     place = read_pose(element, f"{key}.pose", faults)
-    for solid in () if geometry is None else geometry:
+    for solid in () if geometry is None else geometry.findall("*"):
         at, value, there = f"{key}.{solid.tag}", None, place
 
         def sizes(
-            words: str, count: int = 1, default: tuple[float, ...] = (), *, of: Element = solid, at: str = at
+            words: str, count: int = 1, default: tuple[float, ...] = (), *, of: Node = solid, at: str = at
         ) -> Any:
-            found = [numbers(of.findtext(word), count, f"{at}.{word}", faults, default) for word in words.split()]
+            found = [numbers(of.value(word), count, f"{at}.{word}", faults, default) for word in words.split()]
             return [entry for entries in found for entry in entries]
 
         match solid.tag:
@@ -43,7 +42,10 @@ def solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any,
             case "cylinder" | "capsule":
                 value = sizes("radius length")
             case "mesh":
-                value = (solid.findtext("uri") or "").strip(), sizes("scale", 3, (1.0, 1.0, 1.0))
+                value = (
+                    (solid.findtext("uri") or solid.get("filename") or "").strip(),
+                    sizes("scale", 3, (1.0, 1.0, 1.0)),
+                )
             case "plane":
                 normal = sizes("normal", 3, (0.0, 0.0, 1.0))
                 framed = along(normal, place)
@@ -56,59 +58,66 @@ def solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any,
         yield solid.tag, value, there
 
 
-def link_surfaces(model: Element, links: Mapping[str, Element], draft: Draft) -> None:
-    """Surfaces of the links of the model that moves; its links meet each other with ``self_collide`` alone."""
-    each, name = (model.findtext("self_collide") or "").strip() in _TRUE, draft.name
-    if each and draft.contact and model.find("link/collision/geometry/mesh") is not None:
-        draft.leave("contacts (self_collide) between the links of", name)
+def link_surfaces(model: Scope, draft: Draft) -> None:
+    """Surfaces of the links of a model that moves, which meet each other with ``self_collide`` alone."""
+    scopes = model.everything()
+    links = {f"{scope.prefix}{name}": link for scope in scopes for name, link in scope.links.items()}
+    if not draft.contact:
+        for scope in scopes:
+            scope.element.pass_by("self_collide")
+    each = draft.contact and is_true(model.element, "self_collide")
+    solid = [kind for link in links.values() if each for kind in link.findall("collision/geometry/mesh")]
+    if each and solid:
+        draft.leave("contacts (self_collide) between the links of", model.name)
         each = False
-    law = default_law(draft) | ({} if each else {"group": name})
+    law = default_law(draft) | ({} if each else {"group": model.name})
     for link, element in links.items():
         _surfaces(element, link, link, None, law, draft)
 
 
-def ground_surfaces(model: str, places: Mapping[str, Array], links: Mapping[str, Element], draft: Draft) -> None:
-    """Surfaces of a static model, whose links are at ``places`` (7,) in the world."""
+def ground_surfaces(model: Scope, draft: Draft) -> None:
+    """Surfaces of a static model, whose links are the ground; all else in it has no effect."""
     law = {key: value for key, value in default_law(draft).items() if key != "stiffness"}
-    for link, element in links.items():
-        _surfaces(element, WORLD, f"{model}_{link}", places[link], law, draft)
+    for name, link in model.links.items():
+        _surfaces(link, WORLD, f"{model.prefix}{name}", model.link_pose(name), law, draft)
+        link.pass_by_all_but("collision")
+    model.element.pass_by_all_but("link", "model")
 
 
-def _surfaces(
-    element: Element, link: str, name: str, place: Array | None, law: Mapping[str, Any], draft: Draft
-) -> None:
-    found = element.findall("collision")
-    if found and not draft.contact:
-        draft.leave("contacts of", name)
+def _surfaces(element: Node, link: str, name: str, place: Array | None, law: Mapping[str, Any], draft: Draft) -> None:
+    if not draft.contact:
+        if element.has("collision"):
+            draft.leave("contacts of", name)
+            element.pass_by("collision")
         return
-    for number, collision in enumerate(found):
+    for number, collision in enumerate(element.findall("collision")):
+        label = collision.get("name") or number + 1
         if not _meets(collision):
+            collision.pass_by()
             continue
-        own, key = f"{name}_{collision.get('name') or number + 1}", f"links.{name}.collision[{number}]"
+        own, key = f"{name}_{label}", f"links.{name}.collision[{number}]"
         given = _law(collision, own, key, draft)
         for kind, value, at in solids(collision, key, draft):
             collide(draft, link, own, kind, value, at if place is None else SE3.compose(place, at), {**law, **given})
 
 
-def _meets(collision: Element) -> bool:
+def _meets(collision: Node) -> bool:
     """Whether a collision makes forces: not with a bit mask of 0, and not where it is for sensors alone."""
-    bits, sensed = (
-        (collision.findtext(f"surface/contact/{word}") or "").strip().lower()
-        for word in ("collide_bitmask", "collide_without_contact")
-    )
+    bits = collision.peek("surface/contact/collide_bitmask").strip().lower()
+    sensed = (collision.findtext("surface/contact/collide_without_contact") or "").strip().lower()
     return not (bits and not bits.removeprefix("0x").strip("0")) and sensed not in _TRUE
 
 
-def _law(collision: Element, name: str, key: str, draft: Draft) -> dict[str, float]:
+def _law(collision: Node, name: str, key: str, draft: Draft) -> dict[str, float]:
     """Stiffness and friction of a collision; a note of other numbers."""
     found: dict[str, float] = {}
     stiffness, friction = "surface/contact/ode/kp", "surface/friction/ode/mu"
-    if collision.find(friction) is not None:
-        found["friction"] = numbers(collision.findtext(friction), 1, f"{key}.{friction}", draft.faults)[0]
-    if collision.find(stiffness) is not None:
-        found |= soft(numbers(collision.findtext(stiffness), 1, f"{key}.{stiffness}", draft.faults)[0], name, draft)
-    plain = collision.findtext(friction) or f"{FRICTION}"
-    note_unknown(collision, {**COLLISION, f"{friction}2": (plain,)}, draft, "collisions", name)
+    mu, kp = collision.findtext(friction), collision.findtext(stiffness)
+    if mu is not None:
+        found["friction"] = numbers(mu, 1, f"{key}.{friction}", draft.faults)[0]
+    if kp is not None:
+        found |= soft(numbers(kp, 1, f"{key}.{stiffness}", draft.faults)[0], name, draft)
+    collision.named("collisions", name, {**COLLISION, f"{friction}2": (mu or f"{FRICTION}",)})
     return found
 
 

@@ -1,22 +1,23 @@
 """URDF: a tree of links. Source: the URDF specification (wiki.ros.org/urdf/XML); spherical joints as in PyBullet."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
-from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from ephs.mechanics.imports.collisions import collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, draw, named, tensor
-from ephs.mechanics.imports.keys import Known, note_unknown
+from ephs.mechanics.imports.node import Node, Plain
 from ephs.mechanics.imports.sdf_contacts import soft
 from ephs.mechanics.imports.sdf_keys import LINK as SDF_LINK
-from ephs.mechanics.imports.xml import numbers, vector
+from ephs.mechanics.imports.xml import bound, numbers, vector
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.geometry import coupling
 from ephs.semantics.spaces import SE3
 
+_SIDES = ("lower", "upper")
 KINDS = {
     "revolute": "revolute",
     "continuous": "revolute",
@@ -32,43 +33,38 @@ _BULLET = {
     "lateral_friction": "friction", "stiffness": "stiffness", "rolling_friction": "rolling",
     "spinning_friction": "spinning",
 }  # fmt: skip
-"""Elements of Bullet's ``<contact>`` in a link -> keys of surfaces."""
-_ROBOT: Known = dict.fromkeys(("name", "version", "link", "joint", "transmission", "material", "gazebo", "sensor"), ())
-_LINK: Known = {
-    **dict.fromkeys(("name", "type", "inertial/origin", "inertial/mass", "inertial/inertia"), ()),
-    **dict.fromkeys(("visual", "collision", *(f"contact/{word}" for word in _BULLET)), ()),
+"""Nodes of Bullet's ``<contact>`` in a link -> keys of surfaces."""
+_PLAIN_ROBOT: Plain = {"version": (), "material": ()}
+_PLAIN_LINK: Plain = {
+    **dict.fromkeys(("type", "visual/name", "visual/material", "visual/verbose"), ()),
     "contact/restitution": ("0",),
 }
-_COLLISION: Known = dict.fromkeys(("name", "origin", "geometry", "material"), ())
-_FIXED: Known = dict.fromkeys(
-    ("name", "type", "parent", "child", "origin", "dont_collapse", "axis", "limit", "dynamics", "mimic"), ()
-)
-_JOINT: Known = {
-    **dict.fromkeys(("name", "type", "parent", "child", "origin", "dont_collapse", "axis", "mimic"), ()),
-    **dict.fromkeys(("dynamics/damping", "dynamics/friction", "limit/lower", "limit/upper", "limit/effort"), ()),
-    "limit/velocity": ("0",),
-}
+_PLAIN_COLLISION: Plain = {"material": ()}
+_PLAIN_FIXED: Plain = dict.fromkeys(("dont_collapse", "axis", "limit", "dynamics", "mimic"), ())
+_PLAIN_TRANSMISSION: Plain = {"type": ()}
+_PLAIN_JOINT: Plain = {"dont_collapse": (), "limit/velocity": ("0",)}
 _SPRING = {"springStiffness": "stiffness", "springReference": "rest"}
 """Tags for Gazebo of joints -> keys of joints."""
-_TOUCHING: Known = {
-    **dict.fromkeys(("mu1", "kp"), ()), "kd": ("1",), "mu2": ("1",), "fdir1": ("0 0 0",), "minDepth": ("0",),
-    "maxVel": ("0.01",), "maxContacts": (), "laserRetro": (),
+_PLAIN_TOUCHING: Plain = {
+    "kd": ("1",), "mu2": ("1",), "fdir1": ("0 0 0",), "minDepth": ("0",), "maxVel": ("0.01",), "maxContacts": (),
+    "laserRetro": (),
 }  # fmt: skip
 """Tags for Gazebo of contacts, with their defaults."""
-_GAZEBO: Known = {
+_TOUCHING = ("mu1", "kp", *_PLAIN_TOUCHING)
+_PLAIN_GAZEBO: Plain = {
     **{path: plain for path, plain in SDF_LINK.items() if not path.startswith(("collision", "inertial"))},
     **dict.fromkeys(("reference", "material", "preserveFixedJoint", "disableFixedJointLumping"), ()),
-    **dict.fromkeys(("provideFeedback", "implicitSpringDamper", *_SPRING), ()),
+    **dict.fromkeys(("provideFeedback", "implicitSpringDamper"), ()),
     **dict.fromkeys(("turnGravityOff", "selfCollide", "dampingFactor", "static"), ("0",)),
 }
-Settings = Mapping[str, Mapping[str, Element]]
-"""Name of a link or joint -> tag -> element, of ``<gazebo reference=…>``."""
+Settings = Mapping[str, list[Node]]
+"""Name of a link or joint -> its elements ``<gazebo reference=…>``."""
 
 
-def read_urdf(root: Element, draft: Draft, base: str) -> None:
+def read_urdf(root: Node, draft: Draft, base: str) -> None:
     """The links and joints of a robot, its root on the ground by a joint ``root_joint``, fixed or free."""
     draft.name = root.get("name") or draft.name
-    if any("xacro" in str(element.tag) for element in root.iter()):
+    if any("xacro" in element.tag for element in root.everything()):
         draft.faults.append(fault("xacro", "robot", "xacro tags"))
         return
     links = named(root, "link", draft.faults)
@@ -81,64 +77,65 @@ def read_urdf(root: Element, draft: Draft, base: str) -> None:
         _link(link, links[link], draft)
     law, settings = default_law(draft) | {"group": draft.name}, _gazebo(root, links, joints, draft)
     for name, link in links.items():
-        _collisions(name, link, law, settings.get(name, {}), draft)
-    if draft.contact and root.find("link/collision") is not None:
+        _collisions(name, link, law, settings.get(name, []), draft)
+    if draft.contact and any(link.has("collision") for link in links.values()):
         draft.leave("contacts between the links of", draft.name)
     free = base == "free"
     draft.joint(ROOT, "free" if free else "fixed", WORLD, order[0], pose(), pose(), {})
     of_child = {child: name for name, (_, child) in ends.items()}
     for link in order[1:]:
         name = of_child[link]
-        _joint(name, joints[name], *ends[name], settings.get(name, {}), draft)
+        _joint(name, joints[name], *ends[name], settings.get(name, []), draft)
     for name, joint in joints.items():
         _mimic(name, joint, joints, draft)
     for number, element in enumerate(root.findall("transmission")):
         _transmission(element, element.get("name") or f"transmission_{number + 1}", joints, draft)
     for name, joint in joints.items():
-        effort = _attribute(joint.find("limit"), "effort", f"joints.{name}.limit", draft, 0.0)
-        if effort and KINDS[str(joint.get("type"))] in ("revolute", "prismatic") and not draft.driven(name):
+        moves = KINDS[str(joint.get("type"))] in ("revolute", "prismatic")
+        if moves and _effort(name, joint, draft) < math.inf and not draft.driven(name):
             draft.leave("limits of effort of", name)
     for sensor in root.findall("sensor"):
         draft.leave("sensors", sensor.get("name") or "sensor")
-    note_unknown(root, _ROBOT, draft, "robots", draft.name)
+        sensor.pass_by()
+    root.named("robots", draft.name, _PLAIN_ROBOT)
 
 
-def _gazebo(root: Element, links: Mapping[str, Element], joints: Mapping[str, Element], draft: Draft) -> Settings:
-    """Tags for Gazebo; a note of those that are not imported."""
-    found: dict[str, dict[str, Element]] = {}
+def _gazebo(root: Node, links: Mapping[str, Node], joints: Mapping[str, Node], draft: Draft) -> Settings:
+    """Tags for Gazebo, by the link or joint that they are of."""
+    found: dict[str, list[Node]] = {}
     for element in root.findall("gazebo"):
-        name = element.get("reference", "")
+        name = element.get("reference") or ""
         kind = "links" if name in links else "joints" if name in joints else "robots"
-        own = found.setdefault(name, {})
-        own.update((child.tag, child) for child in element)
-        touching: Known = _TOUCHING if draft.contact else dict.fromkeys(_TOUCHING, ())
-        if draft.contact and "mu1" in own:
-            touching = {**touching, "mu2": (_text(own["mu1"]) or "",)}
+        found.setdefault(name, []).append(element)
         for tag in ("plugin", "sensor"):
-            if element.find(tag) is not None:
+            if element.has(tag):
                 draft.leave(f"{tag}s", name or draft.name)
-        note_unknown(element, {**_GAZEBO, **touching}, draft, kind, name or draft.name)
+                element.pass_by(tag)
+        element.named(kind, name or draft.name, _PLAIN_GAZEBO)
     return found
 
 
-def _text(element: Element | None) -> str | None:
-    """The value of a tag for Gazebo, written as a text or as an attribute."""
-    return None if element is None else element.get("value") or element.text
+def _tag(settings: list[Node], tag: str) -> str | None:
+    """The last value of a tag for Gazebo, written as a text or as an attribute."""
+    for element in reversed(settings):
+        if (found := element.find(tag)) is not None:
+            return found.get("value") or found.text
+    return None
 
 
-def _ends(name: str, joint: Element, links: Mapping[str, Element], draft: Draft) -> tuple[str, str]:
+def _ends(name: str, joint: Node, links: Mapping[str, Node], draft: Draft) -> tuple[str, str]:
     """The parent and the child of a joint; its type is checked."""
     check_kind(name, joint, KINDS, draft.faults)
     ends: list[str] = []
     for end in ("parent", "child"):
         element = joint.find(end)
-        link = "" if element is None else element.get("link", "")
+        link = "" if element is None else element.get("link") or ""
         check_link(link, f"joints.{name}.{end}", links, draft.faults)
         ends.append(link)
     return ends[0], ends[1]
 
 
-def _outwards(links: Mapping[str, Element], ends: Mapping[str, tuple[str, str]], draft: Draft) -> list[str]:
+def _outwards(links: Mapping[str, Node], ends: Mapping[str, tuple[str, str]], draft: Draft) -> list[str]:
     """The links from the root outwards; a fault if they do not form a tree."""
     faults, parents, children = draft.faults, dict[str, str](), dict[str, list[str]]()
     for name, (parent, child) in ends.items():
@@ -169,7 +166,7 @@ def _outwards(links: Mapping[str, Element], ends: Mapping[str, tuple[str, str]],
     return order
 
 
-def _link(name: str, link: Element, draft: Draft) -> None:
+def _link(name: str, link: Node, draft: Draft) -> None:
     inertial = link.find("inertial")
     if inertial is None:
         draft.body(name)
@@ -183,17 +180,17 @@ def _link(name: str, link: Element, draft: Draft) -> None:
             lambda entry: _attribute(entries, entry, f"{key}.inertia", draft, None if entry[1] == entry[2] else 0.0)
         )
         draft.body(name, mass, turned_tensor(place[:4], rows), place[4:])
-    note_unknown(link, _LINK if draft.contact else {**_LINK, "contact": ()}, draft, "links", name)
+    link.named("links", name, _PLAIN_LINK)
     for number, visual in enumerate(link.findall("visual")):
         for solid in _solids(visual, f"links.{name}.visual[{number}]", draft):
             draw(draft, name, *solid)
 
 
-def _solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any, np.ndarray]]:
+def _solids(element: Node, key: str, draft: Draft) -> Iterator[tuple[str, Any, np.ndarray]]:
     """Kind, sizes and pose of the solids of a visual or collision element; a mesh has a file and a scale."""
     geometry, faults = element.find("geometry"), draft.faults
     place = _origin(element, key, draft)
-    for solid in () if geometry is None else geometry:
+    for solid in () if geometry is None else geometry.findall("*"):
         at = f"{key}.{solid.tag}"
         value: Any = None
         match solid.tag:
@@ -204,36 +201,42 @@ def _solids(element: Element, key: str, draft: Draft) -> Iterator[tuple[str, Any
             case "cylinder" | "capsule":
                 value = [_attribute(solid, word, at, draft) for word in ("radius", "length")]
             case "mesh":
-                value = solid.get("filename", ""), vector(solid, "scale", at, faults, (1.0, 1.0, 1.0))
+                value = solid.get("filename") or "", vector(solid, "scale", at, faults, (1.0, 1.0, 1.0))
             case _:
                 pass
         yield solid.tag, value, place
 
 
-def _collisions(name: str, link: Element, law: Mapping[str, Any], gazebo: Mapping[str, Element], draft: Draft) -> None:
+def _collisions(name: str, link: Node, law: Mapping[str, Any], gazebo: list[Node], draft: Draft) -> None:
     """Surfaces of a link, or a note of its contacts."""
-    found = link.findall("collision")
-    if not found or not draft.contact:
-        if found:
+    if not draft.contact or not link.has("collision"):
+        if link.has("collision"):
             draft.leave("contacts of", name)
+        link.pass_by("collision", "contact")
+        for element in gazebo:
+            element.pass_by(*_TOUCHING)
         return
     own: dict[str, float] = {}
-    if "mu1" in gazebo:
-        own["friction"] = numbers(_text(gazebo["mu1"]), 1, f"gazebo.{name}.mu1", draft.faults)[0]
-    if "kp" in gazebo:
-        own |= soft(numbers(_text(gazebo["kp"]), 1, f"gazebo.{name}.kp", draft.faults)[0], name, draft)
-    for element in link.findall("contact/*"):
-        if element.tag in _BULLET:
-            key = f"links.{name}.contact.{element.tag}"
-            own[_BULLET[element.tag]] = _attribute(element, "value", key, draft, 0.0)
+    friction, stiffness = _tag(gazebo, "mu1"), _tag(gazebo, "kp")
+    for element in gazebo:
+        plain = _PLAIN_TOUCHING if friction is None else {**_PLAIN_TOUCHING, "mu2": (friction,)}
+        element.named("links", name, {**_PLAIN_GAZEBO, **plain})
+    if friction is not None:
+        own["friction"] = numbers(friction, 1, f"gazebo.{name}.mu1", draft.faults)[0]
+    if stiffness is not None:
+        own |= soft(numbers(stiffness, 1, f"gazebo.{name}.kp", draft.faults)[0], name, draft)
+    for word, entry in _BULLET.items():
+        for element in link.findall(f"contact/{word}"):
+            own[entry] = _attribute(element, "value", f"links.{name}.contact.{word}", draft, 0.0)
+    found = link.findall("collision")
     for number, collision in enumerate(found):
         surface = collision.get("name") or (f"{name}_{number + 1}" if len(found) > 1 else name)
         for solid in _solids(collision, f"links.{name}.collision[{number}]", draft):
             collide(draft, name, surface, *solid, {**law, **own})
-        note_unknown(collision, _COLLISION, draft, "collisions", name)
+        collision.named("collisions", name, _PLAIN_COLLISION)
 
 
-def _joint(name: str, joint: Element, parent: str, child: str, gazebo: Mapping[str, Element], draft: Draft) -> None:
+def _joint(name: str, joint: Node, parent: str, child: str, gazebo: list[Node], draft: Draft) -> None:
     key, kind = f"joints.{name}", KINDS[str(joint.get("type"))]
     origin, turned = _origin(joint, key, draft), pose()
     if kind in AXIAL:
@@ -254,21 +257,20 @@ def _joint(name: str, joint: Element, parent: str, child: str, gazebo: Mapping[s
             entries["friction"] = losses["damping"]
             entries |= draft.dry(name, losses["friction"], d)
     for tag, entry in _SPRING.items():
-        if tag in gazebo and d == 1:
-            entries[entry] = numbers(_text(gazebo[tag]), 1, f"gazebo.{name}.{tag}", draft.faults)[0]
-        elif tag in gazebo:
-            draft.leave(f"{tag} of joints", name)
+        if d == 1 and (text := _tag(gazebo, tag)) is not None:
+            entries[entry] = numbers(text, 1, f"gazebo.{name}.{tag}", draft.faults)[0]
     draft.joint(name, kind, parent, child, SE3.compose(origin, turned), turned, entries)
     limit = joint.find("limit")
     if limit is not None and kind in ("revolute", "prismatic") and joint.get("type") != "continuous":
-        lower, upper = (_attribute(limit, side, f"{key}.limit", draft, 0.0) for side in ("lower", "upper"))
-        draft.limit(name, lower, upper)
-    elif d and limit is not None and {"lower", "upper"} & set(limit.attrib):
+        draft.limit(name, *(bound(limit.get(side), f"{key}.limit.{side}", draft.faults, 0.0) for side in _SIDES))
+    elif d and limit is not None and limit.has(*_SIDES):
         draft.leave("limits of", name)
-    note_unknown(joint, _JOINT if d else _FIXED, draft, "joints", name)
+        for side in _SIDES:
+            limit.get(side)
+    joint.named("joints", name, _PLAIN_JOINT if d else _PLAIN_FIXED)
 
 
-def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draft) -> None:
+def _mimic(name: str, joint: Node, joints: Mapping[str, Node], draft: Draft) -> None:
     """Couple a joint to its mimicked joint, if both have one degree of freedom and the latter starts at 0."""
     mimic = joint.find("mimic")
     if mimic is None:
@@ -281,33 +283,59 @@ def _mimic(name: str, joint: Element, joints: Mapping[str, Element], draft: Draf
     moves = [KINDS.get(str(each.get("type"))) for each in (joint, followed) if each is not None]
     if followed is None:
         draft.leave("mimicry of", f"{name} (of {other}, which is not there)")
-    elif other == name or set(moves) - {"revolute", "prismatic"} or (followed.find("mimic") is not None and offset):
+    elif other == name or set(moves) - {"revolute", "prismatic"} or (followed.has("mimic") and offset):
         draft.leave("mimicry of", f"{name} (of {other})")
     else:
         draft.gear(name, name, other, ratio, offset)
 
 
-def _transmission(element: Element, name: str, joints: Mapping[str, Element], draft: Draft) -> None:
+def _transmission(element: Node, name: str, joints: Mapping[str, Node], draft: Draft) -> None:
     """An actuator of a transmission between one actuator and one joint; its control is the actuator's effort."""
     tied, motors = element.findall("joint"), element.findall("actuator")
-    joint = "" if len(tied) != 1 or len(motors) != 1 else tied[0].get("name", "")
+    joint = "" if len(tied) != 1 or len(motors) != 1 else tied[0].get("name") or ""
     kind = KINDS.get(str(joints[joint].get("type"))) if joint in joints else None
-    text = next((each.text for each in element.iter("mechanicalReduction")), None)
+    said = [face.text or "" for end in (*tied, *motors) for face in end.findall("hardwareInterface")]
+    if any("effort" not in face.lower() for face in said):
+        draft.leave("transmissions whose interface is no effort", name)
+        element.pass_by()
+        return
+    given = [each for each in (element, *tied, *motors) if each.has("mechanicalReduction")]
+    text = given[0].findtext("mechanicalReduction") if given else None
     ratio = numbers(text, 1, f"transmissions.{name}.mechanicalReduction", draft.faults, (1.0,))[0]
     if kind not in ("revolute", "prismatic") or not draft.knows(joint) or not ratio:
         draft.leave("transmissions", name)
+        element.pass_by()
         return
-    limit = joints[joint].find("limit")
-    effort = 0.0 if limit is None else _attribute(limit, "effort", f"joints.{joint}.limit", draft, 0.0)
-    draft.actuate(motors[0].get("name") or name, {joint: ratio}, [-effort / abs(ratio), effort / abs(ratio)])
+    most = _effort(joint, joints[joint], draft) / abs(ratio)
+    draft.actuate(motors[0].get("name") or name, {joint: ratio}, [-most, most])
+    element.named("transmissions", name, _PLAIN_TRANSMISSION)
 
 
-def _origin(element: Element, key: str, draft: Draft) -> np.ndarray:
+def _effort(name: str, joint: Node, draft: Draft) -> float:
+    """The largest effort of a joint, which is infinite where none is given."""
+    limit = joint.find("limit")
+    text = None if limit is None else limit.get("effort")
+    return abs(bound(text, f"joints.{name}.limit.effort", draft.faults, math.inf))
+
+
+def _origin(element: Node, key: str, draft: Draft) -> np.ndarray:
+    """The pose (7,) of an origin, turned by ``rpy``, or by ``quat_xyzw`` as in URDF 1.1."""
     origin = element.find("origin")
     at, faults = f"{key}.origin", draft.faults
-    return pose(vector(origin, "xyz", at, faults), vector(origin, "rpy", at, faults))
+    place = vector(origin, "xyz", at, faults)
+    text = None if origin is None else origin.get("quat_xyzw")
+    if origin is None or text is None:
+        return pose(place, vector(origin, "rpy", at, faults))
+    x, y, z, w = numbers(text, 4, f"{at}.quat_xyzw", faults)
+    if origin.has("rpy"):
+        faults.append(fault("value", f"{at}.quat_xyzw", "rpy beside it", what="one of the two"))
+        origin.get("rpy")
+    if not np.linalg.norm([w, x, y, z]) > 0.0:
+        faults.append(fault("direction", f"{at}.quat_xyzw", "a quaternion of zeros"))
+        return pose(place)
+    return pose(place, [w, x, y, z])
 
 
-def _attribute(element: Element | None, name: str, key: str, draft: Draft, default: float | None = None) -> float:
+def _attribute(element: Node | None, name: str, key: str, draft: Draft, default: float | None = None) -> float:
     text = None if element is None else element.get(name)
     return numbers(text, 1, f"{key}.{name}", draft.faults, () if default is None else (default,))[0]

@@ -4,15 +4,18 @@ import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
 
+from ephs.mechanics.imports.draft import UNLIMITED
+from ephs.mechanics.imports.node import Node
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.scene.text import file_text
 
 MOST_MB = 100
 MOST_LEVELS = 200
+_LEFT_OUT = re.compile(r"<!\[CDATA\[.*?\]\]>|<!--.*?-->|<\?xml\s.*?\?>", re.DOTALL)
 _DECLARATION = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
@@ -20,27 +23,44 @@ def read_tree(path: Path, faults: list[Fault], key: str = "") -> Element | None:
     """The root element of a file; None where there were faults.
 
     Document types and entities are refused before the parser runs: they can make a small file large, and name others.
+    Comments with two hyphens, prefixes without a declaration, and declarations of XML that are not first are read, as
+    by the parsers of MuJoCo, sdformat and urdfdom.
     """
     text = file_text(path, faults, key, MOST_MB)
     if text is None:
         return None
+    text = _LEFT_OUT.sub(_blank, text)
     if declared := _DECLARATION.search(text):
         line = text.count("\n", 0, declared.start()) + 1
         faults.append(fault("entities", _at(key, f"line {line}"), f"<!{declared[1]}"))
         return None
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        faults.append(fault("xml", _at(key, f"line {line}, column {column + 1}"), str(error).partition(":")[0]))
-        return None
-    except ValueError as error:  # an encoding that Python does not have
-        faults.append(fault("xml", key, str(error)))
+        root = _parsed(text)
+    except expat.ExpatError as error:
+        place = f"line {error.lineno}, column {error.offset + 1}"
+        faults.append(fault("xml", _at(key, place), expat.ErrorString(error.code)))
         return None
     if _too_deep(root):
         faults.append(fault("deep", key, f"elements nested deeper than {MOST_LEVELS} levels", most=MOST_LEVELS))
         return None
     return root
+
+
+def _parsed(text: str) -> Element:
+    """The root of a text; names keep their prefixes."""
+    builder = TreeBuilder()
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(text, True)
+    return builder.close()
+
+
+def _blank(found: re.Match[str]) -> str:
+    """Nothing but the ends of lines of a comment or a declaration; a section of characters as it is."""
+    return found[0] if found[0].startswith("<![") else "\n" * found[0].count("\n") or " "
 
 
 def numbers(text: str | None, count: int, key: str, faults: list[Fault], default: Iterable[float] = ()) -> list[float]:
@@ -65,8 +85,19 @@ def numbers(text: str | None, count: int, key: str, faults: list[Fault], default
     return [0.0 if abs(number) < 1.0 / LARGEST else number for number in found]
 
 
+def bound(text: str | None, key: str, faults: list[Fault], default: float) -> float:
+    """A limit: a number, infinite from `UNLIMITED` on; the default where there is none."""
+    try:
+        found = float(text) if text and text.strip() else default
+    except ValueError:
+        found = math.nan
+    if math.isnan(found):
+        return numbers(text, 1, key, faults)[0]
+    return math.copysign(math.inf, found) if abs(found) >= UNLIMITED else found
+
+
 def vector(
-    element: Element | None, name: str, key: str, faults: list[Fault], default: Iterable[float] = (0.0, 0.0, 0.0)
+    element: Node | None, name: str, key: str, faults: list[Fault], default: Iterable[float] = (0.0, 0.0, 0.0)
 ) -> list[float]:
     """Three numbers in an attribute of an element, which may be missing."""
     return numbers(None if element is None else element.get(name), 3, f"{key}.{name}", faults, default)

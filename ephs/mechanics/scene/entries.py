@@ -25,6 +25,7 @@ E = TypeVar("E", bound=Entry)
 _NEUTRAL: dict[str, Any] = {
     "type": "free",
     "bodies": ["ground", "ground"],
+    "points": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
     "at1": [0.0, 0.0, 0.0],
     "at2": [0.0, 0.0, 0.0],
     "capacity": 1.0,
@@ -56,6 +57,7 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "list_type": lambda ctx: ("type", "a list"),
     "numbers": lambda ctx: ("type", "a number or a list of numbers"),
     "limits": lambda ctx: ("range", "[lower, upper], lower < upper, nan for none"),
+    "ordered": lambda ctx: ("range", "[lower, upper], lower ≤ upper"),
     "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
     "rotation": lambda ctx: ("range", FORMS),
     "rotation_type": lambda ctx: ("type", f"a unit quaternion [w, x, y, z], or a table with {FORMS}"),

@@ -101,12 +101,14 @@ def _inertia(value: Any, handler: Any) -> Any:
     return handler(value)
 
 
-def _range(value: Any, handler: Any) -> list[float]:
-    """Two ascending numbers."""
-    found = _limits(value, handler)
-    if any(map(math.isnan, found)):
-        raise PydanticCustomError("limits", "two numbers")
-    return found
+def _range(value: Any, _handler: Any) -> list[float]:
+    """Two numbers, the second not below the first."""
+    if not isinstance(value, list) or len(value) != 2 or not all(_is_number(entry) for entry in value):
+        raise PydanticCustomError("ordered", "two numbers")
+    lower, upper = map(float, value)
+    if not -LARGEST <= lower <= upper <= LARGEST:
+        raise PydanticCustomError("ordered", "two numbers")
+    return [lower, upper]
 
 
 Limits = Annotated[list[float], WrapValidator(_limits), WithJsonSchema(_LIST_SCHEMA | {"minItems": 2, "maxItems": 2})]

@@ -163,3 +163,35 @@ def test_a_transmission_is_an_actuator(write):
     assert not np.allclose(
         sol.joint("shoulder").rate, ephs.simulate(scene, 0.1, method="rk87").joint("shoulder").rate[-1]
     )
+
+
+SERVO = """<mujoco><worldbody>
+<body name="arm" pos="0 0 1"><joint name="h" axis="0 1 0" damping="0.2"/>
+  <inertial pos="0.3 0 0" mass="1" diaginertia="0.001 0.01 0.01"/>
+  <body name="hand" pos="0.5 0 0"><joint name="k" axis="0 1 0" damping="0.1"/>
+    <inertial pos="0.1 0 0" mass="0.5" diaginertia="0.001 0.01 0.01"/></body></body></worldbody>
+<tendon><fixed name="both"><joint joint="h" coef="1"/><joint joint="k" coef="-2"/></fixed></tendon>
+<actuator><position name="servo" joint="h" kp="40" kv="4" ctrlrange="-1 1"/>
+<motor name="push" joint="h" gear="-3" ctrlrange="0.5 2"/><motor name="pull" tendon="both" gear="0.5"/>
+</actuator></mujoco>"""
+DRIVES = ("actuators.servo", "actuators.push", "actuators.pull")
+
+
+@settings(max_examples=10)
+@given(st.lists(st.floats(-3.0, 3.0), min_size=7, max_size=7))
+def test_dynamics_under_controls_are_mujocos(tmp_path_factory, drawn):
+    path = tmp_path_factory.mktemp("model") / "servo.xml"
+    path.write_text(SERVO)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = drawn[:2], drawn[2:4], drawn[4:]
+    mujoco.mj_forward(model, data)
+    dynamics = ephs.dynamics(ephs.load(path), inputs=dict(zip(DRIVES, drawn[4:], strict=True)))
+    there = ({"h": x, "k": y} for x, y in (drawn[:2], drawn[2:4]))
+    found = np.concatenate(list(dynamics.acceleration(dynamics.state(*there)).values()))
+    assert np.abs(found - data.qacc).max() < 1e-10 * max(1.0, np.abs(data.qacc).max())
+
+
+def test_inputs_of_dynamics_are_numbers(write):
+    with pytest.raises(ephs.OptionError, match=r"actuators\.push.*no time"):
+        ephs.dynamics(ephs.load(write(SERVO, "xml")), inputs={"actuators.push": lambda t, _: t})

@@ -40,6 +40,10 @@ def mjcf(body, more=""):
 BALL = "<inertial><mass>1</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>"
 
 
+ONE = f'<model name="m"><link name="a">{BALL}</link></model>'
+WORLD = f'<world name="w">{ONE}</world>'
+
+
 def sdf(*parts):
     return '<sdf version="1.7"><model name="m">' + "".join(parts) + "</model></sdf>"
 
@@ -152,9 +156,46 @@ FAULTS = {
         "joints.j.dynamics.damping",
         ["-1", "not below 0"],
     ),
-    "no model": ("sdf", '<sdf version="1.7"/>', "model", ["none", "one model"]),
-    "two models": ("sdf", '<sdf version="1.7"><model name="a"/><model name="b"/></sdf>', "model", ["2: a, b"]),
-    "a model within": ("sdf", sdf('<model name="inner"/>'), "model", ['"inner"', "models within it"]),
+    "no model": ("sdf", '<sdf version="1.7"/>', "model", ["none", "one world"]),
+    "two worlds": ("sdf", f'<sdf version="1.7">{2 * WORLD}</sdf>', "model", ["2 worlds", "one world"]),
+    "two models of a name": ("sdf", f'<sdf version="1.7">{2 * ONE}</sdf>', "models.m", ['a second model "m"']),
+    "a model within without links": ("sdf", sdf('<model name="inner"/>'), "links", ["none"]),
+    "a parent that is an empty model": (
+        "sdf",
+        sdf(
+            f'<link name="a">{BALL}</link><model name="inner"/>'
+            '<joint name="j" type="fixed"><parent>inner</parent><child>a</child></joint>'
+        ),
+        "models.inner",
+        ["none", "at least one link"],
+    ),
+    "an end on a cycle of frames": (
+        "sdf",
+        sdf(
+            f'<link name="a">{BALL}</link><frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>'
+            '<joint name="j" type="fixed"><parent>f</parent><child>a</child></joint>'
+        ),
+        "joints.j.parent",
+        ["200 levels"],
+    ),
+    "two rotations of an origin": (
+        "urdf",
+        robot(links("ab"), JOINT.format("j", "fixed", "a", "b", '<origin rpy="1 0 0" quat_xyzw="0 0 0 1"/>')),
+        "joints.j.origin.quat_xyzw",
+        ["rpy beside it"],
+    ),
+    "a quaternion of zeros": (
+        "urdf",
+        robot(links("ab"), JOINT.format("j", "fixed", "a", "b", '<origin quat_xyzw="0 0 0 0"/>')),
+        "joints.j.origin.quat_xyzw",
+        ["zeros"],
+    ),
+    "a word for a limit": (
+        "urdf",
+        robot(links("ab"), JOINT.format("j", "revolute", "a", "b", '<limit lower="low" upper="1"/>')),
+        "joints.j.limit.lower",
+        ['"low"'],
+    ),
     "an include": ("sdf", sdf("<include><uri>model://x</uri></include>"), "include", ['"model://x"']),
     "SDF without links": ("sdf", sdf(), "links", ["none"]),
     "an unknown joint in SDF": (
@@ -198,7 +239,18 @@ FAULTS = {
     "what MuJoCo does not know": ("xml", mjcf("<bodi/>"), "", ["MuJoCo says", "unrecognized element"]),
     "a body without mass": ("xml", mjcf('<body name="a"><joint/></body>'), "", ["MuJoCo says", "mass and inertia"]),
     "two bodies of a name": ("xml", mjcf('<body name="a"/><body name="a"/>'), "", ["MuJoCo says", "repeated name"]),
-    "attached models": ("xml", mjcf('<body name="a"><attach model="m"/></body>'), "attach", ["without <attach>"]),
+    "an attached model outside": (
+        "xml",
+        mjcf('<body name="a"><attach model="m"/></body>', '<asset><model name="m" file="../x.xml"/></asset>'),
+        'model "../x.xml"',
+        ["folder of"],
+    ),
+    "a model attached to itself": (
+        "xml",
+        mjcf('<body name="a"><attach model="m"/></body>', '<asset><model name="m" file="model.xml"/></asset>'),
+        'model "model.xml"',
+        ["within itself"],
+    ),
     "an include outside": ("xml", '<mujoco><include file="../x.xml"/></mujoco>', 'include "../x.xml"', ["folder of"]),
 }  # fmt: skip
 

@@ -191,3 +191,43 @@ def test_joints_in_a_ratio_are_geared_and_armatures_are_kept(write):
     inertia = 4.0 * (0.3 + moment + 0.04 * mass) + 0.1 + moment + 0.01 * mass
     start = (sol.joint("two").rate[1, 0] - sol.joint("two").rate[0, 0]) / (sol.t[1] - sol.t[0])
     assert np.isclose(start, 9.81 * mass * (0.1 - 0.4) / inertia, rtol=1e-3)
+
+
+HELD = """<mujoco><worldbody><site name="hook" pos="0 0 1"/>
+<body name="bar" pos="0 0 1"><freejoint name="fly"/><inertial pos="0.5 0 0" mass="1" diaginertia="0.001 0.1 0.1"/>
+<site name="eye"/></body></worldbody><equality><weld {weld}/></equality></mujoco>"""
+# words of a weld: acceleration about y; the pin of the third is 1 m below, where the anchor is
+WELDS = {
+    'site1="hook" site2="eye"': 0.0,
+    'site1="hook" site2="eye" torquescale="0.3"': 0.0,
+    'body1="bar" anchor="0 0 0" torquescale="0"': 9.81 * 0.5 / (0.1 + 0.5**2 + 1.0**2),
+    'site1="hook" site2="eye" torquescale="0"': 9.81 * 0.5 / (0.1 + 0.5**2),
+}
+
+
+@pytest.mark.parametrize("weld", WELDS)
+def test_a_weld_without_torques_is_a_pin(weld, write, quiet):
+    dynamics = ephs.dynamics(quiet(write(HELD.format(weld=weld), "xml")))
+    found = dynamics.acceleration(dynamics.state0)["fly"]
+    assert found[1] == pytest.approx(WELDS[weld], rel=1e-12, abs=1e-12)
+    assert np.abs(found[[0, 2]]).max() < 1e-12
+
+
+STOP = """<mujoco><compiler angle="radian"/><worldbody><body name="arm" pos="0 0 1">
+<joint name="h" {kind} range="-0.5 0.5" {law}/><inertial pos="0.3 0 0" mass="1" diaginertia="0.001 0.01 0.01"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("kind", ['axis="0 1 0"', 'type="slide" axis="0 0 -1"'])
+@pytest.mark.parametrize("law", ["", 'solreflimit="0.01 1"', 'solreflimit="-2500 -100"'])
+def test_a_stop_of_mujoco_does_not_rebound(kind, law, write):
+    path = write(STOP.format(kind=kind, law=law), "xml")
+    scene = ephs.load(path, contact=True)
+    joint = ephs.simulate(scene.with_state({"h": 0.4}), 1.0, rtol=1e-8, atol=1e-10).joint("h")
+    at, rate = joint.coordinate[:, 0], joint.rate[:, 0]
+    struck = int(np.argmax(at > 0.5))
+    assert rate[struck] > 1.0
+    assert rate[struck:].min() >= -0.1  # the inverse of the loss
+    inertia = 0.01 + 0.3**2 if "slide" not in kind else 1.0
+    time = 0.01 if "0.01" in law else 0.02
+    assert np.isclose(scene.joint("h").stop.stiffness, inertia / time**2, rtol=1e-12)

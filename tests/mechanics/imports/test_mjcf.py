@@ -126,3 +126,68 @@ def test_a_model_may_be_a_part(tmp_path):
     alone = ephs.load(tmp_path / "arm.urdf")
     moved = scene.body("left.spin").pose[4:] - alone.body("spin").pose[4:]
     assert np.abs(moved - [0.0, 1.0, 0.0]).max() < 1e-14
+
+
+HEAVY = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1"/>
+<body name="arm" pos="0 0 9"><joint name="hinge" axis="0 1 0"/>
+  <inertial pos="0.1 0 0" mass="{mass}" {given}/></body>
+<body name="door" pos="3 0 9"><joint name="leaf" axis="0 0 1" springdamper="0.2 0.5"/>
+  <inertial pos="0 0 0" mass="{mass}" {given}/></body>
+<body name="ball" pos="0 5 0.1"><freejoint/><inertial pos="0 0 0" mass="{mass}" {given}/>
+  <geom name="s" size="0.1"/></body>
+{more}</worldbody><actuator><position name="servo" joint="hinge" kp="100" dampratio="0.7"/></actuator></mujoco>"""
+ODD = """<body name="odd" pos="0 0 20"><joint name="o"/><inertial pos="1 0 0" mass="1" diaginertia="1 1 5"/></body>"""
+
+
+@pytest.mark.parametrize("more", ["", ODD])
+@pytest.mark.parametrize("given", ['diaginertia="{0} {1} {2}"', 'fullinertia="{0} {1} {2} 0.001 0 0"'])
+@pytest.mark.filterwarnings("ignore::ephs.SceneWarning")
+def test_what_follows_from_masses_follows_from_those_of_the_file(more, given, write):
+    mass, (x, y, z) = 50.0, (0.2, 0.3, 0.4)
+    text = HEAVY.format(mass=mass, given=given.format(x, y, z), more=more)
+    scene = ephs.load(write(text, "xml"), contact=True)
+    # MuJoCo's documentation: damping 2 ζ √(k I) of a servo; of a spring k = I/(τ ζ)², damping 2 I/τ
+    inertia = y + mass * 0.1**2
+    assert np.isclose(scene.joint("hinge").friction[0, 0], 2.0 * 0.7 * np.sqrt(100.0 * inertia), rtol=1e-12)
+    assert np.isclose(scene.joint("leaf").stiffness[0], z / (0.2 * 0.5) ** 2, rtol=1e-12)
+    assert np.isclose(scene.joint("leaf").friction[0, 0], 2.0 * z / 0.2, rtol=1e-12)
+    whole = 3.0 * mass + (1.0 if more else 0.0)
+    assert np.isclose(scene.contacts["floor_s"].law.stiffness, whole / 0.02**2, rtol=1e-12)
+    found = scene.body("arm").inertia
+    assert np.abs(np.diag(found) - [x, y, z]).max() < 1e-14
+    assert abs(found[0, 1] - (0.001 if "full" in given else 0.0)) < 1e-15
+
+
+HAND = """<mujoco model="sub"><compiler meshdir="parts" angle="degree"/><default><joint damping="0.3"/></default>
+<asset><mesh name="m" file="wedge.obj"/>{deeper}</asset><worldbody><body name="hand" pos="0 0 0.1">
+<joint name="k" axis="0 1 0" range="-30 30"/><geom type="mesh" mesh="m"/>{finger}</body></worldbody>
+<actuator><motor name="pull" joint="k" gear="2"/></actuator></mujoco>"""
+ARM = """<mujoco><compiler angle="radian"/><asset><model name="s" file="sub/hand.xml"/></asset><worldbody>
+<body name="arm"><joint name="h" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/>
+<frame pos="0.5 0 0"><attach model="s" body="hand" prefix="a_"/></frame>
+<frame pos="-0.5 0 0" euler="0 0 1"><attach model="s" body="hand" prefix="b_"/></frame></body></worldbody></mujoco>"""
+TIP = '<mujoco><worldbody><body name="tip"><joint name="t" axis="0 1 0"/><geom size="0.1"/></body></worldbody></mujoco>'
+
+
+def test_attached_models_move_as_in_mujoco(tmp_path):
+    (tmp_path / "sub/parts").mkdir(parents=True)
+    (tmp_path / "sub/parts/wedge.obj").write_text(OBJ)
+    deeper, finger = '<model name="d" file="tip.xml"/>', '<attach model="d" body="tip" prefix="f_"/>'
+    (tmp_path / "sub/tip.xml").write_text(TIP)
+    (tmp_path / "sub/hand.xml").write_text(HAND.format(deeper=deeper, finger=finger))
+    (tmp_path / "arm.xml").write_text(ARM)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(5)
+    data.qpos[:], data.qvel[:] = rng.standard_normal((2, model.nq))
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    mujoco.mj_forward(model, data)
+    scene = ephs.load(tmp_path / "arm.xml")
+    names = [model.joint(j).name for j in range(model.njnt)]
+    assert names == ["h", "a_k", "a_f_t", "b_k", "b_f_t"] == [*scene.joints]
+    assert set(scene.actuators) == {"a_pull", "b_pull"}
+    dynamics = ephs.dynamics(scene)
+    state = dynamics.state(*(dict(zip(names, x, strict=True)) for x in (data.qpos, data.qvel)))
+    rates = dynamics.acceleration(state)
+    found = np.concatenate([rates[name] for name in names])
+    assert np.abs(found - data.qacc).max() < 1e-10 * np.abs(data.qacc).max()

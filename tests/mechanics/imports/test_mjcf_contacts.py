@@ -183,8 +183,8 @@ NOTES = {
         "contacts between shapes with many edges: x and y",
     ),
     "stop": (
-        '<joint name="j" type="hinge" range="-1 1" limited="true" solreflimit="0.05 1"/><geom size="1"/>', "",
-        "solreflimit of joints: j",
+        '<joint name="j" type="hinge" range="-1 1" limited="true" solimplimit="0.5"/><geom size="1"/>', "",
+        "solimplimit of joints: j",
     ),
 }  # fmt: skip
 

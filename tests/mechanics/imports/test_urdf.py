@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import ephs
+from ephs.mechanics.imports.read import read_model
 from ephs.mechanics.shapes.dry import Dry
 from tests.mechanics.imports.models import URDF
 from tests.mechanics.imports.pinocchio_robots import compare, robot
@@ -148,3 +149,41 @@ def test_every_name_becomes_one_that_a_scene_may_have(names, write, quiet):
     assert len(scene.joints) == len(names)
     assert scene.system().pattern.boxes
     assert not {"/", "\\"} & set(scene.name)
+
+
+INTERFACE = """<robot name="r"><link name="base"/><link name="a"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" {effort} velocity="0"/></joint>
+<transmission name="t"><joint name="j"/><actuator name="m"><mechanicalReduction>50</mechanicalReduction></actuator>
+</transmission></robot>"""
+
+
+@pytest.mark.parametrize(("effort", "most"), [('effort="0"', 0.0), ('effort="5"', 5.0), ("", np.inf)])
+def test_an_actuator_gives_at_most_the_effort_of_its_joint(effort, most, write, quiet):
+    scene = quiet(write(INTERFACE.format(effort=effort)))
+    weight, inertia = 9.81 * 0.1, 0.01 + 0.1**2
+    sol = ephs.simulate(scene, 1e-7, inputs={"actuators.m": -1.0}, method="rk87", save_at=[0.0, 1e-7])
+    found = float(np.diff(sol.joint("j").rate[:, 0])[0]) / 1e-7
+    assert found == pytest.approx((weight - min(50.0, most)) / inertia, rel=1e-6)
+
+
+@given(st.lists(st.floats(-np.pi, np.pi), min_size=3, max_size=3), st.floats(0.1, 10.0))
+@settings(max_examples=20)
+def test_a_quaternion_of_an_origin_is_the_turn_by_its_angles(tmp_path_factory, angles, scale):
+    """``quat_xyzw`` of URDF 1.1, of any length; roll, pitch and yaw by the formula of half angles."""
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(x / 2), np.sin(x / 2)) for x in angles)
+    x, y = sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy
+    z, w = cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy
+    written = " ".join(repr(scale * float(q)) for q in (x, y, z, w))
+    folder, found = tmp_path_factory.mktemp("turned"), []
+    for way in (f'quat_xyzw="{written}"', 'rpy="{!r} {!r} {!r}"'.format(*angles)):
+        text = URDF.replace('rpy="0.3 -0.2 0.7"', way).replace(
+            '<origin xyz="0 0 0.3" rpy="1 0.5 0"/>', f"<origin {way}/>"
+        )
+        (folder / "m.urdf").write_text(text)
+        tables = read_model(folder / "m.urdf", "fixed", [], [])
+        turn = np.array(tables["joints"]["shoulder"]["frame1"]["rotation"])
+        found.append((turn * np.sign(turn[np.argmax(np.abs(turn))]), np.array(tables["bodies"]["turn"]["inertia"])))
+    for one, other in zip(*found, strict=True):
+        assert np.abs(one - other).max() < 64 * np.finfo(float).eps

@@ -1,11 +1,15 @@
 """Every kind of bad input is refused by name: the key, what was found, what was expected."""
 
+import copy
 import pickle
+import tomllib
 
 import pytest
 
+from ephs.mechanics.imports.convert import toml_text
 from ephs.mechanics.scene import SceneError, SceneWarning
 from ephs.mechanics.scene.load import load
+from ephs.mechanics.scene.schema import SECTIONS
 
 BODY = "[bodies.a]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n"
 OTHER = BODY.replace("bodies.a", "bodies.b")
@@ -385,3 +389,91 @@ def test_errors_travel_between_processes(scene):
         scene(body(mass="-1.0"))
     back = pickle.loads(pickle.dumps(caught.value))
     assert (str(back), back.faults, back.path) == (str(caught.value), caught.value.faults, caught.value.path)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_an_empty_table_is_valid_or_its_faults_are_told(section, tmp_path):
+    (tmp_path / "scene.toml").write_text(f"format = 1\n[{section}.one]\n")
+    try:
+        load(tmp_path / "scene.toml")
+    except SceneError as error:
+        assert all(fault.key for fault in error.faults)
+
+
+EVERY = """format = 1
+[bodies.arm]
+mass = 1.0
+inertia = [0.01, 0.02, 0.02]
+position = [0.3, 0.0, 0.0]
+[bodies.slide]
+mass = 1.0
+inertia = [0.01, 0.02, 0.02]
+position = [0.0, 2.0, 0.0]
+[joints.h]
+type = "revolute"
+bodies = ["ground", "arm"]
+axis = [0.0, 1.0, 0.0]
+at = [0.0, 0.0, 0.0]
+limits = [-1.0, 1.0]
+[joints.s]
+type = "prismatic"
+bodies = ["ground", "slide"]
+axis = [1.0, 0.0, 0.0]
+at = [0.0, 2.0, 0.0]
+[tendons.cable]
+bodies = ["ground", "arm"]
+points = [[0.0, 0.0, 1.0], [0.1, 0.0, 0.1]]
+stiffness = 10.0
+[surfaces.floor]
+body = "ground"
+shape = { plane = {} }
+position = [0.0, 0.0, -3.0]
+[surfaces.ball]
+body = "arm"
+shape = { sphere = 0.1 }
+stiffness = 1e4
+loss = 1.0
+[contacts.c]
+surfaces = ["floor", "ball"]
+[markers.tip]
+body = "arm"
+at = [0.1, 0.0, 0.0]
+[actuators.push]
+joints = ["h"]
+ratio = 2.0
+limits = [-1.0, 1.0]
+[cylinders.ram]
+joint = "s"
+area = [1e-3, 8e-4]
+volume = [1e-4, 1e-4]
+conductance = 1e-9
+[gas_springs.soft]
+joint = "s"
+area = 1e-3
+volume = 1e-3
+pressure = 1e5
+[loads.push]
+body = "arm"
+force = [1.0, 0.0, 0.0]
+"""
+
+
+@pytest.mark.filterwarnings("ignore::ephs.SceneWarning")
+def test_without_a_key_or_with_a_shorter_list_a_scene_is_valid_or_its_faults_are_told(tmp_path):
+    whole, file = tomllib.loads(EVERY), tmp_path / "scene.toml"
+    places = [(section, name, key) for section, tables in whole.items() if section != "format"
+              for name, table in tables.items() for key in table]  # fmt: skip
+    faults = 0
+    for section, name, key in places:
+        given = whole[section][name][key]
+        for short in [None, *([given[:-1], given[:1], []] if isinstance(given, list) else [])]:
+            changed = copy.deepcopy(whole)
+            del changed[section][name][key]
+            if short is not None:
+                changed[section][name][key] = short
+            file.write_text(toml_text(changed))
+            try:
+                load(file)
+            except SceneError as error:
+                faults += len(error.faults)
+    assert faults > 60
