@@ -68,7 +68,7 @@ def _maker(primitive: Primitive, parts: Iterable[Part]) -> Part | None:
         except (ArithmeticError, LookupError, TypeError, ValueError):
             continue  # another part of the same name
         alike = type(made) is type(primitive) and list(made.interface) == list(primitive.interface)
-        names = [each.name for each in fields(made) if each.init]
+        names = [each.name for each in fields(made) if each.init and each.name != "initial"]
         if alike and all(_same(getattr(made, name), getattr(primitive, name)) for name in names):
             return part
     return None

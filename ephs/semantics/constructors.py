@@ -31,6 +31,7 @@ def storage(
     energy: Callable[..., float],
     gradient: Callable[..., Any] | None = None,
     *,
+    initial: Mapping[str, object] | None = None,
     domain: Bounds | None = None,
     name: str = "storage",
 ) -> Storage:
@@ -45,6 +46,8 @@ def storage(
     gradient
         dE, left-trivialised: a sequence with an entry for each port, or (n,). By default derived from the
         energy, by finite differences if the energy cannot be recorded.
+    initial
+        Port name -> state in which a run starts; the identity of its space where not given.
     domain
         Port name -> (least, greatest) bounds of its states, within which the conditions must hold. A run that
         leaves the domain ends with a message.
@@ -54,6 +57,8 @@ def storage(
     StructureError
         The energy is not even under time reversal, the gradient is not its differential, a temperature is not
         positive, or a function does not take the ports' names.
+    AssemblyError
+        An initial value of no port, of a wrong shape, or that is not finite.
 
     Examples
     --------
@@ -90,7 +95,7 @@ def storage(
         )
 
     derived = slope if given is not None else None if form is None else form.gradient
-    return Storage(
+    made = Storage(
         name,
         interface,
         energy=value,
@@ -101,6 +106,7 @@ def storage(
         formula=Formula(energy, gradient=gradient),
         domain=bounds,
     )
+    return made.with_initial(initial) if initial else made
 
 
 def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name: str = "gyrator") -> Reversible:

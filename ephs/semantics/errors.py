@@ -67,6 +67,7 @@ _TEXTS = {
         "scene.with_state(rates=…)"
     ),
     "unknown-state": "{path}: no such state; the states are {expected}",
+    "no-time": "{path}: the solution has no state at {found!r} s; it has times from {first!r} to {last!r} s",
     "unknown-port": "{path}: no such outer port; the outer ports are {expected}",
     "references": (
         "{path}: the relation is relative to {found}, the others to {expected}; take relations to one reference"

@@ -42,9 +42,9 @@ def primitive_record(path: Path, primitive: Primitive) -> dict[str, Any]:
     part = part_of(primitive)
     if part is not None:
         numbers = {name: _plain(path, primitive, value) for name, value in primitive.parameters}
-        return {"part": part.word, "ports": ports, "parameters": numbers}
+        return {"part": part.word, "ports": ports, "parameters": numbers} | _started(primitive)
     try:
-        entry = {primitive.kind: primitive.name, "ports": ports} | _formula(primitive)
+        entry = {primitive.kind: primitive.name, "ports": ports} | _formula(primitive) | _started(primitive)
         if primitive.domain:
             entry["domain"] = {str(port): domain_record((low, high)) for port, low, high in primitive.domain}
         again = primitive_from(Reader("system"), str(path), entry)
@@ -71,6 +71,7 @@ def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
     kind = kinds[0]
     name = reader.text(f"{where}.{kind}", found[kind])
     domain: Bounds = _bounds(reader, f"{where}.domain", found.pop("domain", {})) if kind != "part" else {}
+    initial = found.pop("initial", None) if kind in ("part", "storage") else None
     read = {"part": _part, "storage": _storage, "reversible": _reversible, "irreversible": _irreversible}[kind]
     keys = {"part": {"parameters"}, "storage": {"energy"}, "reversible": set[str](), "irreversible": {"M"}}[kind]
     more = {"storage": {"function"}, "reversible": {"L", "C"}}.get(kind, set())
@@ -86,7 +87,28 @@ def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
     if list(made.interface.items()) != list(ports.items()):
         expected = ", ".join(f"{port}: {kind}" for port, kind in made.interface.items())
         reader.refuse(f"{where}.ports", ", ".join(f"{port}: {kind}" for port, kind in ports.items()), expected)
-    return made
+    return made if initial is None else _starting(reader, f"{where}.initial", made, initial)
+
+
+def _started(primitive: Primitive) -> dict[str, Any]:
+    """Initial values of a primitive as an entry, where it has any."""
+    if not isinstance(primitive, Storage) or not primitive.initial:
+        return {}
+    return {"initial": {str(port): list(numbers) for port, numbers in primitive.initial}}
+
+
+def _starting(reader: Reader, where: str, made: Primitive, value: object) -> Primitive:
+    """The primitive with initial values; the inverse of `_started`."""
+    if not isinstance(made, Storage):
+        reader.refuse(where, f"initial values of the {made.kind} part {made.name}", "none: it has no states")
+    numbers = {
+        port: [reader.finite(f"{where}.{port}[{i}]", x) for i, x in enumerate(reader.list(f"{where}.{port}", given))]
+        for port, given in reader.mapping(where, value)
+    }
+    try:
+        return made.with_initial(numbers)
+    except SemanticsError as error:
+        reader.refuse(where, str(error), "a state of each port")
 
 
 def _ports(reader: Reader, where: str, value: object) -> Interface:

@@ -28,6 +28,8 @@ Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
 Domain = tuple[tuple[Path, float, float], ...]
 """Ports with the least and the largest number that their states may have."""
+Initial = tuple[tuple[Path, tuple[float, ...]], ...]
+"""Ports with the numbers of their initial states."""
 Proof = Callable[[], tuple[Condition, ...]]
 
 
@@ -157,6 +159,8 @@ class Storage(_Structure):
     support
         Where energy and effort are not 0. Of an irreversible process in the states that it reads; its flow is 0 as well
         where the energy of a storage beside it is, which has the same support.
+    initial
+        (port, numbers) of states in which a run starts, where these are not the identity of their space.
     """
 
     name: str
@@ -173,6 +177,7 @@ class Storage(_Structure):
     proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
     support: Support | None = field(default=None, compare=False, repr=False)
+    initial: Initial = ()
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -192,6 +197,18 @@ class Storage(_Structure):
     def reads(self) -> tuple[Path, ...]:
         """The ports whose states enter: a storage's own."""
         return self.bundle.ports
+
+    def with_initial(self, values: Mapping[str, object]) -> "Storage":
+        """The storage in another start: initial values by port.
+
+        Raises
+        ------
+        AssemblyError
+            An unknown port, a wrong shape, or a number that is not finite.
+        """
+        from ephs.semantics.initial import started
+
+        return started(self, {Path.of(port): value for port, value in values.items()}, Path())
 
     def retract(self, x: Point, v: Array) -> dict[Path, Array]:
         """The state x·exp(v), port by port; v (n,) in the fibre's layout."""

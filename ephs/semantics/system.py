@@ -13,9 +13,10 @@ from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Patt
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError, listed
+from ephs.semantics.initial import read_state, saved_state, started
 from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
-from ephs.semantics.spaces import Pair, manifold
+from ephs.semantics.spaces import manifold
 
 if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
@@ -121,8 +122,18 @@ class System:
             }
         )
 
+    @property
+    def initial(self) -> dict[Path, Array]:
+        """Initial values that the storages carry: path of the state -> (size,)."""
+        return {
+            path / port: np.array(value)
+            for path, primitive in self.leaves()
+            if isinstance(primitive, Storage)
+            for port, value in primitive.initial
+        }
+
     def state(self, values: Mapping[str, object] | None = None) -> dict[Path, Array]:
-        """Initial values by path, the others at the identity of their space.
+        """Initial values by path: as given, else those that the storages carry, else the identity of their space.
 
         Raises
         ------
@@ -130,13 +141,30 @@ class System:
             An unknown path, a wrong shape, or a number that is not finite.
         """
         states = self.states
-        out = {path: manifold(quantity.space).identity() for path, quantity in states.items()}
-        for name, value in (values or {}).items():
-            path = Path.of(name)
-            if path not in states:
-                raise AssemblyError("unknown-state", name, expected=listed(name, sorted(map(str, states))))
+        out = {path: manifold(quantity.space).identity() for path, quantity in states.items()} | self.initial
+        for path, value in _known(values or {}, states).items():
             out[path] = read_state(path, states[path], value)
         return out
+
+    def with_initial(self, values: Mapping[str, object] | Mapping[Path, object]) -> "System":
+        """The system in another start: its storages carry these values, by path; others stay as they are.
+
+        Raises
+        ------
+        AssemblyError
+            An unknown path, a wrong shape, or a number that is not finite.
+        """
+        return _started(self, _known(values, self.states), ROOT)
+
+    def at(self, solution: Any, time: float) -> "System":
+        """The system in the state of a solution at one of its times, in s.
+
+        Raises
+        ------
+        AssemblyError
+            The solution has no such time, or states that the system has not.
+        """
+        return self.with_initial(saved_state(solution, time))
 
     @property
     def ledger(self) -> "Ledger":
@@ -191,7 +219,7 @@ class System:
         Parameters
         ----------
         state
-            Where the laws are measured, missing values at the identity; at random states where None.
+            Where the laws are measured, missing values at the start; at random states where None.
         """
         from ephs.semantics.report import check_system
 
@@ -261,6 +289,33 @@ def as_system(filling: Filling) -> System:
     return System(Pattern.identity(filling.interface), Directory.unit(filling))
 
 
+def _known(values: Mapping[Any, object], states: Mapping[Path, Quantity]) -> dict[Path, object]:
+    """The values by path."""
+    found: dict[Path, object] = {}
+    for name, value in values.items():
+        path = Path.of(name)
+        if path not in states:
+            raise AssemblyError("unknown-state", name, expected=listed(name, sorted(map(str, states))))
+        found[path] = value
+    return found
+
+
+def _started(system: System, values: Mapping[Path, object], at: Path) -> System:
+    """The system in the box ``at`` with initial values, all of states that it has."""
+    inside: dict[Path, dict[Path, object]] = {}
+    for path, value in values.items():
+        box = next(Path(path[:k]) for k in range(len(path)) if path[:k] in system.fillings)
+        inside.setdefault(box, {})[Path(path[len(box) :])] = value
+    fillings = dict(system.fillings)
+    for box, given in inside.items():
+        part = fillings[box]
+        if isinstance(part, System):
+            fillings[box] = _started(part, given, at / box)
+        elif isinstance(part, Storage):
+            fillings[box] = started(part, given, at / box)
+    return System(system.pattern, Directory.trusted(fillings)) if inside else system
+
+
 def fold(
     filling: Filling,
     leaf: Callable[[Path, Primitive], T],
@@ -296,28 +351,6 @@ def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> Non
         if not interfaces_match(wanted, filling.interface):
             found, expected = _describe(filling.interface), _describe(wanted)
             raise SemanticsError("interface", box, found=found, expected=expected)
-
-
-def read_state(path: Path, quantity: Quantity, value: object) -> Array:
-    """Value of a state, (size,), from its short form.
-
-    Raises
-    ------
-    AssemblyError
-        A wrong shape, or a number that is not finite.
-    """
-    space = quantity.space
-    try:
-        array = np.atleast_1d(np.asarray(value, dtype=float))
-    except (TypeError, ValueError):
-        raise AssemblyError("state-number", path, found=value, quantity=quantity.kind) from None
-    if quantity.kind == "relative_pose" and array.shape == (space.dim,) != (space.size,):
-        array = Pair.from_space(space).element(array)  # as solutions give them
-    if array.shape != (space.size,):
-        raise AssemblyError("state", path, found=array.shape, expected=(space.size,), quantity=quantity.kind)
-    if not np.all(np.isfinite(array)):
-        raise AssemblyError("state-number", path, found=array, quantity=quantity.kind)
-    return manifold(space).normalise(array)
 
 
 def _describe(interface: Interface) -> str:

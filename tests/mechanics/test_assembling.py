@@ -66,3 +66,18 @@ def test_what_a_scene_was_made_into_is_left_as_it_is():
 def test_checks_say_how_far_joints_are_closed():
     item = next(i for i in check_model(wired(), given()).items if i.name == "closure")
     assert item.ok
+
+
+def test_the_system_of_a_scene_starts_as_the_scene_and_what_is_given_moves_the_rest():
+    scene = ephs.load(Path(__file__).parents[2] / "scenes" / "chain.toml")
+    system = scene.system()
+    run = {"until": 0.1, "method": "rk54", "step": 0.01}
+    one, two = ephs.simulate(system, **run), ephs.simulate(scene, **run)
+    for path in one.states:
+        assert np.array_equal(one[path], two[path]), path
+    name, joint = next((name, j) for name, j in scene.all_joints() if j.kind == "revolute")
+    angle = float(joint.coordinate[0]) + 0.4
+    moved = problem_of_system(system, {f"joints.{name}.pe.q_r": angle}).initial
+    for path, value in initial_state(scene.with_state({name: angle})).items():
+        if path[-1] in ("q", "q_r"):
+            np.testing.assert_allclose(moved[path], value, atol=1e-14)

@@ -160,6 +160,7 @@ def test_every_library_part_is_written_by_name(name):
 
 KINDS = ("revolute", "prismatic", "cylindrical", "planar", "spherical", "fixed", "free", "screw")
 ROUND = rigid_body(2.0, [0.1, 0.2, 0.25])
+TURN, SLIDE = (ephs.quantity.joint_momentum(kind) for kind in ("revolute", "prismatic"))
 MECHANICS = [
     *(joint(kind, stiffness=2.0, pitch=0.3) for kind in KINDS),
     joint("revolute", friction=0.1, heat=True),
@@ -178,6 +179,12 @@ MECHANICS = [
     stabilised(mbs_pattern()(body1=ROUND, body2=ROUND, joint=joint("revolute"))),
     alone(ephs.mechanics.elements.components.ground()),
     alone(ephs.mechanics.elements.components.thermal_node(3.0, 300.0)),
+    alone(ephs.mechanics.armature(TURN, 0.3)),
+    *(ephs.mechanics.gear([of, TURN], [2.0], stiffness=3.0, stretch=0.1) for of in (TURN, SLIDE)),
+    ephs.mechanics.gas_spring(TURN, area=1e-3, volume=1e-3, pressure=2e5, temperature=300.0),
+    ephs.mechanics.hydraulic_cylinder(
+        SLIDE, area=[1e-3, 2e-3], volume=[1e-4, 2e-4], bulk=1e9, conductance=1e-10, pressure=[1e5, 0.0]
+    ),
 ]
 
 

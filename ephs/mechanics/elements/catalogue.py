@@ -7,9 +7,13 @@ import numpy as np
 
 from ephs.mechanics.elements import beam, components, springs
 from ephs.mechanics.elements.closing import Q1, Q2, closing
+from ephs.mechanics.elements.cylinder import oil
+from ephs.mechanics.elements.gear import belt_spring
+from ephs.mechanics.elements.motor import armature
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Interface, Path, Quantity
+from ephs.semantics import library
 from ephs.semantics.catalogue import Part
 from ephs.semantics.primitives import Primitive
 from ephs.semantics.spaces import Pair, pair
@@ -82,10 +86,16 @@ def _thermoelastic(_ports: Interface, n: Numbers) -> Primitive:
     return beam.thermoelastic(n["capacity"], n["temperature"], n["pull"], n["reference"])
 
 
+def _reservoir(ports: Interface, _numbers: Numbers) -> Primitive:
+    return library.environment(**{str(port): kind.quantity for port, kind in ports.items()})
+
+
 PARTS: tuple[Part, ...] = (
+    Part("armature", "armature", lambda ports, n: armature(_port(ports, parity=-1)[1], n["inertia"])),
     Part("beam_damper", "beam_damper", _beam_damper),
     Part("beam_spring", "beam_spring", _beam_spring),
     Part("beam_stretch", "beam_stretch", lambda _, n: beam.beam_stretch(n["length"], tuple(n["rest"]))),
+    Part("belt_spring", "spring", lambda ports, n: belt_spring(_port(ports, parity=1)[1], n["k"])),
     Part("closing", "closing", _closing),
     Part("frame_change", "frame_change", _frame_change),
     Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
@@ -96,10 +106,12 @@ PARTS: tuple[Part, ...] = (
     Part("kinetic", "kinetic", _kinetic),
     Part("lie_poisson", "lie_poisson", lambda ports, _: components.lie_poisson(_group(ports))),
     Part("no_potential", "no_potential", _no_potential),
+    Part("oil", "oil", lambda ports, n: oil(ports[Path.of("q")].quantity, n)),
     Part("pair_spring", "pair_spring", _pair_spring),
     Part("point_damper", "point_damper", lambda _, numbers: springs.point_damper(numbers["damping"])),
     Part("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
     Part("point_stretch", "point_stretch", lambda _ports, _numbers: springs.point_stretch()),
+    Part("reservoir", "environment", _reservoir),
     Part("slack_spring", "slack_spring", lambda _, n: tension_spring(n["stiffness"], n["length"], slack=True)),
     Part(
         "velocity_relation",

@@ -1,6 +1,6 @@
 """Cylinders on the rate of a joint: of oil between two supplies, and of gas against the environment."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ephs.mechanics.elements.gear import turns
@@ -8,7 +8,7 @@ from ephs.operad import Junction, Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.constructors import gyrator
 from ephs.semantics.forms import stored
-from ephs.semantics.primitives import power_ports
+from ephs.semantics.primitives import Storage, power_ports
 from ephs.semantics.system import Filling, System
 
 
@@ -26,6 +26,7 @@ def hydraulic_cylinder(
     bulk: float,
     conductance: float,
     leak: float = 0.0,
+    pressure: Sequence[float] = (0.0, 0.0),
     heat: bool = False,
 ) -> System:
     """A cylinder with two chambers of oil, or a hydraulic motor; ports a, b of the supplies, and p_r of the joint.
@@ -41,13 +42,15 @@ def hydraulic_cylinder(
     area
         (2,) volume of each chamber by the coordinate, m³/m or m³/rad.
     volume
-        (2,) oil in each chamber, m³.
+        (2,) of each chamber at the start, m³.
     bulk
         Its bulk modulus in Pa.
     conductance
         Of each line, m³/(s Pa).
     leak
         Across the piston, likewise.
+    pressure
+        (2,) of the oil in each chamber at the start, above the environment's, Pa.
     heat
         What lines and the leak lose leaves through the port s, in place of the box env.
     """
@@ -72,11 +75,8 @@ def hydraulic_cylinder(
     }
     fillings: dict[str, Filling] = {
         "piston": gyrator({"q": place, "p_r": of}, [[0.0, -1.0], [1.0, 0.0]], name="pkc"),
-        "oil": stored(
-            "oil",
-            power_ports(v_a=quantity.liquid, v_b=quantity.liquid, q=place),
-            _compressed,
-            {**numbers, "bulk": bulk},
+        "oil": oil(place, {**numbers, "bulk": bulk}).with_initial(
+            {f"v_{name}": v * (1.0 + p / bulk) for name, v, p in zip("ab", volume, pressure, strict=True)}
         ),
         "line_a": library.laminar_leak(c=conductance),
         "line_b": library.laminar_leak(c=conductance),
@@ -84,6 +84,11 @@ def hydraulic_cylinder(
     if leak:
         boxes["leak"], fillings["leak"] = {"v1": "v_a", "v2": "v_b", "s": "s"}, library.laminar_leak(c=leak)
     return _closed(junctions, boxes, fillings, heat=heat)
+
+
+def oil(place: Quantity, numbers: Mapping[str, float]) -> Storage:
+    """Energy of the oil in both chambers; numbers are areas, volumes, and the bulk modulus."""
+    return stored("oil", power_ports(v_a=quantity.liquid, v_b=quantity.liquid, q=place), _compressed, numbers)
 
 
 def gas_spring(
@@ -108,7 +113,7 @@ def gas_spring(
     area
         Volume of the gas by the coordinate, m³/m or m³/rad; negative where it shrinks towards larger coordinates.
     volume, pressure, temperature
-        A state of the gas, in m³, Pa (absolute) and K.
+        The gas at the start, in m³, Pa (absolute) and K.
     gamma
         Its ratio of specific heats.
     conductance
@@ -132,7 +137,7 @@ def gas_spring(
     energy = heats * pressure * volume
     fillings: dict[str, Filling] = {
         "piston": gyrator({"p_r": of, "v": quantity.volume, "w": quantity.volume}, skew, name="gas_piston"),
-        "gas": library.ideal_gas(c1=energy, c2=energy / temperature, v0=volume, c=heats),
+        "gas": library.ideal_gas(c1=energy, c2=energy / temperature, v0=volume, c=heats).with_initial({"v": volume}),
         "atmosphere": library.environment(v=quantity.volume),
     }
     if conductance:

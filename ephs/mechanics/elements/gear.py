@@ -7,7 +7,7 @@ import numpy as np
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.constructors import constraint, gyrator, transformer
-from ephs.semantics.primitives import power_ports
+from ephs.semantics.primitives import Storage, power_ports
 from ephs.semantics.spaces import pair
 from ephs.semantics.structures import quadratic
 from ephs.semantics.system import Filling, System
@@ -19,6 +19,7 @@ def gear(
     *,
     stiffness: float = 0.0,
     damping: float = 0.0,
+    stretch: float = 0.0,
     friction: float = 0.0,
     heat: bool = False,
 ) -> System:
@@ -35,6 +36,8 @@ def gear(
         One number for each joint but the first.
     stiffness, damping
         Of a belt or a tendon, in N m/rad and N m s/rad or N/m and N s/m.
+    stretch
+        Of the spring at the start, in rad or m of the first joint.
     friction
         On the first joint's rate, in N m s/rad or N s/m: what the gear loses.
     heat
@@ -56,9 +59,7 @@ def gear(
         fillings = {
             "mesh": constraint({**ports, "p": momentum}, [[*row, -1.0]], name="mesh"),
             "pkc": gyrator({"q": place, "p": momentum}, [[0.0, -1.0], [1.0, 0.0]], name="pkc"),
-            "spring": quadratic(
-                "spring", power_ports(q=place), np.array([[stiffness]]), (("k", stiffness),), trusted=True
-            ),
+            "spring": belt_spring(place, stiffness).with_initial({"q": stretch}),
         }
     else:
         fillings = {"mesh": constraint(ports, [row], name="mesh")}
@@ -78,6 +79,12 @@ def gear(
     return System.of(
         Pattern(junctions=junctions, boxes=boxes), {Path.of(name): filling for name, filling in fillings.items()}
     )
+
+
+def belt_spring(place: Quantity, stiffness: float) -> Storage:
+    """½ k q² of a stretch q, an angle or a displacement."""
+    parameters = (("k", stiffness),)
+    return quadratic("spring", power_ports(q=place), np.array([[stiffness]]), parameters, trusted=True)
 
 
 def turns(of: Quantity) -> bool:

@@ -36,7 +36,7 @@ def motor(
 ) -> System:
     """A direct-current motor; ports q, whose effort is the voltage and whose flow the current, and p_r of the joint.
 
-    Its magnet is the state ``field.b``, the flux linkage of one henry, which stays at the motor's constant.
+    Its magnet is the state ``field.b``, the flux linkage of one henry, which begins and stays at the motor's constant.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def motor(
     fillings = {
         "supply": library.emc(),
         "winding": library.resistor(r=resistance),
-        "field": library.inductor(l=1.0),
+        "field": library.inductor(l=1.0).with_initial({"b": constant}),
         "magnet": library.mkc(),
         "gear": transformer({"p_r": of, "p": quantity.angular_momentum}, [[gear]], name="gear"),
     }

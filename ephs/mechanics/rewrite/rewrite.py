@@ -173,7 +173,7 @@ class Site:
             raise AssemblyError("rewrite", self.where, rule=self.rule, found=self.refusal)
         draft = Draft(system)
         states = self.make(draft)
-        return Rewritten(draft.system(), states, (self,))
+        return Rewritten(_begun(draft.system(), system, states), states, (self,))
 
 
 @final
@@ -243,4 +243,9 @@ def rewrite(system: System, rules: Iterable[Rule]) -> Rewritten:
                     states = states.then(site.make(draft))
                     done.append(site)
                     again = True
-    return Rewritten(draft.system(), states, tuple(done))
+    return Rewritten(_begun(draft.system(), system, states), states, tuple(done))
+
+
+def _begun(made: System, system: System, states: StateMap) -> System:
+    """The system that was made of another one, in the start that belongs to that one's."""
+    return made.with_initial(states.forward(system.state())) if system.initial else made

@@ -1,12 +1,12 @@
 """Mechanisms in systems without scene: their joints are found in the flat system and assembled.
 
 A joint is a holonomic relation between two frames; frame changes lead from there to bodies, whose momentum is coupled
-to a pose, or to the ground. Relative poses follow from poses and poses from relative poses where they are not given; a
-joint that stays open is refused, as in scenes. Joints at frames without a pose, as inside universal joints, are left as
-they are.
+to a pose, to frames without one, as inside universal joints, or to the ground. Relative poses follow from poses and
+poses from relative poses where they are not given; a joint that stays open is refused, as in scenes. Lengths of tendons
+follow from both.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -17,13 +17,19 @@ from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.kinematics import Link, extent
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
+from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Reversible
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
+from ephs.semantics.system import System
 from ephs.solve.result.solution import Solution
+
+TENSION_SPRINGS = ("tension_spring", "slack_spring")
+"""Storages of the length of a tendon."""
 
 
 @final
@@ -38,60 +44,117 @@ class FlatJoints:
     relative
         Paths of their relative poses.
     poses
-        Paths of the bodies' poses, by number.
+        Paths of the poses of bodies, and None of frames without one, by number.
     frames
         Links and joints as they are found in the system.
     """
 
     links: tuple[Link, ...]
     relative: tuple[Path, ...]
-    poses: tuple[Path, ...]
+    poses: tuple[Path | None, ...]
     frames: Frames
 
     def gaps(self, solution: Solution) -> Array:
         """(n,) largest distance in m or angle in rad between where a joint and its bodies put the frame C2."""
         n = len(solution)
         worst = np.zeros(n)
-        for link, path in zip(self.links, self.relative, strict=True):
-            rows = solution[path].reshape(n, link.coupling.dim)
-            inside = np.array([link.coupling.include(link.coupling.element(row)) for row in rows]).reshape(n, 7)
-            first, second = (self._frame(solution, body, frame) for body, frame in _ends(link))
-            gap = compose(inverse(second), compose(first, inside))
-            angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # of small ones, and half turns still show
-            worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
+        poses = {body: solution[path] for body, path in enumerate(self.poses) if path is not None}
+        poses[GROUND] = np.tile(SE3.identity(), (n, 1))
+        hops = spanning_hops(self.links, len(self.poses), ())
+        placing = [hop for hop in hops if self.poses[hop.body] is None]
+        for hop in placing:  # frames without a pose are where the joint before them puts them
+            link, inside = self.links[hop.link], self._inside(solution, hop.link)
+            if not hop.forward:
+                inside = inverse(inside)
+            here, there = (link.frame1, link.frame2) if hop.forward else (link.frame2, link.frame1)
+            first = compose(poses[link.body1 if hop.forward else link.body2], np.broadcast_to(here, (n, 7)))
+            poses[hop.body] = compose(compose(first, inside), np.broadcast_to(SE3.inverse(there), (n, 7)))
+        for number in set(range(len(self.links))) - {hop.link for hop in placing}:
+            link = self.links[number]
+            if {link.body1, link.body2} <= poses.keys():
+                ends = ((link.body1, link.frame1), (link.body2, link.frame2))
+                first, second = (compose(poses[body], np.broadcast_to(frame, (n, 7))) for body, frame in ends)
+                gap = compose(inverse(second), compose(first, self._inside(solution, number)))
+                angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # of small ones, and half turns still show
+                worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
         return worst
 
-    def _frame(self, solution: Solution, body: int, frame: Array) -> Array:
-        n = len(solution)
-        poses = np.tile(SE3.identity(), (n, 1)) if body < 0 else solution[self.poses[body]]
-        return compose(poses, np.broadcast_to(frame, (n, 7)))
-
-
-def _ends(link: Link) -> tuple[tuple[int, Array], tuple[int, Array]]:
-    return (link.body1, link.frame1), (link.body2, link.frame2)
+    def _inside(self, solution: Solution, number: int) -> Array:
+        """(n, 7) relative poses of a joint."""
+        n, of = len(solution), self.links[number].coupling
+        rows = solution[self.relative[number]].reshape(n, of.dim)
+        return np.array([of.include(of.element(row)) for row in rows]).reshape(n, 7)
 
 
 def flat_joints(d: Descriptor) -> FlatJoints:
-    """The joints of a flat system between bodies with poses, and the ground."""
+    """The joints of a flat system between bodies, frames and the ground."""
     found = frames_of(d)
-    posed = [i for i, link in enumerate(found.links) if link.pose is not None]
-    body = {i: number for number, i in enumerate(posed)} | {GROUND: GROUND}
-    joints = [j for j in found.joints if {j.first.link, j.second.link} <= body.keys()]
     return FlatJoints(
         tuple(
-            Link(
-                str(j.path), body[j.first.link], body[j.second.link], j.first.offset, j.second.offset, Coupling(j.pair)
-            )
-            for j in joints
+            Link(str(j.path), j.first.link, j.second.link, j.first.offset, j.second.offset, Coupling(j.pair))
+            for j in found.joints
         ),
-        tuple(j.state.path for j in joints),
-        tuple(pose.path for i in posed if (pose := found.links[i].pose) is not None),
+        tuple(j.state.path for j in found.joints),
+        tuple(None if link.pose is None else link.pose.path for link in found.links),
         found,
     )
 
 
+def start_of(joints: FlatJoints, system: System, given: Mapping[Path, Array]) -> dict[Path, Array]:
+    """Initial states of a mechanism: those that its components carry, but ``given`` ones and what these move.
+
+    Raises
+    ------
+    AssemblyError
+        A joint stays open by more than the tolerance of assembly; it names the joint and the gap.
+    """
+    places = {*joints.poses, *joints.relative}
+    carried = system.initial
+    placed = not places.isdisjoint(carried)
+    out = assembled(joints, system.state(), carried) if placed else system.state()
+    out |= given
+    if not (placed and places.isdisjoint(given)):
+        out = assembled(joints, out, given)
+    known = {*carried, *given}
+    return out | {path: length for path, length in tendon_lengths(joints.frames, out) if path not in known}
+
+
+def tendon_lengths(frames: Frames, state: Mapping[Path, Array]) -> Iterator[tuple[Path, Array]]:
+    """Lengths (1,) that springs of tendons store, from the relative poses of their points.
+
+    All segments share a junction, a gyrator leads from there to the rate of the whole length, and another one from that
+    to what stores it.
+    """
+    wiring = frames.wiring
+    whole: dict[int, float] = {}
+    for number, slot in enumerate(wiring.components):
+        if slot.primitive.kernel is not None and slot.primitive.kernel.name == "point_stretch":
+            at = wiring.ports(number)["e"]
+            whole[at] = whole.get(at, 0.0) + float(np.linalg.norm(state[slot.reads[0].path][4:]))
+    for at, length in whole.items():
+        for rate, turn in _coupled(wiring, at):
+            for end, back in _coupled(wiring, rate):
+                found = wiring.stored(end)
+                if found is not None and wiring.components[found[0]].primitive.name in TENSION_SPRINGS:
+                    yield found[1].path, np.array([length * back / turn])
+
+
+def _coupled(wiring: Wiring, junction: int) -> Iterator[tuple[int, float]]:
+    """Other junctions of constant gyrators of two scalar ports on a junction, each with its flow by the effort here."""
+    for number, port in wiring.on(junction):
+        primitive, ports = wiring.components[number].primitive, wiring.ports(number)
+        if isinstance(primitive, Reversible) and not primitive.reads and primitive.bundle.size == 2 == len(ports):
+            skew, rows = primitive.structure({})
+            (other,) = (name for name in ports if name != port)
+            flow = float(skew[list(ports).index(other), list(ports).index(port)])
+            if flow and not rows.size:
+                yield ports[other], flow
+
+
 def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection[Path]) -> dict[Path, Array]:
     """The states with poses that are not ``given`` set from relative poses, and then these from those.
+
+    What hangs on nothing stays where it is.
 
     Raises
     ------
@@ -101,16 +164,18 @@ def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection
     out = dict(state)
     known = {body for body, path in enumerate(joints.poses) if path in given}
     named = {k.name for k, path in zip(joints.links, joints.relative, strict=True) if path in given}
-    poses = np.array([out[path] for path in joints.poses]).reshape(-1, 7)
-    reached = known | {-1}
-    for hop in spanning_hops(joints.links, len(poses), named):
+    poses = np.array([SE3.identity() if path is None else out[path] for path in joints.poses]).reshape(-1, 7)
+    hops = spanning_hops(joints.links, len(poses), named)
+    reached = known | {-1, *range(len(poses))} - {hop.body for hop in hops}
+    for hop in hops:
         link = joints.links[hop.link]
         if hop.body not in known and (link.body1 if hop.forward else link.body2) in reached:
             x = out[joints.relative[hop.link]]
             poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
             reached.add(hop.body)
     for path, pose in zip(joints.poses, poses, strict=True):
-        out[path] = np.array(pose)
+        if path is not None:
+            out[path] = np.array(pose)
     length = extent(joints.links, poses)[1] or 1.0
     for link, path in zip(joints.links, joints.relative, strict=True):
         x = out[path] if path in given else link.coupling.fit(link.relative(poses), out[path])

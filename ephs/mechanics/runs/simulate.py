@@ -13,7 +13,7 @@ from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.views import view_of
 from ephs.mechanics.rewrite.folded import folded_problem
-from ephs.mechanics.runs.assembling import assembled, flat_joints
+from ephs.mechanics.runs.assembling import flat_joints, start_of
 from ephs.mechanics.runs.journaling import journaled
 from ephs.mechanics.runs.pace import longest_step
 from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
@@ -311,14 +311,15 @@ def problem_of_system(
         size = system.interface[path].quantity.space.dim if path in system.interface else None
         signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
     state = system.state(initial)
+    counters = {slot.path for slot in descriptor.components if slot.primitive.kind == "environment"}
     for slot in descriptor.states:
         given, of = state[slot.path], slot.quantity
-        if not extents.inside(of, given):
+        if not extents.inside(of, given) and Path(slot.path[:-1]) not in counters:
             found = float(given[0]) if given.size == 1 else given
             raise AssemblyError("outside", slot.path, quantity=of.kind, found=found, expected=extents.expected(of))
     joints = flat_joints(descriptor)
     if assemble and joints.links:
-        state = assembled(joints, state, {Path.of(path) for path in initial or {}})
+        state = start_of(joints, system, {path: state[path] for path in map(Path.of, initial or {})})
     gaps = joints.gaps if joints.links else None
     linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
     given = reference or Reference()

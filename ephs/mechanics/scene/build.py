@@ -78,6 +78,11 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
     return once(scene, ("system", asked, pushed), made)
 
 
+def started_system(scene: Scene) -> System:
+    """The same with the scene's initial state; made once, too."""
+    return once(scene, "started", lambda: scene_system(scene).with_initial(initial_state(scene)))
+
+
 def initial_state(scene: Scene) -> dict[Path, Array]:
     """Values of all states of the scene's system at the start."""
     out: dict[Path, Array] = {}

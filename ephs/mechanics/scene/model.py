@@ -80,10 +80,10 @@ class Scene:
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     def system(self) -> "System":
-        """The scene as a hierarchical exergetic port-Hamiltonian system."""
-        from ephs.mechanics.scene.build import scene_system
+        """The scene as a hierarchical exergetic port-Hamiltonian system, in the scene's initial state."""
+        from ephs.mechanics.scene.build import started_system
 
-        return scene_system(self)
+        return started_system(self)
 
     def with_state(
         self,

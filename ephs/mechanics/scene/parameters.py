@@ -238,6 +238,7 @@ def _system(system: System, values: Mapping[str, float]) -> System:
 
 def _refilled(filling: Any, boxes: tuple[Any, ...], parameters: Mapping[str, float]) -> Any:
     if not boxes:
-        return _library()[filling.name](**{**dict(filling.parameters), **parameters})
+        made = _library()[filling.name](**{**dict(filling.parameters), **parameters})
+        return made.with_initial({str(p): x for p, x in filling.initial}) if isinstance(made, Storage) else made
     inner = _refilled(filling.fillings[boxes[0]], boxes[1:], parameters)
     return System.of(filling.pattern, {**dict(filling.fillings.items()), boxes[0]: inner})

@@ -15,9 +15,9 @@ from ephs.operad import Path, Pattern, Quantity
 from ephs.operad.links import closure
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.initial import read_state
 from ephs.semantics.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import manifold
-from ephs.semantics.system import read_state
 
 Values = Mapping[str, object] | Mapping[Path, object] | Mapping[Path, Array]
 """Values of states by path."""
