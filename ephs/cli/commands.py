@@ -100,9 +100,9 @@ def check(scene: str, /, *, initial: list[str] | None = None, loading: Loading =
 
         report = check_model(model, initial_values(initial or []))
     table = Table("law", "", "detail", title=scene, title_justify="left", box=None, pad_edge=False)
-    for name, holds, detail in report.items:
-        verdict = Text("holds", "green") if holds else Text("FAILS", "bold red")
-        table.add_row(Text(name), verdict, Text(detail))
+    colours = {"holds": "green", "doubt": "yellow", "FAILS": "bold red"}
+    for item in report.items:
+        table.add_row(Text(item.name), Text(item.verdict, colours[item.verdict]), Text(item.detail))
     Console().print(table)
     return 0 if report.ok else 1
 

@@ -96,6 +96,11 @@ def run(
     if until is None:
         raise BadInput(_TEXTS["until"].format(file=scene))
     model = load_model(scene, loading)
+    if isinstance(model, ephs.Scene):
+        from ephs.mechanics.constraints.plausible import doubts
+
+        for doubt in doubts(model):
+            complain(f"{scene}: {doubt}")
     name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
     folder = out or Path("out", name)
     with addressed(scene, folder):

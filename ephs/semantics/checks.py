@@ -13,6 +13,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.errors import StructureError
 from ephs.semantics.extents import into
+from ephs.semantics.linear.sums import unit_rows
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.subspace import Subspace
@@ -196,8 +197,8 @@ def _slope_defect(
 
 def dirac(skew: Array, constraint: Array) -> Subspace:
     """The subspace {(f, e): f = L e + Cᵀ λ, 0 = C e} of ℝ²ⁿ."""
-    n, k = skew.shape[0], constraint.shape[0]
-    kernel = np.block([[-np.eye(n), skew, constraint.T], [np.zeros((k, n)), constraint, np.zeros((k, k))]])
+    n, k, rows = skew.shape[0], constraint.shape[0], unit_rows(constraint)
+    kernel = np.block([[-np.eye(n), skew, rows.T], [np.zeros((k, n)), rows, np.zeros((k, k))]])
     return Subspace.from_kernel(kernel).project(range(2 * n))
 
 

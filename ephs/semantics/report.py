@@ -16,6 +16,8 @@ from ephs.semantics.system import System
 
 PROBES = 3
 """States and efforts at which a structure is evaluated again, whatever its verdict."""
+DOUBTS = "doubts"
+"""The check that names what can hardly be meant; it never fails."""
 
 
 @final
@@ -25,6 +27,11 @@ class CheckItem(NamedTuple):
     name: str
     ok: bool
     detail: str
+
+    @property
+    def verdict(self) -> str:
+        """In a word."""
+        return ("doubt" if self.name == DOUBTS else "holds") if self.ok else "FAILS"
 
 
 @final
@@ -40,11 +47,11 @@ class CheckReport:
         return all(item.ok for item in self.items)
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
-        rows = ((name, "holds" if ok else "FAILS", detail) for name, ok, detail in self.items)
+        rows = ((item.name, item.verdict, item.detail) for item in self.items)
         return table("Check: all hold" if self.ok else "Check: some fail", (), rows)
 
     def __str__(self) -> str:
-        return "\n".join(f"{'holds' if ok else 'FAILS'}  {name}: {detail}" for name, ok, detail in self.items)
+        return "\n".join(f"{item.verdict}  {item.name}: {item.detail}" for item in self.items)
 
 
 def check_system(

@@ -32,6 +32,7 @@ class Run(Protocol):
         ...
 
 
+_AT_CONSTRAINTS = (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.UNDETERMINED)
 _AT_LOOPS = (Outcome.OPEN, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.SINGULAR, Outcome.TINY)
 
 
@@ -48,7 +49,7 @@ def failures_of(run: Run) -> Generator[None, None, None]:
             outcome = Outcome.SHAKY
         failed = Interrupted if isinstance(error.cause, KeyboardInterrupt) else SimulationError
         told = [error.equation]
-        if error.outcome in (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED) and run.problem.dependences:
+        if error.outcome in _AT_CONSTRAINTS and run.problem.dependences:
             told.append(run.problem.dependences())
         equation = "; ".join(filter(None, told))
         raise failed(outcome, run.t * run.problem.seconds, error.path, equation, run.solution()) from error.cause

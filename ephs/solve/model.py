@@ -345,8 +345,11 @@ def evaluate_at(model: Model, x: Array, z: Array, h: float) -> tuple[int, int, M
     return *evaluation.at(x, z, h), evaluation.memory
 
 
-def without_cancelled(model: Model, x: Array, values: Array) -> Array:
-    """Entries of the matrix, those of constraints zero where ports of one component cancel each other on a junction."""
+def cancelled(model: Model, x: Array) -> tuple[Index, Index]:
+    """Entries of the matrix that are rounding, as ports of one component cancel each other on a junction.
+
+    And the rows of constraints of which nothing else is left: they are no equations.
+    """
     t, d = model.tables, model.descriptor
 
     def found() -> tuple[int, ...]:
@@ -355,7 +358,7 @@ def without_cancelled(model: Model, x: Array, values: Array) -> Array:
         shared = np.setdiff1d(np.arange(owner.size), np.unique(efforts, return_index=True)[1])
         return tuple(np.unique(owner[shared]).tolist())
 
-    out = values.copy()
+    entries, rows = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     for number in once(d, "components with ports that share a junction", found):
         slot = d.components[number]
         if slot.multipliers and isinstance(slot.primitive, Reversible):
@@ -364,8 +367,10 @@ def without_cancelled(model: Model, x: Array, values: Array) -> Array:
             left = uncancelled(constraint, slot.efforts)
             gone = np.zeros((k, width), dtype=bool)
             gone[:, :n] = left != constraint
-            gone[:, n:] = gone.any(axis=1, keepdims=True) & ~left.any(axis=1, keepdims=True)  # by states, all rounding
+            empty = gone.any(axis=1) & ~left.any(axis=1)
+            gone[empty, n:] = True  # by states, all rounding
             first = t.jacobian_at[number] + width * n
             place = t.jacobian[first : first + width * k].reshape(k, width)
-            out[place[gone & (place >= 0)]] = 0.0
-    return out
+            entries.append(place[gone & (place >= 0)])
+            rows.append(t.counts[0] + t.counts[1] + t.multiplier_at[number] + np.flatnonzero(empty))
+    return np.concatenate(entries), np.concatenate(rows)

@@ -59,6 +59,29 @@ def test_a_constraint_that_cancels_on_a_junction_is_no_equation():
     check_functoriality(system)
 
 
+@settings(patient, max_examples=8)
+@given(st.lists(st.floats(0.1, 1.0), min_size=1, max_size=3), st.integers(-60, 60))
+def test_the_size_of_a_row_means_nothing(entries, power):
+    """Also one of rounding alone, 0.1 + 0.2 − 0.3: its relation is Lagrangian, and the same at any size."""
+    n = len(entries)
+    ports = {f"p{i}": quantity.momentum for i in range(n)}
+    pattern = Pattern(
+        junctions={name: junction(each, exposed=True) for name, each in ports.items()},
+        boxes={"row": {name: name for name in ports}},
+    )
+    found = []
+    for size in (1.0, 2.0**power):
+        skew = np.zeros((n, n))
+        row = structures.constant_structure("row", library.power_ports(**ports), skew, size * np.array([entries]))
+        system = System(pattern, {Path.of("row"): row})
+        probe = random_probe(system, 0)
+        for route in ("flat", "nested"):
+            found.append(system.relation(probe.reference, route=route).at(probe.state, probe.ports))
+        assert all(law(probe).holds for law in SYSTEM_LAWS)
+    assert {relation.dimension for relation in found} == {n + 1}
+    assert max(found[0].distance(other) for other in found[1:]) <= 1e-13
+
+
 @patient
 @given(systems(isolated=True), seeds)
 def test_isolated_systems_are_told_apart_by_their_rates(system, seed):

@@ -4,18 +4,19 @@ What a joint holds are the wrenches W that do no work on its degrees of freedom,
 one set of axes, a wrench on body 2 and its reaction on body 1 make a row (−w, w).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
+from ephs.mechanics.scene.attached import Gear
 from ephs.mechanics.scene.kinematics import Link, elements
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
-from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
+from ephs.semantics.spaces.rank import CONSTRAINT, TINY, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 
@@ -50,12 +51,37 @@ class Hold:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
+class GearHold:
+    """Constraint of a rigid gear.
+
+    Attributes
+    ----------
+    name
+        How to call it.
+    body1, body2
+        Two bodies of its joints, by index.
+    rows
+        (1, 6 n) on the spatial twists of all bodies, of length one.
+    rates
+        By joint, (6 n,) its rate on these twists.
+    """
+
+    name: str
+    body1: int
+    body2: int
+    rows: Array
+    rates: Mapping[str, Array]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
 class Mechanism:
     """A mechanism with the centre (3,) and the length in m by which it is measured."""
 
     now: Snapshot
     centre: Array
     length: float
+    joined: tuple[tuple[str, Gear], ...] = ()
 
     @staticmethod
     def of(scene: Scene) -> "Mechanism":
@@ -65,7 +91,8 @@ class Mechanism:
         points = np.array([*ends, *now.poses[:, 4:]]).reshape(-1, 3)
         centre = points.mean(axis=0) if len(points) else np.zeros(3)
         length = float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
-        return Mechanism(now, centre, length or 1.0)
+        gears = [(name, each) for _, name, each in scene.all_attachments() if isinstance(each, Gear)]
+        return Mechanism(now, centre, length or 1.0, tuple((n, g) for n, g in gears if not g.stiffness))
 
     def holds(self, poses: Array, *, motions: bool = True) -> list[Hold]:
         """Constraints of all joints in a configuration, then of the prescribed motions."""
@@ -74,6 +101,28 @@ class Mechanism:
         if motions:
             out += [self._hold(link, poses, x, moved=True) for link, x in pairs if link.motion is not None]
         return [hold for hold in out if hold.wrenches.shape[1]]
+
+    def gears(self, poses: Array) -> list[GearHold]:
+        """Constraints of the rigid gears in a configuration."""
+        links = {link.name: (link, x) for link, x in zip(self.now.links, elements(self.now.links, poses), strict=True)}
+        out: list[GearHold] = []
+        for name, gear in self.joined:
+            chosen = [links[joint] for joint in gear.joints]
+            rates = {
+                link.name: self._hold(link, poses, x, moved=True).rows[0] / self._unit(link, x) for link, x in chosen
+            }
+            row = -rates[gear.joints[0]]
+            for joint, ratio in zip(gear.joints[1:], gear.ratio, strict=True):
+                row = row + ratio * rates[joint]
+            row = row / max(float(np.linalg.norm(row)), TINY)
+            out.append(GearHold(name, chosen[0][0].body2, chosen[1][0].body2, row[None], rates))
+        return out
+
+    def _unit(self, link: Link, x: Array) -> float:
+        """Length of the twist of a single degree of freedom at the rate one."""
+        basis = link.coupling.basis(x).copy()
+        basis[3:] /= self.length
+        return float(np.linalg.norm(basis))
 
     def moved(self, step: Array) -> Array:
         """The poses (n, 7) after spatial twists (n, 6) about the centre, lengths divided by the mechanism's."""
@@ -116,7 +165,7 @@ class Mechanism:
         return np.vstack([rotation @ wrenches[:3] + np.cross(at, force.T).T, force])
 
 
-def redundant(holds: Sequence[Hold], tolerance: float = CONSTRAINT) -> list[Array]:
+def redundant(holds: Sequence[Hold | GearHold], tolerance: float = CONSTRAINT) -> list[Array]:
     """Of each hold, coefficients (k, r) of the combinations that lie in the span of the holds before."""
     span = np.zeros((holds[0].rows.shape[1] if holds else 0, 0))
     out: list[Array] = []

@@ -10,12 +10,13 @@ frame between them. A prescribed motion is a constraint of its own, after all jo
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import final
+from typing import TypeVar, final
 
 import numpy as np
 
 from ephs.mechanics.constraints.directions import Axes, Direction, Place, describe, enumerated, name_directions
-from ephs.mechanics.constraints.holding import Hold, Mechanism, redundant
+from ephs.mechanics.constraints.holding import GearHold, Hold, Mechanism, redundant
+from ephs.mechanics.constraints.plausible import unmoved
 from ephs.mechanics.scene.adjust import close_loops
 from ephs.mechanics.scene.kinematics import Scale
 from ephs.mechanics.scene.model import Scene
@@ -24,6 +25,7 @@ from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
 
 AWAY, TRIALS, NEAR = 0.02, 3, 0.2
 """Distance and number of neighbouring configurations compared, and the turn of a direction allowed up to there."""
+T = TypeVar("T", "Hold", "Hold | GearHold")
 SHOWN = 3
 """Limit on the clauses of a text; further ones are counted."""
 
@@ -38,7 +40,7 @@ class Dependence:
     joint
         The (dotted) joint, or "the motion of" one, where a prescribed motion follows from others.
     directions
-        A basis of the constraint directions that say nothing new after the joints before.
+        A basis of the constraint directions that say nothing new after the joints before; none of a gear.
     on
         Joints before that hold these directions already; none of them can be left out.
     here
@@ -57,8 +59,15 @@ class Dependence:
         return f"{self.joint} repeats {self.what}"
 
     @property
+    def count(self) -> int:
+        """Number of equations that depend on others."""
+        return len(self.directions) or 1
+
+    @property
     def what(self) -> str:
         """Redundant joints and their directions, in words."""
+        if not self.directions:
+            return enumerated(self.on)
         lasting = [d for d in self.directions if d not in self.passing]
         if self.here == len(self.directions):
             return f"{enumerated(self.on)} in this configuration: {describe(self.directions)}"
@@ -69,16 +78,17 @@ class Dependence:
 
 
 def dependences(scene: Scene) -> tuple[Dependence, ...]:
-    """Redundancies in the scene's state, joint by joint in the scene's order.
+    """Redundancies in the scene's state, joint by joint in the scene's order, then gear by gear.
 
     The numbers of directions add up to the number of constraint equations that depend on others.
     """
     of = Mechanism.of(scene)
-    holds = of.holds(of.now.poses)
-    found = redundant(holds)
-    near = _nearby(of, holds, found)
+    holds, gears = of.holds(of.now.poses), of.gears(of.now.poses)
+    every = [*holds, *gears]
+    found = redundant(every)
+    near = _nearby(of, holds, found[: len(holds)])
     out: list[Dependence] = []
-    for i, (hold, space) in enumerate(zip(holds, found, strict=True)):
+    for i, (hold, space) in enumerate(zip(holds, found, strict=False)):
         if not space.shape[1]:
             continue
         on = _needed(holds[:i], hold.rows.T @ space, _loop_lengths(holds[:i], hold))
@@ -87,21 +97,25 @@ def dependences(scene: Scene) -> tuple[Dependence, ...]:
         here = max(space.shape[1] - near[i].shape[1], 0) if near else 0
         names = tuple(each.name for each in on)
         out.append(Dependence(hold.name, directions, names, here, passing if len(passing) == here else ()))
+    for i, gear in enumerate(gears, start=len(holds)):
+        if found[i].shape[1]:
+            on = _needed(every[:i], gear.rows.T, _loop_lengths(every[:i], gear))
+            out.append(Dependence(gear.name, (), tuple(each.name for each in on)))
     return tuple(out)
 
 
 def explain(scene: Scene) -> str:
-    """The scene's dependences in a sentence, as advice for a run that failed; "" where there are none."""
-    return in_words(dependences(scene))
+    """The scene's dependences and undetermined bodies, as advice for a run that failed; "" where there are none."""
+    return "; ".join(filter(None, [in_words(dependences(scene)), *unmoved(scene)]))
 
 
 def in_words(found: Sequence[Dependence]) -> str:
     """Dependences in a sentence, grouped by equal causes; "" where there are none."""
     if not found:
         return ""
-    count = sum(len(each.directions) for each in found)
+    count = sum(each.count for each in found)
     several = f"{count} constraint equations depend" if count > 1 else "1 constraint equation depends"
-    named = {each.directions[0].axes.name for each in found}
+    named = {each.directions[0].axes.name for each in found if each.directions}
     axes = "" if "" not in named else " (in world axes)" if named == {""} else " (in world axes unless named)"
     clauses: list[str] = []
     for what, members in groupby(found, key=lambda each: each.what):
@@ -151,7 +165,7 @@ def wrenches_in_words(found: Mapping[str, Array]) -> str:
     return f"{_listed(clauses)} (joint axes){others}"
 
 
-def _needed(before: Sequence[Hold], target: Array, lengths: Sequence[float]) -> list[Hold]:
+def _needed(before: "Sequence[T]", target: Array, lengths: Sequence[float]) -> "list[T]":
     """Earlier holds whose span contains the columns of the target, reduced greedily, in their order.
 
     The shortest loops are tried first, as more holds than a loop are seldom needed.
@@ -173,7 +187,7 @@ def _needed(before: Sequence[Hold], target: Array, lengths: Sequence[float]) -> 
     return [before[i] for i in sorted(kept)]
 
 
-def _shares(holds: Sequence[Hold], target: Array) -> list[float] | None:
+def _shares(holds: Sequence[Hold | GearHold], target: Array) -> list[float] | None:
     """Coefficients of the target in the holds; None where it is not in their span."""
     matrix = np.vstack([hold.rows for hold in holds]).T
     weights = np.asarray(np.linalg.lstsq(matrix, target, rcond=CONSTRAINT)[0])
@@ -183,12 +197,12 @@ def _shares(holds: Sequence[Hold], target: Array) -> list[float] | None:
     return [float(np.abs(part).max(initial=0.0)) for part in np.split(weights, cuts)]
 
 
-def _loop_lengths(before: Sequence[Hold], hold: Hold) -> list[float]:
+def _loop_lengths(before: Sequence[Hold | GearHold], hold: Hold | GearHold) -> list[float]:
     """Of each hold before, the length of the shortest way through it from one body of a hold to the other."""
     from_1, from_2 = (_distances(before, start) for start in (hold.body1, hold.body2))
     far = np.inf
 
-    def way(h: Hold) -> float:
+    def way(h: Hold | GearHold) -> float:
         return min(
             from_1.get(h.body1, far) + from_2.get(h.body2, far), from_1.get(h.body2, far) + from_2.get(h.body1, far)
         )
@@ -196,7 +210,7 @@ def _loop_lengths(before: Sequence[Hold], hold: Hold) -> list[float]:
     return [way(h) for h in before]
 
 
-def _distances(holds: Sequence[Hold], start: int) -> dict[int, float]:
+def _distances(holds: Sequence[Hold | GearHold], start: int) -> dict[int, float]:
     """Number of joints between a body and each body reachable from it."""
     beside: dict[int, list[int]] = {}
     for hold in holds:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ephs.mechanics.constraints.plausible import doubts
 from ephs.mechanics.constraints.redundancy import dependences, in_words, indeterminate, wrenches_in_words
 from ephs.mechanics.runs.running import by_constant_steps
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
@@ -16,7 +17,7 @@ from ephs.operad import ROOT, Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.laws import Probe, system_law
-from ephs.semantics.report import CheckItem, CheckReport, check_assembly, check_structure, check_types
+from ephs.semantics.report import DOUBTS, CheckItem, CheckReport, check_assembly, check_structure, check_types
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.system import System
 from ephs.solve.auditing.audit import LAWFUL
@@ -67,6 +68,8 @@ def _items(model: System | Scene, initial: Mapping[str, "ArrayLike"] | None) -> 
     yield check_assembly(d, problem.inputs(0.0, problem.initial))
     if problem.scene is not None and problem.scene.adjusted is not None:
         yield CheckItem("adjusted", True, str(problem.scene.adjusted).removeprefix("adjusted: "))
+    if problem.scene is not None and (doubted := doubts(problem.scene)):
+        yield CheckItem(DOUBTS, True, "; ".join(doubted))
     probe = Probe(system, problem.initial, reference=problem.reference)
     yield _law("Tellegen", probe)
     if not _is_large(problem):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.operad import Interface, Path, Pattern
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.linear.sums import unit_rows
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.relations.base import BasePoint
 from ephs.semantics.subspace import Subspace
@@ -79,13 +80,16 @@ def power_ports(interface: Interface) -> Coordinates:
 
 
 def linear_parts(primitive: Primitive, x: Point, e: Array | None, reference: Reference) -> tuple[Array, Array, Array]:
-    """(A, C, g): f = A e + Cᵀ λ, 0 = C e for a process; e = g for a storage (A, C empty). M is taken at e."""
+    """(A, C, g): f = A e + Cᵀ λ, 0 = C e for a process; e = g for a storage (A, C empty). M is taken at e.
+
+    Rows of C are of length one, or zero.
+    """
     n = primitive.bundle.size
     if isinstance(primitive, Storage):
         return np.zeros((n, n)), np.zeros((0, n)), primitive.effort(x, reference)
     if isinstance(primitive, Reversible):
         skew, constraint = primitive.structure(x)
-        return skew, constraint, np.zeros(n)
+        return skew, unit_rows(constraint), np.zeros(n)
     at = np.zeros(n) if e is None else e
     primitive.require_temperature(at, reference)
     return primitive.matrix(x, at, reference) / reference.temperature, np.zeros((0, n)), np.zeros(n)

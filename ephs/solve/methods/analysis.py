@@ -16,10 +16,12 @@ from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING, Order, OrderOf
-from ephs.solve.model import Model, evaluate_at, without_cancelled
+from ephs.solve.model import Model, cancelled, evaluate_at
 from ephs.solve.sparse import Index, order
 
-SHRUNK = 1e-6
+SHRUNK = 1e-3
+"""Part of its first size to which a pivot may shrink: pivots fall with the part that omitted equations have in their
+dependence, and rounding of the others, over this part, opens omitted joints."""
 DEFECT = 1e-11
 """Tolerance for a dropped equation, relative to its terms; more asks for another rank decision."""
 OTHERWISE = 1e-3
@@ -31,6 +33,20 @@ OWN = 1e-3
 """Part of a row above which an effort that is in no other row makes it independent of the others."""
 ALIKE = 1e-6
 """Relative tolerance for equal components of null vectors."""
+AS_BEFORE, AT_START, WITHIN = 0, 1, 2
+"""Origin of a step's order of elimination: a step before it, at its start, by its unknowns."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Decided:
+    """Origin of an order of elimination: states, unknowns, the step in s, the equations left out before."""
+
+    x: Array
+    z: Array
+    h: float
+    before: Index | None
+    tried: int
 
 
 @final
@@ -52,10 +68,30 @@ class Analysis:
     fill: int
 
 
-def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = None) -> Analysis:
+def entries_at(model: Model, x: Array, z: Array, h: float, tried: int = AT_START) -> tuple[Array, Array]:
+    """Entries of the matrix, and those by which the rank of constraints is decided.
+
+    Where loops are closed, at the start of a step, equations follow from others that do not in a step that is not
+    solved yet: they miss by its third power there, and rank would depend on it. Some follow within the step only, such
+    as in alignment.
+    """
+
+    def found(h: float) -> Array:
+        status, component, memory = evaluate_at(model, x, z, h)
+        if status:
+            raise SolveError.of_component(status, model, component)
+        return memory.data
+
+    values = found(h)
+    if tried != AT_START:
+        return values, values
+    return values, np.where(np.isin(model.tables.row, model.constraint_rows), found(0.0), values)
+
+
+def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = None, tried: int = AT_START) -> Analysis:
     """Decide rank and order at a state and unknowns.
 
-    The pivots that it finds set the order's floor: a pivot that has shrunk to a millionth asks for another order.
+    The pivots that it finds set the order's floor: a pivot that has shrunk much asks for another order.
     ``before`` are the equations that were left out so far.
 
     Raises
@@ -65,11 +101,8 @@ def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = N
     """
     t = model.tables
     size = model.unknowns
-    status, component, memory = evaluate_at(model, x, z, h)
-    if status:
-        raise SolveError.of_component(status, model, component)
-    values = memory.data
-    dropped = dependent_rows(model, x, values, before)
+    values, ranked = entries_at(model, x, z, h, tried)
+    dropped = dependent_rows(model, x, ranked, before)
     diagonal = np.arange(size) + t.row.size - size
     active = np.ones(t.row.size, dtype=bool)
     active[diagonal] = dropped == 1
@@ -129,7 +162,8 @@ def dependent_rows(
     rows = model.constraint_rows
     if not rows.size:
         return out
-    values = without_cancelled(model, x, values)
+    values = values.copy()
+    values[cancelled(model, x)[0]] = 0.0
     of = np.full(size, -1)
     of[rows] = np.arange(rows.size)
     constrained = of[t.row] >= 0

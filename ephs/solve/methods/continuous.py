@@ -16,7 +16,7 @@ from ephs.semantics.bundle import Array
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING
 from ephs.solve.methods.stored import guessed_efforts
-from ephs.solve.model import Evaluation, Model, without_cancelled
+from ephs.solve.model import Evaluation, Model, cancelled
 
 
 @final
@@ -116,7 +116,10 @@ class Continuous:
         rest[: t.counts[0]] = 0.0
         self._evaluate(x, rest, 1.0, inputs)
         states = 2.0 * (self._memory.data - unknowns)
-        return Matrices(whole(without_cancelled(self.model, x, unknowns)), whole(states))
+        entries, empty = cancelled(self.model, x)
+        unknowns[entries] = states[entries] = 0.0
+        unknowns[t.row.size - n + empty] = 1.0  # no equation: the multiplier stays
+        return Matrices(whole(unknowns), whole(states))
 
     def instant(self, x: Array, z: Array, inputs: Array) -> Instant:
         """Powers and energies at (x, z)."""

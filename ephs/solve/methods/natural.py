@@ -12,7 +12,7 @@ import numpy as np
 from ephs.semantics.bundle import Array
 from ephs.semantics.kernel_table import RAISED
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.methods.analysis import Analysis, analyse
+from ephs.solve.methods.analysis import AS_BEFORE, AT_START, WITHIN, Analysis, Decided, analyse
 from ephs.solve.methods.blame import Blame
 from ephs.solve.methods.newton import BEFORE, natural_program
 from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, Order, parts_of
@@ -48,17 +48,6 @@ class NaturalState:
     z: Array
     previous: Array
     sums: Array
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Decided:
-    """Origin of an order of elimination: states, unknowns, the step in s, the equations left out before."""
-
-    x: Array
-    z: Array
-    h: float
-    before: Index | None
 
 
 @final
@@ -211,16 +200,16 @@ class Natural:
         energies, ledgers = np.empty((steps, model.tables.kind.size)), np.empty((steps, 5))
         done = iterations = 0
         failure: SolveError | None = None
-        fresh = False
+        tried = AS_BEFORE
         while done < steps and failure is None:
             try:
-                analysis = self._order(x, z, h)
+                analysis = self._order(x, z, h, max(tried, AT_START))
             except SolveError as error:
                 failure = error
                 break
             order = analysis.order
             wanted = steps - done
-            if fresh:  # no better pivots exist: take this one step with the present ones
+            if tried:  # no better pivots exist: take this one step with the present ones
                 order, wanted = replace(order, floor=np.zeros_like(order.floor)), 1
             elif self._unsettled:
                 wanted = min(wanted, self._unsettled)
@@ -230,17 +219,17 @@ class Natural:
                 out[done : done + taken] = found[:taken]
             done, iterations = done + taken, iterations + spent
             if status == DONE:
-                fresh = False
+                tried = AS_BEFORE
                 self._settle(taken)
-            elif status >= COMPONENT and (fresh or not has_choice(order.dropped, status)):
+            elif status >= COMPONENT and (tried == WITHIN or not has_choice(order.dropped, status)):
                 failure = SolveError.of_component(status, model, component)
-            elif fresh:
+            elif tried == WITHIN:
                 blame = Blame(model, order.dropped)
                 failure = blame.contradicted(x, z, h) if status == INCONSISTENT else of_status(status)
                 if status == DIVERGED:
                     failure = blame.diverged(self._memory.residual, self._memory.scale)
             else:
-                self.analysis, fresh, self._unsettled = None, True, SETTLING
+                self.analysis, tried, self._unsettled = None, tried + 1, SETTLING
         after = NaturalState(x, z, previous, sums)
         return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
 
@@ -263,7 +252,7 @@ class Natural:
         self.analysis, found = None, snapshot["decided"]
         if found is not None:
             self._dropped = found["before"]
-            self._order(found["x"], found["z"], found["h"])
+            self._order(found["x"], found["z"], found["h"], found["tried"])
         self._dropped, self._unsettled = snapshot["dropped"], snapshot["unsettled"]
         self.changes = snapshot["changes"]
 
@@ -276,10 +265,10 @@ class Natural:
         d = self.model.descriptor
         return [d.advance(x, 0.5 * h * state.z[: d.rate_size])]
 
-    def _order(self, x: Array, z: Array, h: float) -> Analysis:
+    def _order(self, x: Array, z: Array, h: float, tried: int = AT_START) -> Analysis:
         if self.analysis is None:
-            self._decided = Decided(x.copy(), z.copy(), float(h), self._dropped)
-            self.analysis = analyse(self.model, x, z, h, self._dropped)
+            self._decided = Decided(x.copy(), z.copy(), float(h), self._dropped, tried)
+            self.analysis = analyse(self.model, x, z, h, self._dropped, tried)
             self._dropped = self.analysis.dropped
             self.changes += 1
             self._memory = replace(self._memory, factors=np.zeros(self.analysis.fill))

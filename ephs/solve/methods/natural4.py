@@ -19,13 +19,22 @@ from ephs.semantics.pullback import pulled_ports
 from ephs.semantics.spaces.codes import SE3
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.methods.analysis import DEFECT, SHRUNK, analyse, dependent_rows
+from ephs.solve.methods.analysis import (
+    AS_BEFORE,
+    AT_START,
+    DEFECT,
+    SHRUNK,
+    WITHIN,
+    Decided,
+    analyse,
+    dependent_rows,
+    entries_at,
+)
 from ephs.solve.methods.blame import Blame
 from ephs.solve.methods.collocation import moments
 from ephs.solve.methods.gauss import gauss_program
 from ephs.solve.methods.natural import (
     Chunk,
-    Decided,
     Loop,
     NaturalState,
     has_choice,
@@ -54,14 +63,12 @@ from ephs.solve.methods.scheme import (
     StagesOf,
 )
 from ephs.solve.methods.stored import Stored
-from ephs.solve.model import Model, evaluate_at
+from ephs.solve.model import Model
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index, order
 
 INSTANT = 1e-7
 """The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
-AS_BEFORE, AT_START, WITHIN = 0, 1, 2
-"""Origin of a step's order of elimination: a step before it, at its start, by its unknowns."""
 
 
 @final
@@ -104,7 +111,7 @@ class Natural4:
         self._bound: Loop | None = None
         self._dropped: Index | None = None
         self._decided: Decided | None = None
-        self._inputs, self._tried = np.zeros(0), AS_BEFORE
+        self._inputs = np.zeros(0)
         self._stored = Stored(model)
 
     def init(self, x: Array) -> NaturalState:
@@ -183,7 +190,6 @@ class Natural4:
         return {
             "decided": parts(self._decided) if self._order is not None else None,
             "inputs": self._inputs,
-            "tried": self._tried,
             "dropped": self._dropped,
             "changes": self.changes,
         }
@@ -193,7 +199,7 @@ class Natural4:
         self._order, found = None, snapshot["decided"]
         if found is not None:
             self._dropped = found["before"]
-            self._decide(found["x"], found["z"], found["h"], snapshot["inputs"], snapshot["tried"])
+            self._decide(found["x"], found["z"], found["h"], snapshot["inputs"], found["tried"])
         self._dropped, self.changes = snapshot["dropped"], snapshot["changes"]
 
     def _loop(self, o: Order, steps: int) -> Loop:
@@ -214,24 +220,11 @@ class Natural4:
         return self._bound
 
     def _decide(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> None:
-        """Rank of the constraints, and an order of elimination for all stages, at these values.
-
-        Where loops are closed, at the start, equations follow from others that do not in a step that is not solved yet;
-        but some follow there only, such as in alignment.
-        """
+        """Rank of the constraints, and an order of elimination for all stages, at these values."""
         model, t, n = self.model, self.model.tables, self.model.unknowns
-        self._decided, self._inputs = Decided(x.copy(), z.copy(), float(h), self._dropped), inputs.copy()
-        self._tried = tried
-        status, component, memory = evaluate_at(model, x, z[0], h)
-        if status:
-            raise SolveError.of_component(status, model, component)
-        values = memory.data
-        if tried == AT_START:
-            status, component, memory = evaluate_at(model, x, z[0], 0.0)
-            if status:
-                raise SolveError.of_component(status, model, component)
-            values = np.where(np.isin(t.row, model.constraint_rows), memory.data, values)
-        dropped = self._dropped = dependent_rows(model, x, values, self._dropped, self._closing)
+        self._decided, self._inputs = Decided(x.copy(), z.copy(), float(h), self._dropped, tried), inputs.copy()
+        _, ranked = entries_at(model, x, z[0], h, tried)
+        dropped = self._dropped = dependent_rows(model, x, ranked, self._dropped, self._closing)
         s = self._scratch
         fault = gauss_program().compiled()["linearise"](
             parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), model.scal(INSTANT),
