@@ -19,6 +19,7 @@ from ephs.cli.input import Loading, Stepping
 from ephs.cli.linear import linearize
 from ephs.cli.run import run
 from ephs.cli.sweep import sweep
+from ephs.semantics.report import CheckItem
 from ephs.solve.auditing.findings import Audit, Finding
 from examples.failures import CASES, Case
 
@@ -110,6 +111,7 @@ def house(monkeypatch, tmp_path):
     for name, value in names.items():
         monkeypatch.setattr(ephs, name, value, raising=False)
     monkeypatch.setattr("ephs.mechanics.scene.document.scene_to_text", repr)
+    monkeypatch.setattr("ephs.mechanics.constraints.plausible.doubts", lambda scene: ())
     monkeypatch.setitem(sys.modules, "ephs.show", SimpleNamespace(draw=draw))
     monkeypatch.setitem(sys.modules, "ephs.show.report", SimpleNamespace(write_report=write_report))
     monkeypatch.chdir(tmp_path)
@@ -263,7 +265,7 @@ def test_a_missing_extra_keeps_the_data(house, capsys, monkeypatch):
 
 @pytest.mark.parametrize(("ok", "code"), [(True, 0), (False, 1)])
 def test_check_prints_each_law_and_exits_by_the_verdict(house, capsys, monkeypatch, ok, code):
-    items = [("power balance", True, "defect 1e-16"), ("energy [mf]", ok, "found 0.1")]
+    items = [CheckItem("power balance", True, "defect 1e-16"), CheckItem("energy [mf]", ok, "found 0.1")]
     module = SimpleNamespace(check_model=lambda model, initial: SimpleNamespace(items=items, ok=ok))
     monkeypatch.setitem(sys.modules, "ephs.mechanics.runs.check", module)
     assert cli.main(["check", "crank.toml"]) == code

@@ -93,3 +93,28 @@ def test_a_loop_that_is_held_at_rest_takes_few_iterations(method):
     sol = ephs.simulate(scene, 0.3, method=method, **({"step": 1e-2} if method == "natural" else {}))
     assert sol.audit.passed and sol.joint("bearing").coordinate[-1, 0] == 0.0
     assert sol.stats["iterations"] <= 12 * sol.stats["steps"]
+
+
+HELD = """
+format = 1
+[bodies.rod]
+mass = {mass}
+inertia = [0.001, 0.2, 0.2]
+position = [0.5, 0.0, 0.0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "rod"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+motion = {{ times = [0.0, 1.0], displacements = [{held}, {held}] }}
+"""
+
+
+@pytest.mark.parametrize("method", ["rk87", "rk54", "auto", "radau"])
+def test_the_work_of_what_holds_a_joint_is_rounding_and_no_finding(method, tmp_path):
+    file = tmp_path / "held.toml"
+    for held, mass in ((0.2, 2.0), (0.2, 2e4), (1.3, 2.0)):
+        file.write_text(HELD.format(held=held, mass=mass), encoding="utf-8")
+        sol = ephs.simulate(ephs.load(file), 0.5, method=method)
+        assert sol.audit.passed, sol.audit
+        assert np.abs(sol.work).max() <= 100.0 * np.finfo(float).eps * mass * 9.81

@@ -242,7 +242,8 @@ def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iter
     if "work_apart" in solution.stats:
         instant = int(np.argmin(np.abs(solution.t - solution.stats["work_apart_at"])))
         size, hint = float(solution.stats["work_apart"]) / ledgers.scale, ": near a dead centre of what is prescribed"
-        yield Breach(size, lambda: COARSE - min(COARSE, bounds.ledger), instant, hint=hint)
+        slack = COARSE - min(COARSE, bounds.ledger)
+        yield Breach(size, lambda: slack + rounded(solution) / ledgers.scale, instant, hint=hint)
     for kind, held, made in (("entropy", ledgers.entropies, ledgers.made), ("volume", ledgers.volumes, None)):
         scale, rounding = exchanged(solution, kind)
         if not scale or not _isolated(solution, kind):
