@@ -16,12 +16,12 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test laws real learning lint types docs bench tables fuzz fuzz-inputs mutate mutants repeat dist matrix smoke clean
+.PHONY: help demo test laws real peers learning lint types docs bench tables fuzz fuzz-inputs mutate mutants repeat dist matrix smoke clean
 
 help:
 	@echo 'make demo   simulate scenes/$(SCENE).toml and write out/$(SCENE)/report.html'
 	@echo 'make test   run the short tests; make laws: the long ones; make lint, make types: style and types; make fuzz: the laws, for long; make fuzz-inputs COUNT=N: so many broken files; make mutate: which breaks of the code no test sees (docs/mutation.md); make mutants: the same for the operad, by mutmut'
-	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio; make learning: derivatives of runs in PyTorch and JAX, which it installs'
+	@echo 'make real   fetch real robots (131 MB) and hold their import against Pinocchio; make peers OF="FOLDER ...": the same for all models of installed packages or of folders; make learning: derivatives of runs in PyTorch and JAX, which it installs'
 	@echo 'make dist   wheel and sdist, tested as installed; make matrix: the tests under other Pythons and dependencies; make smoke: the wheel under other Pythons, where there are any; make repeat: the same digits with nothing compiled yet'
 	@echo 'make docs   build docs/_build/html; make bench: what got slower than benchmarks/baseline.json; make tables: all benchmarks; make clean: remove what was built'
 
@@ -47,6 +47,9 @@ laws: $(VENV)/.installed-dev
 
 real: $(VENV)/.installed-real
 	$(PYTEST) -n $(CORES) tests_real
+
+peers: $(VENV)/.installed-real
+	$(BIN)/python -m tests_real.peers $(OF)
 
 learning: $(VENV)/.installed-dev $(VENV)/.installed-learning
 	$(PYTEST) -n 0 tests_learning

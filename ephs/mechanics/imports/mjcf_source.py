@@ -243,6 +243,9 @@ class Source:
                 self._files[known] = file.relative_to(self._draft.folder.resolve()).as_posix()
         for parent, child in [pair for pair in _geoms(root) if pair[1].get("mesh") in lost]:
             self._remove_geom(parent, child)
+            if parent.tag != "worldbody" and parent.find("inertial") is None and child.get("mass") != "0":
+                called = child.get("name") or parent.get("name") or child.get("mesh", "")
+                self._draft.leave("masses of shapes whose meshes are not read", called)
         for section in root.findall("contact"):
             for pair in section.findall("pair"):
                 ends = [pair.get(word) or "" for word in ("geom1", "geom2")]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.imports.read import read_model
 from ephs.mechanics.shapes.dry import Dry
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.imports.models import MODELS, URDF
@@ -191,3 +192,15 @@ def test_attached_models_move_as_in_mujoco(tmp_path):
     rates = dynamics.acceleration(state)
     found = np.concatenate([rates[name] for name in names])
     assert np.abs(found - data.qacc).max() < 1e-10 * np.abs(data.qacc).max()
+
+
+@pytest.mark.parametrize(
+    ("inertial", "told"), [("", True), ('<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>', False)]
+)
+def test_mass_that_is_lost_with_a_mesh_is_told(inertial, told, tmp_path):
+    text = f"""<mujoco><asset><mesh name="m" file="../far.stl"/></asset><worldbody><body name="b"><joint/>{inertial}
+    <geom size="0.1"/><geom name="bone" type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+    (tmp_path / "model.xml").write_text(text)
+    faults, left = [], []
+    assert read_model(tmp_path / "model.xml", "fixed", faults, left) is not None
+    assert any(line.endswith("masses of shapes whose meshes are not read: bone") for line in left) == told
