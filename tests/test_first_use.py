@@ -6,9 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import ephs
+from ephs import library as lib
+from ephs import quantity as Q
 from ephs.cli import commands as cli
 from ephs.cli.new import TEMPLATES
 from ephs.cli.next import EXAMPLES, commands
@@ -185,3 +188,46 @@ def test_what_is_said_first_loads_nothing_heavy(words):
 def test_a_name_that_is_no_model_is_answered_with_the_models_of_the_file(capsys):
     assert cli.main(["check", f"{ROOT / 'examples/oscillator.py'}:damped"]) == 2
     assert "damped is a Pattern" in (said := capsys.readouterr().err) and "free_oscillator, damped_oscillator" in said
+
+
+def oscillator():
+    return ephs.Pattern(
+        junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum, exposed=True)},
+        boxes={"spring": {"q": "q"}, "mass": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+    )
+
+
+def filled():
+    return oscillator()(spring=lib.spring(k=1.0), mass=lib.point_mass(m=1.0), pkc=lib.pkc())
+
+
+SLIPS = {
+    "a pattern is run": (
+        lambda: ephs.simulate(oscillator(), 1.0),
+        "found a pattern, expected a system .* fill its boxes",
+    ),
+    "a state as reference": (lambda: filled().check({"spring.q": 1.0}), "expected a Reference .* state="),
+    "a number as text": (lambda: lib.spring(k="1.5"), r"parameter k is '1\.5', expected a number > 0"),
+    "no number": (lambda: lib.friction(d=None), "parameter d is None, expected a number"),
+    "an input without return": (
+        lambda: ephs.simulate(filled(), 1.0, inputs={"p": {"flow": lambda t: None}}),
+        "it returns None, perhaps for want of a return",
+    ),
+    "a part of the library": (lambda: lib.sprnig, "did you mean 'spring'"),
+    "a quantity": (lambda: Q.displacment, "did you mean 'displacement'"),
+    "two ways at once": (lambda: lib.thermal_capacity(c1=1.0, capacity=2.0), "expected c1 and c2, or capacity and"),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_slips_are_told_by_what_was_meant(slip):
+    make, said = SLIPS[slip]
+    with pytest.raises((ephs.SemanticsError, ephs.SimulationError, AttributeError), match=said):
+        make()
+
+
+def test_a_capacity_begins_at_its_temperature():
+    """θ = c1/c2 exp(s/c2), 300 K at s = 0."""
+    one, two = lib.thermal_capacity(capacity=20.0, temperature=300.0), lib.thermal_capacity(c1=6000.0, c2=20.0)
+    assert one == two
+    assert one.energy_gradient({port: np.zeros(1) for port in one.reads})[0] == pytest.approx(300.0, rel=1e-15)

@@ -3,11 +3,12 @@
 from dataclasses import dataclass, replace
 from math import isfinite
 from types import MappingProxyType
-from typing import TypeAlias, final
+from typing import Any, TypeAlias, final
 
 from ephs.operad.charges import KINDS, PLAIN, POSITIVE, WHOLE, Charges, Domain, charges_of, require_domain
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
+from ephs.operad.messages import nearest_name
 from ephs.operad.units import dimension
 
 # Kind of pair: dimension of its subgroup of SE(3), numbers stored for an element, names of its parameters.
@@ -220,6 +221,10 @@ class Quantities:
     body_momentum: Quantity = Quantity("momentum", Space("se(3)*", 6, 6), -1)
     direct_pose: Quantity = Quantity("pose", Space("SO(3)xR3", 6, 7), 1)
     direct_momentum: Quantity = Quantity("momentum", Space("so(3)xR3*", 6, 6), -1)
+
+    def __getattr__(self, name: str) -> Any:
+        near = nearest_name(name, (word for word in dir(type(self)) if not word.startswith("_")))
+        raise AttributeError(f"there is no quantity {name!r}" + (f"; did you mean {near!r}?" if near else ""))
 
     def species(self, name: str, /, **elements: float) -> Quantity:
         """The amount of a substance in mol, with its composition: atoms, or other units, of each element.

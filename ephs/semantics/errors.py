@@ -78,6 +78,10 @@ _TEXTS = {
         "the elements of the species"
     ),
     "missing-input": ("{path}: the outer port is open: give inputs={{'{path}': {{'flow': …}}}} or {{'effort': …}}"),
+    "reference": (
+        "{path}: the reference is {found}, expected a Reference of the environment; states are given as state=…"
+    ),
+    "unfilled": "{path}: found a pattern, expected a system or a scene; fill its boxes by pattern(box=…)",
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
     "input": "{path}: the input is {found}, expected {expected}",
     "joined": "{path}: joined to {port}, found {found}, expected {expected}; only equal quantities share a state",

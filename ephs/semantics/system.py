@@ -5,7 +5,7 @@ A system carries its states: isolated composites have no ports, and equality of 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, final
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, final
 
 import numpy as np
 
@@ -222,6 +222,9 @@ class System:
             Where the laws are measured, missing values at the start; at random states where None.
         """
         from ephs.semantics.report import check_system
+
+        if isinstance(cast("object", reference), Mapping):
+            raise AssemblyError("reference", ROOT, found=str(reference))
 
         return check_system(self, reference, state=state)
 

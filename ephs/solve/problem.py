@@ -10,6 +10,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.descriptor import Descriptor, Input
+from ephs.semantics.errors import AssemblyError
 from ephs.semantics.system import System
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.motion_law import MotionLaw
@@ -98,6 +99,8 @@ class Signal:
             raise
         except Exception as error:
             raise SolveError(Outcome.INPUT, self.name, f"{type(error).__name__}: {error}", error) from error
+        if given is None:
+            raise SolveError(Outcome.INPUT, self.name, "it returns None, perhaps for want of a return")
         if self.size is not None and found.shape != (self.size,):
             raise SolveError(Outcome.INPUT, self.name, f"{found.size} numbers where {self.size} are wanted")
         if not np.isfinite(found).all():
@@ -122,6 +125,10 @@ class Outlined(Linked, Protocol):
 
     def outline(self) -> Any:
         """Bodies and joints as a scene, to be drawn."""
+        ...
+
+    def velocity_error(self) -> Array:
+        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
 
 
@@ -255,6 +262,18 @@ class Problem:
     length: float = 1.0
     names: Mapping[Path, str] = field(default_factory=dict)
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
+
+    def signal(self, port: Path) -> Signal:
+        """What is prescribed at an outer port.
+
+        Raises
+        ------
+        AssemblyError
+            Nothing is.
+        """
+        if port not in self.signals:
+            raise AssemblyError("missing-input", port)
+        return self.signals[port]
 
     def inputs(self, t: float, state: State) -> dict[Path, Input]:
         """The inputs of the descriptor form at a time."""

@@ -14,8 +14,30 @@ INSTANT = 1e-7
 """Step without motion, as a fraction of a step."""
 JUMP = 1e-6
 """Jumps below this fraction of the states of their kind count as rounding of the given values."""
+SEVERAL = 4.0
+"""Times the jump that a step leaves: as much as steps one after the other leave of it."""
 SMALL = 1e-6
 """Least scale of the states of a kind, in its unit."""
+
+
+def _jump(method: Natural, problem: Problem, x: Array, instant: float) -> tuple[Array, Array] | None:
+    """Largest change of each state (states,) in a step without motion, and the state halfway; None where it fails."""
+    d = problem.descriptor
+    after, chunk = method.advance(method.init(x), instant, 1)
+    if chunk.failure is not None:
+        return None
+    moved = instant * after.z[: d.rate_size]
+    sizes = np.array([np.abs(moved[slot.rates]).max(initial=0.0) for slot in d.states])
+    return sizes, d.advance(x, 0.5 * moved)
+
+
+def _left(method: Natural, problem: Problem, x: Array, h: float) -> Array:
+    """Jumps (states,) that a step h of the method itself leaves, from a state on the constraints: its momenta keep off
+    them by its error.
+    """
+    there, chunk = method.advance(method.init(x), h, 1)
+    found = None if chunk.failure is not None else _jump(method, problem, there.x, 0.5 * INSTANT * h)
+    return np.zeros(len(problem.descriptor.states)) if found is None else SEVERAL * found[0]
 
 
 def check_start(problem: Problem, model: Model, h: float) -> None:
@@ -32,21 +54,17 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
         return
     d = problem.descriptor
     x = d.pack(problem.initial)
-    jumps: list[Array] = []
     method = Natural(model)
-    for instant in (INSTANT * h, 0.5 * INSTANT * h):
-        after, chunk = method.advance(method.init(x), instant, 1)
-        if chunk.failure is not None:
-            return
-        moved = np.abs(instant * after.z[: d.rate_size])
-        jumps.append(np.array([moved[slot.rates].max(initial=0.0) for slot in d.states]))
+    jumps = [_jump(method, problem, x, instant) for instant in (INSTANT * h, 0.5 * INSTANT * h)]
+    if jumps[0] is None or jumps[1] is None:
+        return
     sizes: dict[str, float] = {}
     for slot in d.states:
         flat = manifold(slot.quantity.space).code == VECTOR
         size = float(np.abs(x[slot.point]).max(initial=0.0)) if flat else 1.0
         sizes[slot.quantity.kind] = max(sizes.get(slot.quantity.kind, 0.0), size)
     limits = np.array([JUMP * max(sizes[slot.quantity.kind], SMALL) for slot in d.states])
-    share = np.where(jumps[1] > 0.75 * jumps[0], jumps[1] / limits, 0.0)
-    if share.max(initial=0.0) > 1.0:
+    share = np.where(jumps[1][0] > 0.75 * jumps[0][0], jumps[1][0] / limits, 0.0)
+    if share.max(initial=0.0) > 1.0 and np.any(share > _left(method, problem, jumps[1][1], h) / limits):
         path = str(d.states[int(np.argmax(share))].path)
         raise SolveError(Outcome.INCONSISTENT, path, "the constraints do not hold at the start")

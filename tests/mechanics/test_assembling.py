@@ -7,9 +7,10 @@ import pytest
 
 import ephs
 from benchmarks.hard.four_bars import wired, wired_poses
+from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.runs.check import check_model
 from ephs.mechanics.runs.simulate import problem_of_system
-from ephs.mechanics.scene.build import initial_state
+from ephs.mechanics.scene.build import initial_state, scene_inputs
 from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3
 from ephs.solve.mobility import mobility
@@ -81,3 +82,24 @@ def test_the_system_of_a_scene_starts_as_the_scene_and_what_is_given_moves_the_r
     for path, value in initial_state(scene.with_state({name: angle})).items():
         if path[-1] in ("q", "q_r"):
             np.testing.assert_allclose(moved[path], value, atol=1e-14)
+
+
+@pytest.mark.parametrize("method", ["auto", "rk87", "natural"])
+def test_an_input_that_is_missing_is_named(method):
+    system = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml").system()
+    with pytest.raises(AssemblyError, match=r"^drives\.main: .* give inputs=\{'drives\.main'"):
+        ephs.simulate(system, 0.1, method=method)
+
+
+@pytest.mark.parametrize("name", ["four-bar", "chain", "universal"])
+def test_velocity_residuals_are_measured_as_of_scenes(name, monkeypatch):
+    scene = ephs.load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
+    inputs = {str(path): {"flow": one.value} for path, one in scene_inputs(scene).items()}
+    run = {"until": 0.02, "method": "rk54", "step": 2e-3, "audit": "off"}
+    sol = ephs.simulate(scene.system(), inputs=inputs, **run)
+    fastest = max(np.abs(sol.body(f"bodies.{body}").angular_velocity).max() for body in scene.bodies)
+    assert sol.velocity_error.max() <= 8 * 6 * 10 * np.finfo(float).eps * max(1.0, fastest)
+    rates = LinkMotion.rates
+    monkeypatch.setattr(LinkMotion, "rates", property(lambda self: {k: 1.5 * r for k, r in rates.fget(self).items()}))
+    off = max(np.abs(rate / 3.0).max() for rate in sol.problem.linked(sol).rates.values())
+    assert sol.problem.linked(sol).velocity_error().max() == pytest.approx(off, rel=1e-9)

@@ -18,6 +18,7 @@ from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.dynamics.stepping import Steps
 from ephs.mechanics.motion.views import BodyState
 from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.following import has_stretches
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.tangent import Linearised
@@ -95,7 +96,7 @@ class Dynamics:
         return {name: where for name, where in kept.items() if where.size or name not in self.cut}
 
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
-        """The initial state with other joint coordinates; see `Scene.with_state`; `closed` moves geared joints.
+        """The initial state with other joint coordinates; geared joints and stretches follow, see `Scene.with_state`.
 
         Of a tree all joints' may be given as arrays (n,). Of a system the nearest state whose loops are closed.
 
@@ -104,7 +105,7 @@ class Dynamics:
         SceneError
             A name is unknown, a value has the wrong length, or a loop does not close.
         """
-        made = None if adjust else self.placing.state(self.state0, coordinates, rates)
+        made = None if adjust or self._stretches else self.placing.state(self.state0, coordinates, rates)
         if made is not None:
             return made
         by_name = [self.layout.named("state", given) for given in (coordinates, rates)]
@@ -112,6 +113,11 @@ class Dynamics:
             return self.closed(self.placing.moved(self.state0, *by_name))
         scene = self.scene.with_state(*by_name, adjust=adjust)
         return self._of_states(problem_of_scene(scene).initial)
+
+    @property
+    def _stretches(self) -> bool:
+        """Whether stretches of belts and tendons of the scene follow its coordinates."""
+        return self.scene is not None and has_stretches(self.scene)
 
     def unpack(self, array: ArrayLike) -> State:
         """The state of an array in the layout of `State.array`; loops are not closed.

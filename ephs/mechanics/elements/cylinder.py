@@ -27,6 +27,7 @@ def hydraulic_cylinder(
     conductance: float,
     leak: float = 0.0,
     pressure: Sequence[float] = (0.0, 0.0),
+    travel: float = 0.0,
     heat: bool = False,
 ) -> System:
     """A cylinder with two chambers of oil, or a hydraulic motor; ports a, b of the supplies, and p_r of the joint.
@@ -42,7 +43,7 @@ def hydraulic_cylinder(
     area
         (2,) volume of each chamber by the coordinate, m³/m or m³/rad.
     volume
-        (2,) of each chamber at the start, m³.
+        (2,) of each chamber where q = 0, m³.
     bulk
         Its bulk modulus in Pa.
     conductance
@@ -51,6 +52,8 @@ def hydraulic_cylinder(
         Across the piston, likewise.
     pressure
         (2,) of the oil in each chamber at the start, above the environment's, Pa.
+    travel
+        Displacement q of the piston at the start, rad or m.
     heat
         What lines and the leak lose leaves through the port s, in place of the box env.
     """
@@ -73,11 +76,13 @@ def hydraulic_cylinder(
         for key, pair in {"area": area, "volume": volume}.items()
         for name, x in zip("ab", pair, strict=True)
     }
+    held = {
+        f"v_{name}": v * (1.0 + p / bulk) + a * x
+        for name, v, p, a, x in zip("ab", volume, pressure, area, (travel, -travel), strict=True)
+    }
     fillings: dict[str, Filling] = {
         "piston": gyrator({"q": place, "p_r": of}, [[0.0, -1.0], [1.0, 0.0]], name="pkc"),
-        "oil": oil(place, {**numbers, "bulk": bulk}).with_initial(
-            {f"v_{name}": v * (1.0 + p / bulk) for name, v, p in zip("ab", volume, pressure, strict=True)}
-        ),
+        "oil": oil(place, {**numbers, "bulk": bulk}).with_initial({**held, "q": travel}),
         "line_a": library.laminar_leak(c=conductance),
         "line_b": library.laminar_leak(c=conductance),
     }

@@ -32,6 +32,7 @@ def motor(
     gear: float = 1.0,
     inductance: float = 0.0,
     inertia: float = 0.0,
+    current: float = 0.0,
     heat: bool = False,
 ) -> System:
     """A direct-current motor; ports q, whose effort is the voltage and whose flow the current, and p_r of the joint.
@@ -50,6 +51,8 @@ def motor(
         Rate of the rotor by the joint's, in rad/rad or rad/m.
     inertia
         Of the rotor in kg m².
+    current
+        At the start, where there is an inductance, in A.
     heat
         The winding's heat leaves through the port s, in place of the box env.
     """
@@ -76,7 +79,7 @@ def motor(
         "gear": transformer({"p_r": of, "p": quantity.angular_momentum}, [[gear]], name="gear"),
     }
     for name, port, filling in (
-        ("coil", "b", library.inductor(l=inductance) if inductance else None),
+        ("coil", "b", library.inductor(l=inductance).with_initial({"b": inductance * current}) if inductance else None),
         ("rotor", "p", library.rotor(j=inertia) if inertia else None),
         ("env", "s", None if heat else library.environment()),
     ):

@@ -111,7 +111,7 @@ class GeneralMotion:
         problem, port = self._solution.problem, self._frames.wiring.outer.get(joint.rate)
         if problem is None or port is None or joint.pair.dim != 1:
             return None
-        signal = problem.signals[port]
+        signal = problem.signal(port)
         if not signal.effort or not (signal.constant or isinstance(signal.value, MotionLaw)):
             return None
         return np.array([float(signal.at(float(t), {})[0]) for t in self._solution.t])

@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from ephs.mechanics.motion.batch import compose
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion
 from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.reduced import motion_of
+from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import nearest_of
 
 if TYPE_CHECKING:
@@ -88,9 +91,35 @@ class LinkMotion:
         """(n, 6) of a joint."""
         return self._found.wrench(self._joints[name].path)
 
+    def velocity_error(self) -> Array:
+        """(n,) largest component of the velocity residual of any joint between bodies and the ground, m/s or rad/s."""
+        worst, twists, rates = np.zeros(len(self._solution)), self.twists, self.rates
+        names = {i: str(link.path) for i, link in enumerate(self._frames.links) if str(link.path) in self._links}
+        for name, joint in self._joints.items():
+            ends = joint.first, joint.second
+            if not {end.link for end in ends} <= {SOLID, *names}:
+                continue
+            of = Coupling(joint.pair)
+            rows = self._solution[joint.state.path].reshape(-1, joint.pair.dim)
+            inside = np.array([of.include(of.element(row)) for row in rows]).reshape(-1, 7)
+            frames = compose(np.broadcast_to(joint.first.offset, inside.shape), inside), joint.second.offset
+            residual = -rates[name] @ joint.pair.basis.T
+            for end, frame, sign in zip(ends, frames, (-1.0, 1.0), strict=True):
+                if end.link != SOLID:
+                    residual = residual + sign * _at_frame(twists[names[end.link]], frame)
+            worst = np.maximum(worst, np.abs(residual).max(axis=1))
+        return worst
+
     @cached_property
     def _found(self) -> ByPath:
         return motion_of(self._solution)
+
+
+def _at_frame(twist: Array, frame: Array) -> Array:
+    """Twists (n, 6) of a body, seen from frames (7,) or (n, 7) in it."""
+    turn = np.array([quaternion_to_matrix(q) for q in np.broadcast_to(frame, (len(twist), 7))[:, :4]])
+    moved = twist[:, 3:] + np.cross(twist[:, :3], np.broadcast_to(frame, (len(twist), 7))[:, 4:])
+    return np.hstack([np.einsum("nji,nj->ni", turn, part) for part in (twist[:, :3], moved)])
 
 
 def _drawn(name: str, joint: LinkJoint, ends: list[tuple[str | None, Array]], element: Array) -> Joint:

@@ -32,7 +32,7 @@ from ephs.mechanics.scene.meant import is_shaky
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units, seen_from
 from ephs.mechanics.scene.state import Snapshot
-from ephs.operad import Path
+from ephs.operad import Path, Pattern
 from ephs.operad.collector import paused_collector
 from ephs.semantics import extents
 from ephs.semantics.bundle import Reference
@@ -301,6 +301,8 @@ def problem_of_system(
 
     ``assemble``: bodies and joints whose poses are not given are put where the others want them.
     """
+    if isinstance(system, Pattern):
+        raise AssemblyError("unfilled", "model")
     descriptor = system.descriptor()
     signals: dict[Path, Signal] = {}
     for port, given in (inputs or {}).items():

@@ -52,6 +52,7 @@ class Motor(Attachment):
         float, Number(first=-1), "gear ratio: rate of the rotor per rate of the joint, rad/rad or rad/m"
     ] = 1.0
     inertia: Annotated[float, Number(energy=1, time=2, least=NON_NEGATIVE), "inertia of the rotor, kg m²"] = 0.0
+    current: Annotated[float, Number(), "current at the start, with an inductance; A"] = 0.0
     voltage: Annotated[float, Number(energy=1), 'voltage without an input "motors.NAME", V'] = 0.0
     heat: Annotated[str, Named("node"), "thermal node that takes up the heat of the winding"] = ENVIRONMENT
 
@@ -134,7 +135,20 @@ class Cylinder(Attachment):
         Number(energy=1, length=-3, count=2),
         'pressures of the supplies above world.pressure without an input "cylinders.NAME", Pa',
     ] = field(default_factory=lambda: frozen([0.0, 0.0]))
+    initial_pressure: Annotated[
+        Array | None,
+        Number(energy=1, length=-3, count=2),
+        "pressures of the oil at the start above world.pressure, Pa; default: pressure",
+    ] = None
+    travel: Annotated[
+        float, Number(first=1), "displacement of the piston at the start from where the chambers have volume, rad or m"
+    ] = 0.0
     heat: Annotated[str, Named("node"), "thermal node that takes up the heat of lines and leak"] = ENVIRONMENT
+
+    @property
+    def started(self) -> Array:
+        """(2,) pressures of the oil at the start, in Pa."""
+        return self.pressure if self.initial_pressure is None else self.initial_pressure
 
     @property
     def warms(self) -> bool:

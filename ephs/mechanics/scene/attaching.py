@@ -71,12 +71,12 @@ def system_of(of: Attachment, joints: Sequence[Quantity]) -> tuple[System, tuple
         case Motor():
             made = motor(
                 joints[0], constant=of.constant, resistance=of.resistance, gear=of.gear, inductance=of.inductance,
-                inertia=of.inertia, heat=heat,
+                inertia=of.inertia, current=of.current, heat=heat,
             )  # fmt: skip
         case Cylinder():
             made = hydraulic_cylinder(
                 joints[0], area=of.area.tolist(), volume=of.volume.tolist(), bulk=of.bulk, conductance=of.conductance,
-                leak=of.leak, heat=heat,
+                leak=of.leak, pressure=of.started.tolist(), travel=of.travel, heat=heat,
             )  # fmt: skip
         case GasSpring():
             made = gas_spring(
@@ -85,8 +85,9 @@ def system_of(of: Attachment, joints: Sequence[Quantity]) -> tuple[System, tuple
             )  # fmt: skip
         case Gear():
             made = gear(
-                joints, of.ratio.tolist(), stiffness=of.stiffness, damping=of.damping, friction=of.friction, heat=heat
-            )
+                joints, of.ratio.tolist(), stiffness=of.stiffness, damping=of.damping, stretch=of.stretch,
+                friction=of.friction, heat=heat,
+            )  # fmt: skip
             return made, tuple(f"p{k}" for k in range(len(joints)))
         case _:
             raise TypeError(of.name)
@@ -101,12 +102,12 @@ def starts_of(of: Attachment, joints: Sequence[Joint]) -> dict[str, Array]:
         case Motor():
             out["field.b"] = np.array([of.constant])
             if of.inductance:
-                out["coil.b"] = zero
+                out["coil.b"] = np.array([of.inductance * of.current])
             if of.inertia:
                 out["rotor.p"] = of.inertia * of.gear * joints[0].rate
         case Cylinder():
-            held = of.volume * (1.0 + of.pressure / of.bulk)
-            out |= {"oil.v_a": held[:1], "oil.v_b": held[1:], "oil.q": zero}
+            held = of.volume * (1.0 + of.started / of.bulk) + of.area * [of.travel, -of.travel]
+            out |= {"oil.v_a": held[:1], "oil.v_b": held[1:], "oil.q": np.array([of.travel])}
         case GasSpring():
             out |= {"gas.s": zero, "gas.v": np.array([of.volume]), "atmosphere.v": zero}
         case Gear():

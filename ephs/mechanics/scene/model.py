@@ -97,8 +97,8 @@ class Scene:
         Parameters
         ----------
         coordinates : joint name to its coordinates, a number or ``(d,)``; rotation vectors in the axes of
-            C1. Joints that are not named keep theirs, unless they close a loop. A body without a joint has
-            an implicit free joint of its name.
+            C1. Joints that are not named keep theirs, unless they close a loop or rigid gears tie them to
+            named ones. A body without a joint has an implicit free joint of its name.
         rates : joint name to its u_r, a number or ``(d,)``.
         adjust : take the nearest state that closes the loops, the named joints held.
 
@@ -112,7 +112,10 @@ class Scene:
         return with_state(self, coordinates or {}, rates or {}, adjust)
 
     def at(self, solution: Any, time: float) -> "Scene":
-        """The scene in the state of a solution at one of its times, temperatures included."""
+        """The scene in the state of a solution at one of its times, temperatures, stretches and currents included.
+
+        Velocities are those on the joints; what `natural` leaves the joints by is in ``scene.system().at(…)``.
+        """
         from ephs.mechanics.scene.state import at_solution
 
         return at_solution(self, solution, time)

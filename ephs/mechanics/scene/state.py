@@ -1,6 +1,6 @@
 """A scene in another state: along its joint coordinates, adjusted to close, or taken from a solution."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.assembly import gyration, measure
+from ephs.mechanics.scene.attached import ATTACHED, Attachment, Gear
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
+from ephs.mechanics.scene.following import left, stretched, tied
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen, mapped
@@ -73,6 +76,11 @@ class Snapshot:
             np.array([body.twist for body in bodies]).reshape(-1, 6),
         )
 
+    def coordinates(self) -> dict[str, Array]:
+        """Coordinates (d,) of all joints."""
+        pairs = zip(self.links, self.joints, strict=True)
+        return {k.name: k.coupling.coordinates(np.asarray(j.coordinate)) for k, j in pairs}
+
     def roots(self) -> Array:
         """The bodies' inverse root inertias, the metric of every adjustment."""
         n = len(self.bodies)
@@ -92,6 +100,8 @@ def with_state(
     now, where = Snapshot.of(scene), scene.source or scene.name
     wanted = _given(now, coordinates, "coordinates", where)
     speeds = _given(now, rates, "rates", where)
+    wanted = tied(scene, now.coordinates(), wanted)
+    speeds = tied(scene, {j.name: np.asarray(j.rate) for j in now.joints}, speeds)
     links = [replace(k, coordinates=wanted.get(k.name), rate=speeds.get(k.name)) for k in now.links]
 
     before = [np.asarray(j.coordinate) for j in now.joints]
@@ -205,7 +215,13 @@ def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequen
         coordinate, rate = joints[path + j.name]
         return replace(j, coordinate=coordinate, rate=rate)
 
-    return mapped(scene, {"bodies": body, "joints": joint})
+    before = now.coordinates()
+    after = {k.name: k.coupling.coordinates(x) for k, x in zip(now.links, xs, strict=True)}
+
+    def gear(path: str, g: Gear) -> Gear:
+        return stretched(g, path, before, after)
+
+    return mapped(scene, {"bodies": body, "joints": joint, "gears": gear})
 
 
 def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
@@ -214,15 +230,30 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     k = int(np.argmin(np.abs(times - time)))
     if abs(times[k] - time) > SLIVER * max(1.0, abs(time)):
         raise SceneError(scene.name, [fault("no time", "time", time, first=times[0], last=times[-1])])
-    now = Snapshot.of(scene)
+    now, named = Snapshot.of(scene), {name for name, _ in scene.all_joints()}
     poses, twists = now.poses.copy(), now.twists.copy()
     for i, name in enumerate(now.names):
         body = solution.body(name)
         poses[i] = np.concatenate((body.quaternion[k], body.position[k]))
         twists[i] = body_twist(poses[i], body.velocity[k], body.angular_velocity[k])
+    links = [
+        replace(link, near=link.coupling.element(np.asarray(solution.joint(link.name).coordinate[k])))
+        if link.name in named
+        else link
+        for link in now.links
+    ]
+    there = rebuilt(scene, now, poses, twists, elements(links, poses))
     heat = {name: float(solution.thermal(name).temperature[k]) for name, _ in scene.all_thermal()}
-    there = rebuilt(scene, now, poses, twists, elements(now.links, poses))
-    return mapped(there, {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])})
+    states = solution.state_at(k)
+
+    def attached(section: str) -> Callable[[str, Attachment], Attachment]:
+        return lambda path, of: left(of, component_path(section, path + of.name), states)
+
+    return mapped(
+        there,
+        {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])}
+        | {section: attached(section) for section in ATTACHED},
+    )
 
 
 def _given(now: Snapshot, values: Mapping[str, ArrayLike], what: str, where: str) -> dict[str, Array]:

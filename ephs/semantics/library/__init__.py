@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Directory, Interface, PortType, Quantity, quantity
+from ephs.operad.messages import nearest_name
 from ephs.semantics import formulas
 from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.derive.linear import Linear
+from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import coupled, dissipated, stored
 from ephs.semantics.library import chemistry as chemistry
 from ephs.semantics.library.chemistry import ideal_mixture, reaction
@@ -69,6 +71,12 @@ __all__ = [
     "winding",
 ]
 
+
+def __getattr__(name: str) -> Any:
+    near = nearest_name(name, __all__)
+    raise AttributeError(f"the library has no {name!r}" + (f"; did you mean {near!r}?" if near else ""))
+
+
 Structure = tuple[Sequence[Sequence[Any]] | None, Sequence[Sequence[Any]] | None]
 """L and C, either of which may be left out."""
 
@@ -114,9 +122,27 @@ def inductor(*, l: float) -> Storage:  # noqa: E741 - the field's symbol
     return _scalar("inductor", "b", quantity.flux_linkage, formulas.inductor, l=l)
 
 
-def thermal_capacity(*, c1: float, c2: float) -> Storage:
-    """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2."""
+def thermal_capacity(
+    *, c1: float | None = None, c2: float | None = None, capacity: float | None = None, temperature: float | None = None
+) -> Storage:
+    """Thermal capacity; port s: E = c1*exp(s/c2), temperature θ = E/c2.
+
+    Either c1 in J and c2 in J/K, or ``capacity`` C in J/K and ``temperature`` θ₁ in K at s = 0: c1 = C θ₁, c2 = C.
+    """
+    if capacity is not None or temperature is not None:
+        if c1 is not None or c2 is not None or capacity is None or temperature is None:
+            found = ", ".join(
+                key
+                for key, x in zip(("c1", "c2", "capacity", "temperature"), (c1, c2, capacity, temperature), strict=True)
+                if x is not None
+            )
+            expected = "c1 and c2, or capacity and temperature"
+            raise StructureError("parameter", "thermal_capacity", key="names", found=found, expected=expected)
+        positive("thermal_capacity", capacity=capacity, temperature=temperature)
+        c1, c2 = capacity * temperature, capacity
     positive("thermal_capacity", c1=c1, c2=c2)
+    assert c1 is not None
+    assert c2 is not None
     formula = Formula(formulas.thermal_capacity, ("c1", "c2"), formulas.thermal_capacity_slope)
     return exponential("thermal_capacity", c1, c2, (("c1", c1), ("c2", c2)), formula)
 

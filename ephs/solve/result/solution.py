@@ -189,6 +189,8 @@ class Solution:
     @cached_property
     def velocity_error(self) -> Array:
         """(n,) largest residual of the reported velocities, in m/s or rad/s; zero for systems without joints."""
+        if self.motion is None and self.problem is not None and self.problem.linked is not None:
+            return self.problem.linked(self).velocity_error()
         return np.zeros(len(self)) if self.motion is None else self.motion.velocity_error()
 
     @property

@@ -158,7 +158,7 @@ class _Reader:
         return found
 
     def _prescribed(self, port: Path) -> bool:
-        return self.problem.signals[port].effort
+        return self.problem.signal(port).effort
 
     def _bare(self, junction: int) -> str | None:
         """Why nothing can be attached to a junction; None where it can."""
@@ -199,7 +199,7 @@ class _Reader:
     def _motion(self, port: Path, freedoms: int) -> MotionLaw | None:
         """Prescribed effort of a joint's port; None where a force is given."""
         self.ports.add(port)
-        signal = self.problem.signals[port]
+        signal = self.problem.signal(port)
         if not signal.effort:
             return None
         if freedoms != 1:
@@ -304,7 +304,7 @@ class _Reader:
             frame = self.found.frames.get(junction)
             if frame is None:
                 raise Unplaced(port, "is a port of neither a joint nor a body")
-            if self.problem.signals[port].effort:
+            if self.problem.signal(port).effort:
                 raise Unplaced(port, "prescribes the motion of a body; a joint's can be prescribed")
             yield Acting(port, frame)
 
