@@ -15,6 +15,7 @@ from typing import final
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, sp
 from ephs.modelica.relation import Relation
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 
 
 @final
@@ -111,7 +112,7 @@ def _witness(relation: Relation, form: Matrix) -> dict[str, object]:
     """A positive power, and a point (values of ports and states) at which it occurs."""
     import numpy as np
 
-    _, vectors = np.linalg.eigh(np.array(form.tolist(), dtype=float))
+    _, vectors = symmetric_eigen(np.array(form.tolist(), dtype=float))
     least = sp.Matrix(vectors[:, 0] / np.abs(vectors[:, 0]).max())
     rows = [(port.potential, port.domain.position, relation.efforts[row, :]) for row, port in enumerate(relation.ports)]
     said = [f"{'der(' * at}{symbol}{')' * at} = {float((row * least)[0]):.4g}" for symbol, at, row in rows]

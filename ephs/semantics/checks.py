@@ -15,6 +15,7 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.extents import into
 from ephs.semantics.linear.sums import unit_rows
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.trials import ROTATING, Trial
@@ -274,9 +275,9 @@ def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
         entry = _worst(defect)
         raise _fail("symmetry", irreversible, trial, float(matrix[entry] - matrix[entry[::-1]]), entry=entry)
     energy_effort = e + bundle.intensive(reference)
-    least = float(np.linalg.eigvalsh(even).min(initial=0.0))
+    least = float(symmetric_eigenvalues(even).min(initial=0.0))
     if not least >= -TOLERANCE * scale:
-        raise _fail("definite", irreversible, trial, float(np.linalg.eigvalsh(matrix).min(initial=0.0)))
+        raise _fail("definite", irreversible, trial, float(symmetric_eigenvalues(matrix).min(initial=0.0)))
     terms = np.abs(matrix) @ np.abs(energy_effort)
     defect = matrix @ energy_effort
     if not np.all(np.abs(defect) <= TOLERANCE * terms):

@@ -20,6 +20,7 @@ from ephs.semantics.primitives import Primitive, Reversible
 from ephs.semantics.relations import relation_of
 from ephs.semantics.relations.base import BasePoint, StateClass, Values, place
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT, DIFFERENCE
 from ephs.semantics.system import System, fold
 
@@ -249,7 +250,7 @@ def newton(residual: Callable[[Array], Array], z: Array, *, iterations: int = 30
             up[i] += delta
             down[i] -= delta
             jacobian[:, i] = (residual(up) - residual(down)) / (2.0 * delta)
-        step = np.linalg.lstsq(jacobian, r, rcond=CONSTRAINT)[0]
+        step = least_squares(jacobian, r, part=CONSTRAINT)
         share = 1.0
         new, r_new, error = _tried(residual, z - step)
         # far from the solution a full step may increase the residual; near it only rounding remains

@@ -13,6 +13,7 @@ from ephs.semantics.derive.linear import Linear
 from ephs.semantics.forms import dissipated, stored
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proof, Reversible, Storage, power_ports
 from ephs.semantics.spaces import codes, manifold
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.verdict import Condition, proved
 
 
@@ -185,7 +186,7 @@ def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition
         (d, d) constant; None where it is a function of the states that is known to be non-negative and even.
     """
     sound = mu is None or (np.array_equal(mu, mu.T) and bool(np.all(np.isfinite(mu))))
-    square = sound and (mu is None or not mu.any() or float(np.linalg.eigvalsh(mu)[0]) >= 0.0)
+    square = sound and (mu is None or not mu.any() or float(symmetric_eigenvalues(mu)[0]) >= 0.0)
     power, *_ = interface.values()
     symmetric, definite, energy, conserving, mirrored, turned = STATEMENTS["irreversible"]
     form = "M = Bᵀ (μ/θ) B with B = [θ, −u]"

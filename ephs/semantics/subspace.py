@@ -11,6 +11,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, TINY, rank_of
 
 
@@ -40,7 +41,7 @@ class Subspace:
         rows = matrix[norms > 0.0] / norms[norms > 0.0, None] if matrix.size else matrix[:0]
         if not rows.size:
             return Subspace(np.eye(n))
-        _, sigma, vt = np.linalg.svd(rows, full_matrices=True)
+        _, sigma, vt = svd(rows)
         rank = rank_of(sigma, ELIMINATION)
         return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank, sigma[0]))
 
@@ -49,7 +50,7 @@ class Subspace:
         """Span of the columns of vectors (n, r); columns small relative to the usual size count as rounding."""
         if not vectors.size:
             return Subspace(np.zeros((vectors.shape[0], 0)))
-        u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
+        u, sigma, _ = svd(vectors, full_matrices=False)
         rank = rank_of(sigma, ELIMINATION, usual)
         return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank, max(sigma[0], usual)))
 

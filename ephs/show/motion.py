@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import DIRECTION, TINY
 
 OPPOSITE = 1e-9
@@ -146,7 +147,7 @@ def between(first: Array, second: Array) -> tuple[Array, float]:
 
 def equivalent_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     """Sides (3,) m and orientation (4,) of the solid box with this mass, kg, and inertia (3, 3), kg m²."""
-    moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float))
+    moments, axes = symmetric_eigen(np.asarray(inertia, dtype=float))
     if np.linalg.det(axes) < 0:
         axes[:, 2] *= -1.0
     squares = 6.0 / mass * (moments.sum() - 2.0 * moments) if mass > 0 else np.zeros(3)
@@ -159,7 +160,7 @@ def equivalent_box(mass: float, inertia: Array) -> tuple[Array, Array]:
 def best_side(points: Array) -> Array:
     """(3,) the way from points (n, 3) to where their motion is seen best: flat motions from the front."""
     scatter = points - points.mean(axis=0)
-    _, spread, axes = np.linalg.svd(scatter.T @ scatter)
+    _, spread, axes = svd(scatter.T @ scatter)
     if spread[1] > PLANAR * max(spread[0], TINY) and spread[2] < 0.05 * spread[0]:
         front = np.array([0.0, 0.0, 1.0]) if abs(axes[2, 2]) > 0.3 else np.array([1.0, -1.2, 0.8])
         normal = axes[2] * (1.0 if axes[2] @ front >= 0 else -1.0)

@@ -16,6 +16,7 @@ from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.extents import room
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
 
@@ -153,7 +154,7 @@ def instant(
 
 def _least_norm(matrix: Array, right: Array) -> tuple[Array, Array]:
     """Solution of least norm, and a basis (n, k) of the null space."""
-    u, sigma, vt = np.linalg.svd(matrix, full_matrices=True)
+    u, sigma, vt = svd(matrix)
     rank = rank_of(sigma, IMPLICIT)
     return vt[:rank].T @ ((u[:, :rank].T @ right) / sigma[:rank]), vt[rank:].T
 
@@ -193,7 +194,7 @@ def _all_efforts(d: Descriptor, constraint: Array, stored: dict[int, float], giv
     out[places] = [known[int(i)] for i in places]
     others = np.setdiff1d(np.arange(d.effort_size), places)
     if others.size and constraint.size:
-        out[others] = np.linalg.lstsq(constraint[:, others], -constraint[:, places] @ out[places], rcond=ELIMINATION)[0]
+        out[others] = least_squares(constraint[:, others], -constraint[:, places] @ out[places], part=ELIMINATION)
     return out
 
 
@@ -267,5 +268,5 @@ def _rank(matrix: Array) -> int:
     if not matrix.size:
         return 0
     norms = np.linalg.norm(matrix, axis=1)
-    sigma = np.linalg.svd(matrix / norms[:, None], compute_uv=False)
+    sigma = singular_values(matrix / norms[:, None])
     return rank_of(sigma, CONSTRAINT)

@@ -18,6 +18,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives import Reversible
+from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.instant import Mobility, is_velocity
 from ephs.solve.sparse import Index
@@ -140,7 +141,7 @@ def _sound(condition: _Condition, junction: int) -> bool:
     """Whether the rows determine the effort of a junction."""
     block = condition.blocks[junction]
     rows, columns = block.shape
-    return rows == columns and bool(np.linalg.svd(block / condition.size[:, None], compute_uv=False)[-1] >= SOUND)
+    return rows == columns and bool(singular_values(block / condition.size[:, None])[-1] >= SOUND)
 
 
 def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Condition]]:
@@ -222,5 +223,5 @@ def _rank(group: list[tuple[Mapping[int, Array], Array]], dims: Index) -> int:
         for free, block in terms.items():
             matrix[row : row + size.size, at[free] : at[free] + block.shape[1]] = block / size[:, None]
         row += size.size
-    sigma = np.linalg.svd(matrix, compute_uv=False)
+    sigma = singular_values(matrix)
     return int(np.sum(sigma > CONSTRAINT * max(float(sigma[0]), 1.0))) if sigma.size else 0

@@ -13,6 +13,7 @@ from ephs.semantics import Irreversible, Reference, Reversible, Storage, constru
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.primitives import Point
 from ephs.semantics.spaces import Pair
+from ephs.semantics.spaces.decompositions import pseudoinverse
 
 CLEARED = 1e-12
 """Rounding error of entries of order one."""
@@ -150,7 +151,7 @@ def _turning(interface: Interface, stiffness: float) -> Storage:
 def _kept(bundle: Bundle) -> Array:
     """The projector off the charges, which reversible structures conserve."""
     rows = np.array([bundle.indicator(name) for name in bundle.charges]).reshape(len(bundle.charges), bundle.size)
-    return np.eye(bundle.size) - np.linalg.pinv(rows) @ rows
+    return np.eye(bundle.size) - pseudoinverse(rows) @ rows
 
 
 def _cleared(matrix: Array) -> Array:

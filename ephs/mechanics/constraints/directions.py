@@ -13,6 +13,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares, svd
 
 ALIGNED = 1e-6
 """Largest relative distance of a direction from a named axis."""
@@ -137,7 +138,7 @@ def _about(space: Array, arm: Array, length: float) -> Array:
     moved = space.copy()
     moved[:3] += np.cross(arm, space[3:].T).T
     moved[:3] /= length
-    return np.linalg.svd(moved, full_matrices=False)[0]
+    return svd(moved, full_matrices=False)[0]
 
 
 def _turned(space: Array, rotation: Array) -> Array:
@@ -156,7 +157,7 @@ def _pure(space: Array) -> int:
 
 
 def _null(matrix: Array) -> Array:
-    _, sigma, vt = np.linalg.svd(matrix)
+    _, sigma, vt = svd(matrix)
     return vt[int(np.sum(sigma > ALIGNED)) :].T
 
 
@@ -169,7 +170,7 @@ def _sparse(space: Array, axes: Axes, place: Place, length: float) -> Iterable[D
     rest = space @ _null(np.hstack([forces, moments]).T)
     if rest.shape[1]:
         simple = _echelon(rest[3:])
-        both = rest @ np.linalg.lstsq(rest[3:], simple, rcond=None)[0]
+        both = rest @ least_squares(rest[3:], simple)
         for i in range(both.shape[1]):
             moment, force = _cleaned(length * both[:3, i], length), simple[:, i]
             yield _line(Direction(moment, force, axes, place), length)

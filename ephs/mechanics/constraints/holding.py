@@ -16,6 +16,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -173,7 +174,7 @@ def redundant(holds: Sequence[Hold | GearHold], tolerance: float = CONSTRAINT) -
         q, triangle = np.linalg.qr(hold.rows.T)
         rest = q - span @ (span.T @ q)
         rest -= span @ (span.T @ rest)  # twice, because small remainders lose orthogonality
-        u, sigma, vt = np.linalg.svd(rest, full_matrices=False)
+        u, sigma, vt = svd(rest, full_matrices=False)
         new = sigma > tolerance
         out.append(np.linalg.solve(triangle, vt[~new].T))
         span = np.hstack([span, u[:, new]])
@@ -184,5 +185,5 @@ def annihilator(basis: Array) -> Array:
     """An orthonormal basis of the wrenches that do no work on the twists in the columns."""
     if not basis.shape[1]:
         return np.eye(6)
-    u, sigma, _ = np.linalg.svd(basis)
+    u, sigma, _ = svd(basis)
     return u[:, rank_of(sigma, CONSTRAINT) :]

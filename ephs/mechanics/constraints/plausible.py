@@ -12,6 +12,7 @@ import numpy as np
 from ephs.mechanics.constraints.directions import enumerated
 from ephs.mechanics.constraints.holding import Mechanism
 from ephs.mechanics.scene.model import Scene
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
 
 LONG, HEAVY, MASSLESS = 100.0, 1e3, 1e6
@@ -107,7 +108,7 @@ def _null(rows: np.ndarray) -> np.ndarray:
     """Basis of the twists that constraints allow."""
     if not rows.size:
         return np.eye(rows.shape[1])
-    _, sigma, vt = np.linalg.svd(rows)
+    _, sigma, vt = svd(rows)
     return vt[rank_of(sigma, CONSTRAINT) :].T
 
 

@@ -21,6 +21,7 @@ from ephs.mechanics.scene.adjust import close_loops
 from ephs.mechanics.scene.kinematics import Scale
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
 
 AWAY, TRIALS, NEAR = 0.02, 3, 0.2
@@ -134,7 +135,7 @@ def indeterminate(scene: Scene) -> dict[str, Array]:
     holds = of.holds(of.now.poses)
     if not holds:
         return out
-    u, sigma, _ = np.linalg.svd(np.vstack([hold.rows for hold in holds]))
+    u, sigma, _ = svd(np.vstack([hold.rows for hold in holds]))
     free = u[:, rank_of(sigma, CONSTRAINT) :]
     loads: dict[str, Array] = {}
     start = 0
@@ -190,7 +191,7 @@ def _needed(before: "Sequence[T]", target: Array, lengths: Sequence[float]) -> "
 def _shares(holds: Sequence[Hold | GearHold], target: Array) -> list[float] | None:
     """Coefficients of the target in the holds; None where it is not in their span."""
     matrix = np.vstack([hold.rows for hold in holds]).T
-    weights = np.asarray(np.linalg.lstsq(matrix, target, rcond=CONSTRAINT)[0])
+    weights = np.asarray(least_squares(matrix, target, part=CONSTRAINT))
     if np.abs(matrix @ weights - target).max(initial=0.0) > SPANNED:
         return None
     cuts = np.cumsum([len(hold.rows) for hold in holds])[:-1]
@@ -235,7 +236,7 @@ def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> lis
     if not least:
         return None
     now, out = of.now, None
-    _, sigma, vt = np.linalg.svd(np.vstack([hold.rows for hold in of.holds(now.poses, motions=False)]))
+    _, sigma, vt = svd(np.vstack([hold.rows for hold in of.holds(now.poses, motions=False)]))
     ways = vt[rank_of(sigma, CONSTRAINT) :]
     links = [replace(link, coordinates=None) for link in now.links]
     rng = np.random.default_rng(0)

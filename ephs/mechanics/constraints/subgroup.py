@@ -11,6 +11,7 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import ASSEMBLY
 
 
@@ -36,20 +37,20 @@ class Subgroup:
     def translations(self) -> Array:
         """(3, k): an orthonormal basis of the translations in it."""
         turning = self.basis[:3]
-        _, sizes, right = np.linalg.svd(turning, full_matrices=True)
+        _, sizes, right = svd(turning)
         rank = int(np.sum(sizes > ASSEMBLY))
         return self.basis[3:] @ right[rank:].T
 
     @property
     def turning(self) -> Array:
         """(3, k): an orthonormal basis of its rotation axes."""
-        left, sizes, _ = np.linalg.svd(self.basis[:3], full_matrices=False)
+        left, sizes, _ = svd(self.basis[:3], full_matrices=False)
         return left[:, sizes > ASSEMBLY]
 
     def pitch(self) -> float:
         """Advance in m/rad along its one axis of rotation, without its translations."""
         axis = self.turning[:, 0]
-        twist = self.basis @ np.linalg.lstsq(self.basis[:3], axis, rcond=None)[0]
+        twist = self.basis @ least_squares(self.basis[:3], axis)
         free = self.translations
         return float(axis @ (twist[3:] - free @ (free.T @ twist[3:])))
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import pseudoinverse, singular_values
 from ephs.semantics.spaces.rank import ELIMINATION, rank_of
 from ephs.solve.errors import OptionError
 
@@ -128,9 +129,9 @@ def task_of(
         jacobian, drift = chosen @ jacobian, chosen @ drift
     root = np.linalg.cholesky(model.mass_matrix(state))
     inside = np.linalg.solve(root, jacobian.T)
-    if rank_of(np.linalg.svd(inside, compute_uv=False), ELIMINATION) < jacobian.shape[0]:
+    if rank_of(singular_values(inside), ELIMINATION) < jacobian.shape[0]:
         raise OptionError(
             "task", body, f"{jacobian.shape[0]} velocities that the mechanism can have at once; choose directions"
         )
-    left = np.asarray(np.linalg.pinv(inside.T), dtype=float)  # (n, k): inside (insideᵀ inside)⁻¹
+    left = np.asarray(pseudoinverse(inside.T), dtype=float)  # (n, k): inside (insideᵀ inside)⁻¹
     return Task(jacobian, drift, left.T @ left, np.asarray(np.linalg.solve(root.T, left), dtype=float))

@@ -10,6 +10,7 @@ from ephs.mechanics.elements import components
 from ephs.operad import Pattern, junction
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import INERTIA
 from ephs.semantics.system import System
 
@@ -106,7 +107,7 @@ def _inertia(mass: float, inertia: "ArrayLike", strict: bool) -> Array:
         if np.any(tensor):
             raise _bad("inertia", tensor.tolist(), "0, since the mass is 0")
         return tensor
-    least, middle, most = np.linalg.eigvalsh(tensor)
+    least, middle, most = symmetric_eigenvalues(tensor)
     if not strict and 0.0 not in (least, middle, most):
         return tensor
     if not least > 0.0:

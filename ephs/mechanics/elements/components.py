@@ -23,6 +23,7 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import coupled, stored
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, Pair, codes, manifold
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.special import squared_turn, turn_ratio
 from ephs.semantics.verdict import proved
@@ -336,7 +337,7 @@ def dry_friction(of: Pair, mu: float, dry: Dry) -> Irreversible:
 
 def _dissipates(mu: Array) -> bool:
     """Whether μ is exactly symmetric and certainly non-negative."""
-    return not mu.any() or (np.array_equal(mu, mu.T) and float(np.linalg.eigvalsh(mu)[0]) >= 0.0)
+    return not mu.any() or (np.array_equal(mu, mu.T) and float(symmetric_eigenvalues(mu)[0]) >= 0.0)
 
 
 @cache

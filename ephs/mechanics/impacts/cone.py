@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 
 SWEEPS = 200
@@ -73,7 +74,7 @@ def _newton(whole: Array, free: Array, mu: Array, rho: Array, start: Array, allo
     for _ in range(ITERATIONS):
         if size <= allowed:
             break
-        step = np.linalg.lstsq(slope, -left, rcond=CONSTRAINT)[0]
+        step = least_squares(slope, -left, part=CONSTRAINT)
         share = 1.0
         for _ in range(HALVINGS):
             tried = found + share * step

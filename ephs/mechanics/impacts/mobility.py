@@ -1,10 +1,10 @@
 """Response of a mechanism to impulses, with loop closures and prescribed motions."""
 
-import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 
 
@@ -16,4 +16,4 @@ def answer(equations: Equations, state: ReducedState, rows: Array) -> Array:
     if not len(held):
         return free
     back = cho_solve(factor, held.T)
-    return free - back @ np.linalg.lstsq(held @ back, held @ free, rcond=CONSTRAINT)[0]
+    return free - back @ least_squares(held @ back, held @ free, part=CONSTRAINT)

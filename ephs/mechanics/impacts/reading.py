@@ -16,6 +16,7 @@ from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.solve.sparse import Index
 
@@ -121,5 +122,5 @@ def _balanced(by: Array, forces: Array, friction: Array, slipping: NDArray[np.bo
     if not columns:
         return np.zeros((forces.size // 3, 3, 0))
     unknown = np.array(columns).T
-    _, sigma, right = np.linalg.svd(by @ unknown)
+    _, sigma, right = svd(by @ unknown)
     return (unknown @ right[rank_of(sigma, CONSTRAINT) :].T).reshape(forces.size // 3, 3, -1)

@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.impacts.cone import impulses
+from ephs.mechanics.impacts.holding import Holding
 from ephs.mechanics.impacts.islands import Unlawful, islands_of, shared, struck
 from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
@@ -21,6 +22,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
@@ -37,7 +39,7 @@ PARTING = 1e-9
 """Speed, in the mechanism's own, above which closed contacts part."""
 QUIET = 1e-6
 """Speed, likewise, below which contacts do not bounce: the error of a ball's bouncing time; squared, of its energy."""
-PARTS = 10_000
+PARTS = 1000
 """Largest number of parts of a step."""
 BRIEF = 1e-6
 """Fraction of a step too short to decide between sticking and slipping."""
@@ -114,6 +116,8 @@ class Impacts(ReducedMethod):
         for _ in range(PARTS):
             here = self._struck(here)
             end, share, worst = self._taken(here, left)
+            if not worst <= 1.0 and self.control.step is None:
+                return Attempt(state, end, end.t - state.t, self._rejecting(h - left, share * left, h, worst), 0.0)
             if abs(share * left) > BRIEF * abs(h):
                 modes = self._changed(here, modes)
             here, error = end, max(error, worst)
@@ -125,6 +129,15 @@ class Impacts(ReducedMethod):
                 return Attempt(state, end, h, error, least, happened=tuple(self._happened))
         path = self._touching.paths[int(np.argmin(self._touching.gaps(here.q, here.r)))]
         raise SolveError(Outcome.TINY, str(path), f"a step of more than {PARTS} impacts")
+
+    def _rejecting(self, done: float, part: float, h: float, error: float) -> float:
+        """Error of a step of h s whose part of ``part`` s after ``done`` has an error above 1: what shortens it so far
+        that the part would have 1.
+        """
+        if not np.isfinite(error):
+            return error
+        power = self.exponent - self.share
+        return float(max(h / (done + part * error ** (-1.0 / power)), 1.0 + BRIEF) ** power)
 
     # ---- impacts -----------------------------------------------------------------------------------------------
 
@@ -182,6 +195,8 @@ class Impacts(ReducedMethod):
         share = 1.0
         for _ in range(DIVISIONS):
             end, error, divided = self._smooth(state, share * h, held, gaps)
+            if not error <= 1.0 and self.control.step is None:  # it says nothing about gaps or forces
+                return end, share, error
             if divided == 1.0:
                 divided = self._closing(gaps, rates, end, share * h, held)
             if divided == 1.0:
@@ -198,11 +213,11 @@ class Impacts(ReducedMethod):
         self, state: ReducedState, h: float, held: Index, gaps: Array, whole: ReducedState, error: float
     ) -> tuple[ReducedState, float]:
         """The end by two halves, and its error by their difference to the whole, which is of order 2."""
-        middle, _, divided = self._smooth(state, 0.5 * h, held, gaps)
-        if divided < 1.0:
+        middle, missed, divided = self._smooth(state, 0.5 * h, held, gaps)
+        if divided < 1.0 or not missed <= 1.0:
             return whole, TOO_LONG
-        end, _, divided = self._smooth(middle, 0.5 * h, held, gaps)
-        if divided < 1.0:
+        end, missed, divided = self._smooth(middle, 0.5 * h, held, gaps)
+        if divided < 1.0 or not missed <= 1.0:
             return whole, TOO_LONG
         self.exponent = 3.0
         eq = self.equations
@@ -233,53 +248,84 @@ class Impacts(ReducedMethod):
             flight = self._inner.step(self._inner.anew(state), h)
             return replace(flight.end, memory=()), flight.error, 1.0
         rows0, axes = touching.rows(state.q, state.r, held)
-        laws = [touching.laws[i].friction for i in held]
         start = rows0 @ state.r
         slipping = np.repeat(np.hypot(start[1::3], start[2::3]) > PARTING * self._speed, 3)
         slipping[::3] = False
         before = np.where(slipping, start, 0.0)
-        rows1, impulse, found, change = rows0, np.zeros(3 * held.size), np.zeros(3 * held.size), np.zeros((0, 0))
-        for count in range(ROUNDS):
-            self._push(state.t, h, rows0.T @ impulse / h, rows1.T @ impulse / h)
-            attempt = self._inner.step(self._inner.anew(state), h)
-            end = attempt.end
-            rows1, _ = touching.rows(end.q, end.r, held, axes)
-            if not count:
-                change = answer(eq, end, rows1)
-            mobility = rows1 @ change
-            free = rows1 @ end.r - mobility @ impulse
-            solved = impulses(mobility, free + before, laws, impulse)
-            if solved is None:
-                return state, 0.0, 0.5
-            found = solved
-            most, fast = float(np.abs(mobility @ found).max()), float((np.abs(rows1) @ np.abs(end.r)).max())
-            if float(np.abs(mobility @ (found - impulse)).max()) <= SETTLED * most + ROUNDED * (fast + self._speed):
-                break
-            impulse = found
-        else:  # the part is too long for them
-            return state, 0.0, 0.5
-        pressed = found[::3] > PRESSING * found[::3].max()
+        settled = self._settled(state, h, held, axes, rows0, before)
+        if isinstance(settled, float | int):  # errors above 1 are for the control, else the part is too long
+            return (state, 0.0, 0.5) if settled <= 1.0 else (state, settled, 1.0)
+        end, error, solved, pushed, rest, change = settled
+        pressed = solved[::3] > PRESSING * solved[::3].max()
         moved = self._put(end, held[pressed], gaps[held[pressed]], change[:, ::3][:, pressed])
         rows1, _ = touching.rows(moved.q, moved.r, held, axes)
-        moved = replace(moved, r=moved.r + change @ (found - impulse))
+        moved = replace(moved, r=moved.r + change @ rest)
         stop = rows1 @ moved.r
         loose = held[~pressed]
         if loose.size and touching.gaps(moved.q, moved.r)[loose].min() < -self._closed:  # it opens and closes again
             return end, 0.0, 0.5
-        if (divided := _turning(before, stop, found, laws, PARTING * self._speed)) < 1.0:
+        laws = [touching.laws[i].friction for i in held]
+        if (divided := _turning(before, stop, solved, laws, PARTING * self._speed)) < 1.0:
             return end, 0.0, divided
-        taken = -0.5 * (found * (start + stop)).reshape(-1, 3)[:, 1:].sum(axis=1)
+        taken = -0.5 * (solved * (start + stop)).reshape(-1, 3)[:, 1:].sum(axis=1)
         heat = np.zeros(held.size)
         for island in islands_of(rows1 @ change):
             heat[island] = shared(taken[island])
         put = float(end.totals[1] - state.totals[1])
         if not self._alone:
-            put = 0.5 * float((rows0.T @ impulse) @ state.r + (rows1.T @ impulse) @ end.r)
+            put = 0.5 * float((rows0.T @ pushed) @ state.r + (rows1.T @ pushed) @ end.r)
         booked = self._booked(end, moved, held, heat, -put)
         booked, _ = eq.accounts.corrected(state, booked, h, np.full(self.atol.size, np.inf), chosen=False, alone=True)
         slips = np.hypot(stop[1::3], stop[2::3]) > PARTING * self._speed
         self._modes[held] = np.where(pressed, np.where(slips, SLIPPING, STICKING), APART)
-        return replace(booked, memory=()), attempt.error, 1.0
+        return replace(booked, memory=()), error, 1.0
+
+    def _settled(
+        self, state: ReducedState, h: float, held: Index, axes: Index, rows0: Array, before: Array
+    ) -> tuple[ReducedState, float, Array, Array, Array, Array] | float:
+        """The end of h s, its error, the impulses (3k,) of closed contacts, those that pushed it there besides what
+        holds, the rest that has to, and the answers (n, 3k) to them; else the error without these.
+
+        Stops are held at every instant, points of contact where their impulses do not settle.
+        """
+        stops, found = np.array([self._touching.pulling(i) is not None for i in held]), 0.0
+        for may in (stops,) if stops.all() else (stops, np.ones_like(stops)):
+            holding = Holding(self.equations, self._touching, state, h, held, axes, before, may)
+            if may is not stops and not holding:
+                break
+            found = self._iterated(state, h, held, axes, rows0, before, holding)
+            if not isinstance(found, float | int):
+                break
+        return found
+
+    def _iterated(
+        self, state: ReducedState, h: float, held: Index, axes: Index, rows0: Array, before: Array, holding: Holding
+    ) -> tuple[ReducedState, float, Array, Array, Array, Array] | float:
+        """The same with what holds at every instant."""
+        eq, touching, chosen = self.equations, self._touching, self.control.step is None
+        laws = [touching.laws[i].friction for i in held]
+        rows1, impulse, change = rows0, np.zeros(3 * held.size), np.zeros((0, 0))
+        for count in range(ROUNDS):
+            self._push(state.t, h, rows0.T @ impulse / h, rows1.T @ impulse / h)
+            with holding.acting():
+                attempt = self._inner.step(self._inner.anew(state), h)
+            kept, end = holding.impulse(), attempt.end
+            if chosen and not attempt.error <= 1.0:
+                return float(attempt.error)
+            rows1, _ = touching.rows(end.q, end.r, held, axes)
+            if not count:
+                change = answer(eq, end, rows1)
+            mobility = rows1 @ change
+            free = rows1 @ end.r - mobility @ (kept + impulse)
+            solved = impulses(mobility, free + before, laws, kept + impulse)
+            if solved is None:
+                return 0.0
+            rest = solved - kept - impulse
+            most, fast = float(np.abs(mobility @ solved).max()), float((np.abs(rows1) @ np.abs(end.r)).max())
+            if float(np.abs(mobility @ rest).max()) <= SETTLED * most + ROUNDED * (fast + self._speed):
+                return end, attempt.error, solved, impulse, rest, change
+            impulse = solved - kept
+        return 0.0
 
     def _push(self, t: float, h: float, first: Array, last: Array) -> None:
         """Let closed contacts act on the tree's rates from t on, by forces (n,) that go from ``first`` to ``last``."""
@@ -302,7 +348,7 @@ class Impacts(ReducedMethod):
             if float(np.abs(gaps).max()) <= DRIFTED * self._closed:
                 break
             rows, _ = self._touching.rows(q, state.r, pressed)
-            q = eq.moved(q, answer @ np.linalg.lstsq(rows[::3] @ answer, -gaps, rcond=CONSTRAINT)[0])
+            q = eq.moved(q, answer @ least_squares(rows[::3] @ answer, -gaps, part=CONSTRAINT))
         return state if q is state.q else eq.closed(replace(state, q=q))
 
     def taken(self, state: ReducedState) -> Snapshot | None:

@@ -16,11 +16,14 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces import SE3, se3
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.sparse import Index
 
 POSES: Final[Any] = se3
 """Formulas of poses, for arrays of many."""
+BENT = 1e-5
+"""Largest change, in rad or m, over which rows are differentiated: its square and rounding over it are 1e-10."""
 
 
 @final
@@ -169,6 +172,14 @@ class Touching:
                     seen = SE3.adjoint(SE3.inverse(offset))
                     out[3 * k : 3 * k + 3] += sign * wrenches @ seen @ residual.twists(body)
         return out, chosen
+
+    def bending(self, q: Array, r: Array, which: Index, axes: Index) -> Array:
+        """(3k,) accelerations along the rows that are due to their change, J̇ r; zero of stops of the tree's joints."""
+        if not self._cut and which.size and which.min() >= len(self._points):
+            return np.zeros(3 * which.size)
+        part = BENT / max(float(np.abs(r).max(initial=0.0)), TINY)
+        ahead, back = (self.rows(self._eq.moved(q, by * r), r, which, axes)[0] for by in (part, -part))
+        return (ahead - back) @ r / (2.0 * part)
 
     def ways(self, i: int, axis: int) -> Array:
         """(3, 3) world directions of the rows of a point, where the links were placed last; zeros of a stop."""

@@ -24,6 +24,7 @@ from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 
 LEAST = 2e-15
 """Least mass in kg and moment of inertia in kg m² that MuJoCo takes of a moving body, with some room."""
@@ -146,7 +147,7 @@ def _impossible_inertias(spec: Any, draft: Draft) -> list[tuple[Any, Inertia]]:
             body.mass, body.inertia, body.fullinertia = 1.0, np.ones(3), [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
             found.append((body, given))
             continue
-        moments, axes = np.linalg.eigh(given.tensor) if whole else (np.array(body.inertia), np.eye(3))
+        moments, axes = symmetric_eigen(given.tensor) if whole else (np.array(body.inertia), np.eye(3))
         largest = moments.max()
         lacking = 2.0 * largest - moments.sum()
         if given.mass >= LEAST and moments.min() >= LEAST and lacking <= -ROUNDED * largest:

@@ -10,18 +10,20 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.scene import freedoms_of
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd
 
-REAL = 1e-9
-"""Largest imaginary part of a real eigenvalue, relative to its size."""
 SAME = 1e-12
 """Fraction of a load below which its remainder is rounding."""
-BRACKET, SOFT = 1e-10, 1e-13
-"""Width of the bracket of a critical share, and the least stiffness beside others, at which it is found."""
+FLAT = 1e-12
+"""Size of an eigenvalue of the scaled stiffness, whose diagonal is 1, that is rounding."""
+LOCATED, ALIKE = 1e-12, 1e-7
+"""Part of a step to which a critical point is located; part of the loads within which two of them are one."""
+TRIALS = 80
+"""Trial points on a step, at most, to locate a critical point: bisection alone needs half of them."""
 LONGEST, SHORTEST = 1.0, 1e-6
 """Bounds of the distance from one equilibrium to the next, in rad, parts of the scene's length, and of the loads."""
 ITERATIONS = 12
@@ -57,7 +59,7 @@ class StaticPath:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Balance:
     """Forces at a configuration on its independent degrees of freedom, (k,), what they change by, and what the loads
-    add.
+    add; ``values`` are the eigenvalues of the scaled stiffness.
     """
 
     state: State
@@ -65,21 +67,11 @@ class _Balance:
     stiffness: Array
     load: Array
     Z: Array
+    values: Array
 
     @property
     def unstable(self) -> int:
-        values = self._values
-        return int(((values.real < 0.0) & (np.abs(values.imag) <= REAL * np.abs(values.real))).sum())
-
-    @property
-    def softest(self) -> float:
-        """Eigenvalue nearest zero, relative to the largest."""
-        values = self._values
-        return float(values.real[np.abs(values).argmin()] / np.abs(values).max())
-
-    @property
-    def _values(self) -> NDArray[np.complex128]:
-        return np.linalg.eigvals(self.stiffness).astype(complex)
+        return int((self.values < 0.0).sum())
 
 
 def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> StaticPath | None:
@@ -107,6 +99,12 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
                 return None
             continue
         there, reached, count = found
+        turned = (_tangent(there, metric) @ (metric * ahead)) * _tangent(there, metric)[-1] * ahead[-1] < 0.0
+        if turned and there.unstable == here.unstable and trial > SHORTEST:  # two critical points, or another path
+            step = 0.5 * trial
+            continue
+        met = [_critical(model, here, share, ahead, trial, metric, there, k) for k in _between(here, there)]
+        critical += _distinct(critical, [x for x in met if x <= until * (1.0 + SAME)])
         if reached > until:
             last = _held(model, there.state, until)
             if last is None:
@@ -115,8 +113,6 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
                     return None
                 continue
             there, reached = last, until
-        if there.unstable != here.unstable:
-            critical.append(_crossing(model, here, share, there, reached))
         before, here, share = ahead, there, reached
         shares.append(share)
         points.append(here.state)
@@ -157,14 +153,26 @@ def _balance(model: Dynamics, state: State, share: float) -> _Balance:
     mass = Z.T @ by.force_a @ Z
     load = mass @ (full - bare)[free.which]
     force = mass @ bare[free.which] + share * load
-    return _Balance(state, force, -mass @ (by.acceleration_q @ Z)[free.which], load, Z)
+    stiffness = -mass @ (by.acceleration_q @ Z)[free.which]
+    return _Balance(state, force, stiffness, load, Z, _eigenvalues(stiffness))
+
+
+def _eigenvalues(stiffness: Array) -> Array:
+    """(k,) real parts, the least first, of the eigenvalues of a stiffness (k, k) scaled to a diagonal of 1.
+
+    By Sylvester's law the scale changes no sign of those of a symmetric one; a free direction has a rounded 0.
+    """
+    size = np.abs(np.diag(stiffness))
+    scale = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+    values: Array = np.real(np.linalg.eigvals(scale[:, None] * stiffness * scale)).astype(float)
+    return np.sort(values) + FLAT
 
 
 def _tangent(here: _Balance, metric: Array) -> Array:
     """(n + 1,) unit tangent of the path, configuration and part of the loads."""
     rows = np.column_stack([here.stiffness, -here.load])
     scale = np.abs(rows).max(axis=1, keepdims=True)
-    _, _, ways = np.linalg.svd(rows / np.where(scale > 0.0, scale, 1.0))
+    _, _, ways = svd(rows / np.where(scale > 0.0, scale, 1.0))
     way = ways[-1]
     whole = np.append(here.Z @ way[:-1], way[-1])
     return whole / np.sqrt(whole @ (metric * whole))
@@ -233,19 +241,52 @@ def _moved(model: Dynamics, state: State, change: Array) -> State:
     return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
 
 
-def _crossing(model: Dynamics, one: _Balance, low: float, two: _Balance, high: float) -> float:
-    """The part of the loads between two equilibria at which the stiffness is singular: by the softest eigenvalue."""
-    if one.softest * two.softest >= 0.0:
-        return 0.5 * (low + high)
-    for _ in range(8):
-        share = low + (high - low) * one.softest / (one.softest - two.softest)
-        middle = _held(model, one.state, share)
-        if middle is None:  # near a limit point there may be no equilibrium at a given load
-            return share
-        if middle.softest * one.softest > 0.0:
-            one, low = middle, share
-        else:
-            two, high = middle, share
-        if abs(high - low) <= BRACKET or abs(middle.softest) <= SOFT:
+def _between(one: _Balance, two: _Balance) -> range:
+    """Places in the order of the eigenvalues whose sign differs between two equilibria."""
+    return range(*sorted((one.unstable, two.unstable)))
+
+
+def _critical(
+    model: Dynamics, here: _Balance, share: float, ahead: Array, distance: float, metric: Array, there: _Balance, k: int
+) -> float:
+    """The part of the loads, between here and an equilibrium at a distance along the path, at which the k-th eigenvalue
+    is zero: by regula falsi (Anderson and Björck), and bisection where that does not halve the bracket.
+    """
+    low, high, first, last = 0.0, distance, float(here.values[k]), float(there.values[k])
+    part, before = share, distance
+    for trial in range(TRIALS):
+        middle = low + (high - low) * first / (first - last)
+        if trial % 3 == 2 and high - low > 0.5 * before:
+            middle = 0.5 * (low + high)
+        before = high - low if trial % 3 == 2 else before
+        found = _along(model, here, share, ahead, middle, metric)
+        if found is None:  # the path forks there: the equations are singular
+            middle = (
+                0.5 * (low + high) if abs(middle - 0.5 * (low + high)) > 0.1 * (high - low) else 0.7 * low + 0.3 * high
+            )
+            found = _along(model, here, share, ahead, middle, metric)
+            if found is None:
+                return part
+        at, part, _ = found
+        value = float(at.values[k])
+        if value == 0.0:
             break
-    return low + (high - low) * one.softest / (one.softest - two.softest)
+        if value * last < 0.0:
+            low, first = high, last
+        else:
+            less = 1.0 - value / last
+            first *= less if less > 0.0 else 0.5
+        step = abs(middle - high)
+        high, last = middle, value
+        if step <= LOCATED * distance or abs(high - low) <= LOCATED * distance:
+            break
+    return part
+
+
+def _distinct(known: list[float], found: list[float]) -> list[float]:
+    """What is found besides the known ones; several directions may lose their stiffness at one load."""
+    out: list[float] = []
+    for share in found:
+        if not any(abs(share - other) <= ALIKE * max(abs(share), abs(other)) for other in [*known[-1:], *out]):
+            out.append(share)
+    return sorted(out)

@@ -13,6 +13,7 @@ import numpy as np
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
+from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
@@ -127,7 +128,7 @@ class Pencil:
             rows = np.vstack([matrices.unknowns.toarray(), np.hstack([kept, np.zeros((len(kept), z.size - self.n_w))])])
             right = np.concatenate([residual, kept @ z[: self.n_w]])
             size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)
-            step = np.linalg.lstsq(rows / size[:, None], right / size, rcond=REGULAR)[0]
+            step = least_squares(rows / size[:, None], right / size, part=REGULAR)
             z = z - step
             if np.abs(step).max(initial=0.0) <= SETTLED * max(LEAST, float(np.abs(z).max(initial=0.0))):
                 return z
@@ -176,7 +177,7 @@ class Pencil:
 
     def _left(self, rows: Array) -> Array:
         """The left kernel of the equations without rates: what leaves conditions on states, and on inputs."""
-        u, sigma, _ = np.linalg.svd(rows)
+        u, sigma, _ = svd(rows)
         return u[:, int(np.sum(sigma > ELIMINATION * sigma.max(initial=1.0))) :]
 
     def _conditions(self, parts: Parts) -> Array:
@@ -218,7 +219,7 @@ class Pencil:
         rest = np.setdiff1d(np.arange(self.n_w), np.concatenate([which, left_out]))
         if rows.size and rest.size:
             size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)[:, None]
-            X[rest] = -np.linalg.lstsq(rows[:, rest] / size, rows[:, which] / size, rcond=ELIMINATION)[0]
+            X[rest] = -least_squares(rows[:, rest] / size, rows[:, which] / size, part=ELIMINATION)
         return X
 
     @property
@@ -256,7 +257,7 @@ class Pencil:
             columns[: self.n_w] = 1.0 / max(1.0, h)  # increments rather than rates: both of one size
             rows = rows * columns
             size = np.maximum(np.abs(rows).max(axis=1, initial=0.0), TINY)
-            step = columns * np.linalg.lstsq(rows / size[:, None], residual / size, rcond=REGULAR)[0]
+            step = columns * least_squares(rows / size[:, None], residual / size, part=REGULAR)
             if not np.isfinite(step).all():
                 return None
             z = z - step

@@ -21,6 +21,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
 from ephs.solve.errors import OptionError
@@ -162,7 +163,7 @@ class _Linear:
             return out
         dependent = np.setdiff1d(np.arange(self.n), self.free.which)
         change = self.velocities.rows @ self.free.Z
-        out[dependent] = -np.linalg.lstsq(found.rows[:, dependent], change, rcond=ELIMINATION)[0]
+        out[dependent] = -least_squares(found.rows[:, dependent], change, part=ELIMINATION)
         return out
 
     # ---- the matrices ------------------------------------------------------------------------------------------
@@ -296,7 +297,7 @@ class _Linear:
             if np.abs(flow - flow.T).max() > ROUNDED * np.abs(flow).max():
                 return None, "the thermal nodes are not in equilibrium", A
             R[warm, warm] = 0.5 * (flow + flow.T)
-        least = np.linalg.eigvalsh(R).min(initial=0.0)
+        least = symmetric_eigenvalues(R).min(initial=0.0)
         if least < -ROUNDED * np.abs(R).max(initial=0.0):
             return None, "what dissipates in this state is not a friction", A
         return PortHamiltonian(J, R, Q), "", (J - R) @ Q

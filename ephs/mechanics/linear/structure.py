@@ -6,6 +6,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 
 ROUNDING = 1e-12
 """Relative tolerance of a power balance: rounding of products of matrices."""
@@ -91,7 +92,7 @@ def laws_of(
         Whether the outputs are the inputs' power conjugates.
     """
     J, R, Q = ph.J, ph.R, ph.Q
-    least = np.asarray(np.linalg.eigvalsh(0.5 * (R + R.T)), dtype=float)
+    least = np.asarray(symmetric_eigenvalues(0.5 * (R + R.T)), dtype=float)
     out = [
         Law("A = (J − R) Q", A, (J - R) @ Q, _size((np.abs(J) + np.abs(R)) @ np.abs(Q))),
         Law("J is skew", J, -J.T, _size(J) + _size(R)),
@@ -100,7 +101,7 @@ def laws_of(
         Law("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(J) + _size(R)),
     ]
     if conjugate:
-        gain = np.asarray(np.linalg.eigvalsh(D + D.T), dtype=float)
+        gain = np.asarray(symmetric_eigenvalues(D + D.T), dtype=float)
         out.append(Law("C = Bᵀ Q", C, B.T @ Q, max(sizes.C, sizes.B * float(np.abs(Q).sum(axis=0).max(initial=0.0)))))
         out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), sizes.D))
     return tuple(out)

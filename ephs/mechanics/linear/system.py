@@ -18,6 +18,7 @@ from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.decompositions import least_squares, pseudoinverse, svd, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, failing_at
@@ -79,7 +80,7 @@ class _Linear:
         """The linear system."""
         p, X, k, pencil = self.parts, self.X, self.k, self.pencil
         rows, by_states, by_inputs = pencil.algebraic(p)
-        back = np.linalg.pinv(rows, rcond=ELIMINATION)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
+        back = pseudoinverse(rows, part=ELIMINATION)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
         given = np.hstack([by_states @ X, by_inputs])
         by = back @ given
         W = _kernel(rows)
@@ -172,17 +173,17 @@ def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamilton
         return None, "a potential pushes a state on a group, where it has no Hessian"
     V = _kernel(p.hold)
     P, N = p.T @ V, V.T @ p.flow_efforts @ V
-    back, W = np.linalg.pinv(P, rcond=ELIMINATION), _kernel(P)
+    back, W = pseudoinverse(P, part=ELIMINATION), _kernel(P)
     returned = W.T @ N @ W
-    inner = N - N @ W @ np.linalg.pinv(returned, rcond=ELIMINATION) @ W.T @ N
+    inner = N - N @ W @ pseudoinverse(returned, part=ELIMINATION) @ W.T @ N
     flow = -back.T @ inner @ back
     across = np.hstack([_kernel(P.T), back.T @ N @ W @ _kernel(returned)])
     held = across.T @ p.Q @ across
-    project = np.eye(len(X)) - across @ np.linalg.pinv(held, rcond=ELIMINATION) @ across.T @ p.Q
+    project = np.eye(len(X)) - across @ pseudoinverse(held, part=ELIMINATION) @ across.T @ p.Q
     whole = (project @ flow @ project.T)[np.ix_(which, which)]
     Q = X.T @ p.Q @ X
     J, R, Q = 0.5 * (whole - whole.T), -0.5 * (whole + whole.T), 0.5 * (Q + Q.T)
-    if np.linalg.eigvalsh(R).min(initial=0.0) < -NEGATIVE * np.abs(whole).max(initial=0.0):
+    if symmetric_eigenvalues(R).min(initial=0.0) < -NEGATIVE * np.abs(whole).max(initial=0.0):
         return None, "entropy is produced in this state"
     if np.abs((J - R) @ Q - A).max(initial=0.0) > SPANNED * max(size, TINY):
         return None, "stored exergy does not determine what is dissipated in this state"
@@ -193,7 +194,7 @@ def _kernel(matrix: Array) -> Array:
     """An orthonormal basis (n, k) of a matrix's null space."""
     if not matrix.size:
         return np.eye(matrix.shape[1])
-    _, sigma, vt = np.linalg.svd(matrix)
+    _, sigma, vt = svd(matrix)
     return vt[rank_of(sigma, ELIMINATION) :].T
 
 
@@ -206,7 +207,7 @@ def _solved(matrix: Array, right: Array, count: int) -> Array:
         They are not: efforts or rates are not determined by the equations.
     """
     size = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)[:, None]
-    found = np.linalg.lstsq(matrix / size, right / size, rcond=IMPLICIT)[0]
+    found = least_squares(matrix / size, right / size, part=IMPLICIT)
     loose = _kernel(matrix / size)[:count]
     off = np.abs(matrix @ found - right).max(initial=0.0)
     if np.abs(loose).max(initial=0.0) > NEIGHBOUR or off > NEIGHBOUR * max(1.0, np.abs(right).max(initial=0.0)):

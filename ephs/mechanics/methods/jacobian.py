@@ -29,7 +29,7 @@ TANGENT = 8
 class Jacobian:
     """∂ẏ/∂y of y = (v, r, heats) at v = 0: by tangents; of inputs that are functions, by differences of their values.
 
-    With ``counts`` the matrices are counted there, as ``jacobians``.
+    With ``counts`` the matrices are counted there, as ``jacobians``; ``holding`` is what held contacts in the last one.
     """
 
     def __init__(self, equations: Equations, counts: dict[str, Any] | None = None) -> None:
@@ -42,6 +42,7 @@ class Jacobian:
         self._linear: Linearised | None = None
         self._slopes: RateSlopes | None = None
         self._at: ReducedState | None = None
+        self.holding = equations.holding
         self._value = np.zeros((self.size, self.size))
 
     @property
@@ -64,6 +65,11 @@ class Jacobian:
         if self._at is not None and not renew:
             return self._value
         value = self._of_rates(state) if self._compiled else self._dense(state)
+        self.holding = self.equations.holding
+        if self.holding is not None:
+            rates = slice(self.equations.nv, self.equations.nv + self.equations.n)
+            value = value.copy()
+            value[rates] += self.holding.slopes(state, value[rates])
         self._value, self._at = value, state
         self._counts["jacobians"] += 1
         return value

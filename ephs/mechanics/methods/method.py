@@ -10,7 +10,7 @@ from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Leg, Row, Span
+from ephs.solve.stepping import Attempt, Leg, Row, Span, too_fast
 
 HALVINGS = 4
 """Number of halvings of a failing part of a step whose whole succeeded."""
@@ -80,8 +80,11 @@ class ReducedMethod(ABC):
         except SolveError:
             if not halvings:
                 raise
-        if found is not None and not (halvings and found.error > 1.0 and self.control.step is None):
+        coarse = found is not None and found.error > 1.0 and self.control.step is None
+        if found is not None and not (coarse and (halvings or found.h != h)):
             return found.end
+        if found is not None and not halvings:  # left unfinished
+            raise too_fast(self.name, found.worst, h)
         middle = self._part(state, 0.5 * h, halvings - 1)
         return self._part(middle, 0.5 * h, halvings - 1)
 

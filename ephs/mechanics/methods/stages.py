@@ -98,7 +98,7 @@ class Stages:
         SolveError
             The iteration does not converge, or a component cannot be evaluated.
         """
-        if self._stale:
+        if self._stale or self.jacobian.holding is not self.equations.holding:
             self._renew(state)
         try:
             return self._solve(state, y0, h)

@@ -20,6 +20,7 @@ from ephs.mechanics.tree.finding.naming import counted
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY
 from ephs.solve.control import Control
@@ -97,7 +98,7 @@ class Variational(ReducedMethod):
         if self._driven.size:  # the work of prescribed motions: their impulses at both ends of the step
             impulse = mass @ closed.r - after
             rows = eq.rows()
-            second = np.linalg.lstsq(rows.T, impulse, rcond=CONSTRAINT)[0][: self._driven.size]
+            second = least_squares(rows.T, impulse, part=CONSTRAINT)[: self._driven.size]
             first = push[: self._driven.size]
             work += float(first @ state.r[self._driven] + second @ closed.r[self._driven])
         closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
@@ -233,5 +234,5 @@ def _least(matrix: Array, before: Array, rows: Array, first: Array, second: Arra
     size = float(np.abs(matrix).max())
     whole = np.block([[matrix / size, -before.T], [rows, np.zeros((m, m))]])
     right = np.concatenate([first / size, second])
-    found = np.asarray(np.linalg.lstsq(whole, right, rcond=CONSTRAINT)[0], dtype=float)
+    found = np.asarray(least_squares(whole, right, part=CONSTRAINT), dtype=float)
     return found[:n], size * found[n:]

@@ -14,6 +14,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Input
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import pseudoinverse, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.instant import instant
 from ephs.solve.motion_law import MotionLaw
@@ -124,7 +125,7 @@ class GeneralMotion:
 
 def _nearest(known: Array, unknown: Array, right: Array, twists: Array, roots: list[Array]) -> tuple[Array, Array]:
     """Twists nearest to the given ones in the mass metric with known·u + unknown·r = right, and such r."""
-    inverse = np.linalg.pinv(unknown, rcond=CONSTRAINT) if unknown.shape[2] else np.zeros(unknown.shape).mT
+    inverse = pseudoinverse(unknown, part=CONSTRAINT) if unknown.shape[2] else np.zeros(unknown.shape).mT
     whitened = np.zeros_like(known)
     for i, root in enumerate(roots):
         where = slice(6 * i, 6 * i + 6)
@@ -134,7 +135,7 @@ def _nearest(known: Array, unknown: Array, right: Array, twists: Array, roots: l
     out = twists.copy()
     if roots:
         kept = whitened - unknown @ (inverse @ whitened)
-        shift = np.einsum("nij,nj->ni", np.linalg.pinv(kept, rcond=CONSTRAINT), rest)
+        shift = np.einsum("nij,nj->ni", pseudoinverse(kept, part=CONSTRAINT), rest)
         for i, root in enumerate(roots):
             where = slice(6 * i, 6 * i + 6)
             out[:, where] -= shift[:, where] @ root
@@ -143,5 +144,5 @@ def _nearest(known: Array, unknown: Array, right: Array, twists: Array, roots: l
 
 def _root(inertia: Array) -> Array:
     """(6, 6) symmetric root of the inverse of an inertia, its moments taken without their signs."""
-    moments, axes = np.linalg.eigh(inertia)
+    moments, axes = symmetric_eigen(inertia)
     return np.asarray((axes / np.sqrt(np.abs(moments))) @ axes.T, dtype=float)

@@ -19,6 +19,7 @@ from ephs.mechanics.constraints.holding import annihilator
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -200,7 +201,7 @@ def _wrench_outward(turn: Array, at: Array, wrenches: Array) -> Array:
 
 def _solved(rows: Array, right: Array) -> tuple[Array, Array]:
     """Least-norm solution of equations and their null space: (m,) and orthonormal columns (m, k)."""
-    left, sigma, columns = np.linalg.svd(rows)
+    left, sigma, columns = svd(rows)
     rank = rank_of(sigma, CONSTRAINT, 1.0)
     return columns[:rank].T @ ((left.T @ right)[:rank] / sigma[:rank]), columns[rank:].T
 

@@ -21,6 +21,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import nearest_of
 from ephs.solve.problem import State
@@ -299,7 +300,7 @@ class StateView(Mapping[Path, Array]):
                     right[at : at + 6] -= block @ twist(twists, body)
             rows[at : at + 6, column : column + link.coupling.dim] = -link.coupling.basis(x)
             column += link.coupling.dim
-        found = np.linalg.lstsq(rows, right, rcond=None)[0]
+        found = least_squares(rows, right)
         return np.asarray(found[:first], dtype=float).reshape(-1, 6)
 
 

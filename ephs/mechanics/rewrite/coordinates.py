@@ -18,6 +18,7 @@ from ephs.mechanics.tree.finding.mechanism import Reduced, reduce_system
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, rank_of
 from ephs.solve.errors import OptionError
 from ephs.solve.model import compile_model
@@ -147,7 +148,7 @@ def cyclic(reduced: Reduced, part: Part) -> Subgroup:
     kept = _invariance(reduced.gravity)
     if not free.shape[1] or not kept.shape[1]:
         return none
-    left, sizes, _ = np.linalg.svd(np.linalg.qr(free)[0].T @ kept)
+    left, sizes, _ = svd(np.linalg.qr(free)[0].T @ kept)
     return Subgroup(np.linalg.qr(free)[0] @ left[:, : int(np.sum(sizes > 1.0 - ASSEMBLY))])
 
 
@@ -172,7 +173,7 @@ def _invariance(gravity: Array) -> Array:
     if size == 0.0:
         return np.eye(6)
     down = gravity / size
-    level = np.linalg.svd(down[None, :])[2][1:].T
+    level = svd(down[None, :])[2][1:].T
     out = np.zeros((6, 3))
     out[:3, 0], out[3:, 1:] = down, level
     return out
@@ -257,10 +258,10 @@ def _rank(reduced: Reduced, found: Sequence[Loop]) -> int:
         for link, sign in loop.way:
             row[:, at[link] : at[link] + int(t.dim[link])] += sign * reduced.twists[link]
         within = loop.group.basis
-        u, sizes, _ = np.linalg.svd(within.T @ reduced.twists[loop.edge], full_matrices=True)
+        u, sizes, _ = svd(within.T @ reduced.twists[loop.edge])
         out.append((within @ u[:, int(np.sum(sizes > ASSEMBLY)) :]).T @ row)
     matrix = np.vstack(out) if out else np.zeros((0, 1))
-    sizes = np.linalg.svd(matrix, compute_uv=False)
+    sizes = singular_values(matrix)
     return rank_of(sizes, CONSTRAINT)
 
 
@@ -328,7 +329,7 @@ def _centre(group: Subgroup) -> Array:
     for w, v in zip(group.basis[:3].T, group.basis[3:].T, strict=True):
         rows.append(-np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]]))
         right.append(v)
-    return np.asarray(np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0], dtype=float)
+    return np.asarray(least_squares(np.vstack(rows), np.concatenate(right)), dtype=float)
 
 
 def _vector(values: Array) -> str:

@@ -14,6 +14,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 
 ROUNDING = 1e-12
@@ -296,7 +297,7 @@ def _moves(draft: Draft, momentum: Path) -> Array:
         for joint, forward in way:
             span = _carried(joint, forward, span, rng)
         columns.append(span)
-    u, sizes, _ = np.linalg.svd(np.hstack(columns))
+    u, sizes, _ = svd(np.hstack(columns))
     return u[:, : rank_of(sizes, CONSTRAINT)] if sizes.size and sizes[0] > 0.0 else np.zeros((6, 0))
 
 

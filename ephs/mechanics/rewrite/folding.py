@@ -15,6 +15,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import IMPLICIT
 
 NAME = "fold a transformer"
@@ -43,7 +44,7 @@ def _map(columns: Mapping[Path, Array], size: float, inner: Path) -> tuple[Array
     others = [j for j in columns if j != inner]
     if block.shape[0] != block.shape[1] or len(others) > 1:
         return None
-    if not np.linalg.svd(block, compute_uv=False)[-1] > IMPLICIT * size:
+    if not singular_values(block)[-1] > IMPLICIT * size:
         return None
     if not others:
         return np.zeros((block.shape[0], 0)), None

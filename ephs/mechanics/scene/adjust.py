@@ -13,6 +13,7 @@ import numpy as np
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import least_squares, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, LIGHT
 from ephs.solve.threads import in_one_thread
 
@@ -25,7 +26,7 @@ def mass_roots(masses: Array, inertias: Array) -> Array:
     lightest = _least(masses)
     least = _least(np.trace(inertias, axis1=1, axis2=2))
     for root, mass, inertia in zip(roots, masses, inertias, strict=True):
-        moments, axes = np.linalg.eigh(inertia)
+        moments, axes = symmetric_eigen(inertia)
         root[:3, :3] = axes @ np.diag(np.maximum(moments, least) ** -0.5) @ axes.T
         root[3:, 3:] = max(mass, lightest) ** -0.5 * np.eye(3)
     return roots
@@ -111,7 +112,7 @@ def _across(link: Link, x: Array, scale: Scale) -> Array:
     basis = scale.weights @ link.coupling.basis(x)
     if not basis.shape[1]:
         return scale.weights
-    return scale.weights @ np.linalg.svd(basis, full_matrices=True)[0][:, basis.shape[1] :]
+    return scale.weights @ svd(basis)[0][:, basis.shape[1] :]
 
 
 def _row(link: Link, x: Array, forbidden: Array, roots: Array) -> Array:
@@ -125,7 +126,7 @@ def _row(link: Link, x: Array, forbidden: Array, roots: Array) -> Array:
 
 def _least_change(matrix: Array, target: Array) -> Array:
     """The shortest of the solutions that are best by least squares."""
-    return np.asarray(np.linalg.lstsq(matrix, target, rcond=CONSTRAINT)[0], dtype=np.float64)
+    return np.asarray(least_squares(matrix, target, part=CONSTRAINT), dtype=np.float64)
 
 
 def _steps(roots: Array, change: Array) -> Array:

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.surfaces import Contact
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import INERTIA
 
 
@@ -137,14 +138,14 @@ def _put_inertia(scene: Scene, name: str, values: Array) -> Scene:
 def _body_faults(scene: Scene, name: str, before: Scene) -> list[Fault]:
     """An inertia that no mass distribution has."""
     body, key = scene.body(name), f"bodies.{name}.inertia"
-    moments = np.linalg.eigvalsh(body.inertia)
+    moments = symmetric_eigenvalues(body.inertia)
     slack = INERTIA * float(np.abs(moments).max())
     text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
     if body.mass == 0.0 and body.inertia.any():
         return [fault("massless", key, text)]
     if moments[0] < -slack:
         return [fault("inertia indefinite", key, text)]
-    old = np.linalg.eigvalsh(before.body(name).inertia)
+    old = symmetric_eigenvalues(before.body(name).inertia)
     sound = old[2] <= old[0] + old[1] + INERTIA * float(np.abs(old).max())
     if sound and moments[2] > moments[0] + moments[1] + slack:
         return [fault("inertia triangle", key, text)]
@@ -282,7 +283,7 @@ def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
 
 
 def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
-    moments = np.linalg.eigvalsh(scene.joint(name).friction)
+    moments = symmetric_eigenvalues(scene.joint(name).friction)
     if moments.size and moments[0] < -INERTIA * float(np.abs(moments).max()):
         return [fault("friction sign", f"joints.{name}.friction", f"the eigenvalue {moments[0]:.6g}")]
     return []

@@ -14,6 +14,7 @@ from ephs.mechanics.scene.attached import Attachment, Cylinder, GasSpring, Gear,
 from ephs.mechanics.scene.model import Scene, frozen
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import pseudoinverse
 
 
 def tied(scene: Scene, now: Mapping[str, Array], given: Mapping[str, Array]) -> dict[str, Array]:
@@ -31,7 +32,7 @@ def tied(scene: Scene, now: Mapping[str, Array], given: Mapping[str, Array]) -> 
         free = sorted({name for row in moved for name in row} - known)
         matrix = np.array([[row.get(name, 0.0) for name in free] for row in moved])
         change = [sum(x * float((out[j] - now[j])[0]) for j, x in row.items() if j in known) for row in moved]
-        for name, step in zip(free, -np.linalg.pinv(matrix) @ change, strict=True):
+        for name, step in zip(free, -pseudoinverse(matrix) @ change, strict=True):
             out[name] = now[name] + step
         known |= set(free)
     return out

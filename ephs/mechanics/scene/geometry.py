@@ -15,6 +15,7 @@ from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.codes import SE3 as SE3_CODE
 from ephs.semantics.spaces.codes import SO3 as SO3_CODE
+from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.spaces.rank import ALIGNED, DIRECTION
 
@@ -69,7 +70,7 @@ class Coupling:
 
     def left_inverse(self, basis: Array) -> Array:
         """(d, 6) of least norm with B⁺ B = 1, of a basis (6, d) that `basis` gave."""
-        return left_inverse(self.pair) if self.middle is None else np.asarray(np.linalg.pinv(basis), dtype=float)
+        return left_inverse(self.pair) if self.middle is None else np.asarray(pseudoinverse(basis), dtype=float)
 
     def coordinates(self, x: Array) -> Array:
         """The coordinates (d,) of an element."""

@@ -12,6 +12,7 @@ from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import symmetric_eigen, symmetric_eigenvalues
 
 TINY = 1e-11
 """Kinetic energy is a function of momentum only where no principal moment is zero: one that is counts as this much of
@@ -41,7 +42,7 @@ def mass_and_inertia(
         return mass, tensor
     if not tensor.any() and mass == 0.0:
         return mass, tensor
-    principal = np.linalg.eigvalsh(tensor)
+    principal = symmetric_eigenvalues(tensor)
     wrong = _wrong(principal)
     if strict:
         if not wrong and principal[0] <= 0.1 * TINY * principal[2]:
@@ -51,9 +52,9 @@ def mass_and_inertia(
         return mass, tensor
     if wrong and mode == "nearest":
         tensor = nearest_inertia(tensor)
-        odd.append(fault("inertia nearest", where, _text(principal), taken=_text(np.linalg.eigvalsh(tensor))))
+        odd.append(fault("inertia nearest", where, _text(principal), taken=_text(symmetric_eigenvalues(tensor))))
     mass, tensor = _regular(mass, tensor, key, odd)
-    principal = np.linalg.eigvalsh(tensor)
+    principal = symmetric_eigenvalues(tensor)
     if mode == "warn" and _wrong(principal):
         odd.append(fault("inertia kept", where, _text(principal)))
     return mass, tensor
@@ -65,7 +66,7 @@ def nearest_inertia(tensor: Array) -> Array:
     The second moments ∫ x xᵀ dm = ½ tr(I) − I of a distribution of mass have no negative eigenvalue; those that are
     negative become zero.
     """
-    moments, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+    moments, axes = symmetric_eigen(0.5 * np.trace(tensor) * np.eye(3) - tensor)
     second = (axes * np.maximum(moments, 0.0)) @ axes.T
     return np.trace(second) * np.eye(3) - second
 
@@ -79,7 +80,7 @@ def _wrong(moments: NDArray[Any]) -> str:
 
 def _regular(mass: float, tensor: Array, key: str, odd: list[Fault]) -> tuple[float, Array]:
     """The same with no mass and no principal moment at zero."""
-    moments, axes = np.linalg.eigh(tensor)
+    moments, axes = symmetric_eigen(tensor)
     largest = float(np.abs(moments).max())
     if mass == 0.0:
         mass = TINY * largest

@@ -21,6 +21,7 @@ from ephs.mechanics.scene.model import Scene, frozen, mapped
 from ephs.mechanics.scene.state import Snapshot, rebuilt
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of
 from ephs.solve.threads import in_one_thread
 
@@ -42,7 +43,7 @@ def as_meant(scene: Scene) -> tuple[Scene, str, list[Fault]]:
     if len(now.bodies) > LARGEST or len(now.links) <= len(now.bodies):  # no loop
         return scene, "", []
     scale, links = now.scale(scene.world.gravity), now.links
-    _, sigma, vt = np.linalg.svd(_matrix(links, now.poses, scale), full_matrices=True)
+    _, sigma, vt = svd(_matrix(links, now.poses, scale))
     low, high = rank_of(sigma, EXPLICIT), rank_of(sigma, ROUNDING)
     if low == high:
         return scene, "", []
@@ -77,7 +78,7 @@ def is_shaky(scene: Scene) -> bool:
     if len(now.bodies) > LARGEST or len(now.links) <= len(now.bodies):  # no loop
         return False
     scale, links = now.scale(scene.world.gravity), now.links
-    _, sigma, vt = np.linalg.svd(_matrix(links, now.poses, scale), full_matrices=True)
+    _, sigma, vt = svd(_matrix(links, now.poses, scale))
     free = vt[rank_of(sigma, EXPLICIT) :]
     sums = [one + two for one, two in combinations(free, 2)]
     return len(free) > 0 and not any(
@@ -124,7 +125,7 @@ def _followed(links: Sequence[Link], poses: Array, way: Array, rank: int, scale:
         poses = _stepped(poses, STRIDE / np.abs(way).max() * way, scale)
         for _ in range(ROUNDS + 2):
             poses = _stepped(poses, -_solved(links, poses, scale), scale)
-        _, sigma, vt = np.linalg.svd(_matrix(links, poses, scale), full_matrices=True)
+        _, sigma, vt = svd(_matrix(links, poses, scale))
         moves = [SE3.log(SE3.compose(SE3.inverse(a), b)) / unit for a, b in zip(start, poses, strict=True)]
         opened = largest_gap(links, poses, elements(links, poses), scale) > EXPLICIT * STRIDE
         if opened or rank_of(sigma, EXPLICIT) > rank or not np.abs(moves).max() > 0.5 * STRIDE:
@@ -140,7 +141,7 @@ def _followed(links: Sequence[Link], poses: Array, way: Array, rank: int, scale:
 def _solved(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
     """The change that closes joints best, along all that they clearly forbid."""
     errors = _errors(links, poses, scale)
-    return np.asarray(np.linalg.lstsq(_matrix(links, poses, scale), errors, rcond=EXPLICIT)[0], dtype=np.float64)
+    return np.asarray(least_squares(_matrix(links, poses, scale), errors, part=EXPLICIT), dtype=np.float64)
 
 
 def _errors(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
@@ -170,7 +171,7 @@ def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -
                 block[:, 6 * m + 6 * n * k : 6 * m + 6 * n * (k + 1)] = rows
                 blocks.append(block)
             errors.append(_errors(links, poses, scale))
-        found = np.linalg.lstsq(np.vstack(blocks), np.concatenate(errors), rcond=EXPLICIT)[0]
+        found = least_squares(np.vstack(blocks), np.concatenate(errors), part=EXPLICIT)
         change: Array = -np.asarray(found, dtype=np.float64)
         links = tuple(
             replace(link, frame2=SE3.normalise(SE3.retract(link.frame2, unit * step)))
@@ -179,7 +180,7 @@ def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -
         shifts = change[6 * m :].reshape(len(configurations), -1)
         configurations = [_stepped(poses, shift, scale) for poses, shift in zip(configurations, shifts, strict=True)]
     gaps = [largest_gap(links, poses, elements(links, poses), scale) for poses in configurations]
-    sigma = np.linalg.svd(_matrix(links, configurations[0], scale), compute_uv=False)
+    sigma = singular_values(_matrix(links, configurations[0], scale))
     if max(gaps) > 10.0 * ROUNDING or rank_of(sigma, EXPLICIT) != rank_of(sigma, ROUNDING):
         return None
     return tuple(links), configurations[0]

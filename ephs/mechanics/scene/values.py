@@ -7,6 +7,7 @@ import numpy as np
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 
 TOLERANCE = 1e-9
 QUATERNION_TOLERANCE = 1e-6
@@ -61,7 +62,7 @@ def friction(value: Any, d: int, key: str, faults: list[Fault]) -> Array:
     scale = float(np.abs(matrix).max(initial=0.0))
     if scale and np.abs(matrix - matrix.T).max() > TOLERANCE * scale:
         faults.append(fault("friction asymmetric", key, shown(value)))
-    elif scale and np.linalg.eigvalsh(matrix)[0] < -TOLERANCE * scale:
+    elif scale and symmetric_eigenvalues(matrix)[0] < -TOLERANCE * scale:
         faults.append(fault("friction sign", key, shown(value)))
     return 0.5 * (matrix + matrix.T)
 

@@ -22,6 +22,7 @@ from ephs.mechanics.tree.sweeps.cuts import Cut
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.march import Status
@@ -290,7 +291,7 @@ class ExplicitTangent:
             if of == TIE:  # its row is shared with others
                 continue
             rows = row[where].reshape(6, 6)
-            row[where] = (own[where].reshape(6, 6) @ np.linalg.pinv(rows) @ rows).ravel()
+            row[where] = (own[where].reshape(6, 6) @ pseudoinverse(rows) @ rows).ravel()
         return out.ravel()
 
     # ---- what is kept ------------------------------------------------------------------------------------------

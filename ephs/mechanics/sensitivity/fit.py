@@ -11,6 +11,7 @@ from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
@@ -223,7 +224,7 @@ class _Runs:
 def _covariance(jacobian: Array, deviation: float) -> tuple[Array, Array]:
     """Covariance of the parameters, and standard errors; infinite along what the record does not determine."""
     size = np.maximum(np.linalg.norm(jacobian, axis=0), TINY)
-    _, sigma, vt = np.linalg.svd(jacobian / size, full_matrices=False)
+    _, sigma, vt = svd(jacobian / size, full_matrices=False)
     seen = sigma > ELIMINATION * sigma.max(initial=0.0)
     half = (vt[seen].T / sigma[seen]) / size[:, None]
     covariance = deviation**2 * half @ half.T

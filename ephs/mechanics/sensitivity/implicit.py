@@ -17,6 +17,7 @@ from ephs.mechanics.tree.engine.tangents import DIRECTIONS
 from ephs.semantics.bundle import Array
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, vector
 from ephs.solve.errors import OptionError, SolveError
@@ -194,7 +195,7 @@ class NaturalTangent:
                 return np.asarray(np.linalg.solve(matrix / rows, right / rows), dtype=float)
             except np.linalg.LinAlgError:
                 pass
-        return np.asarray(np.linalg.lstsq(matrix / rows, right / rows, rcond=IMPLICIT)[0], dtype=float)
+        return np.asarray(least_squares(matrix / rows, right / rows, part=IMPLICIT), dtype=float)
 
     def _by(self, number: int, function: Callable[[_Side], Array]) -> Array:
         """The derivative of what a model is evaluated from by a parameter."""

@@ -8,6 +8,7 @@ from typing import Final, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import svd
 
 FLAT: Final = 1e-5
 """Relative tolerance within which triangles are one face: that of files in single precision."""
@@ -120,7 +121,7 @@ def _face(plane: Array, corners: Array, tolerance: float) -> Face | None:
     on = np.flatnonzero(np.abs(corners @ normal - offset) <= tolerance)
     if on.size < 3:
         return None
-    across = np.linalg.svd(normal[None])[2][1:]
+    across = svd(normal[None])[2][1:]
     if np.linalg.det([*across, normal]) < 0.0:
         across = across[::-1]
     flat = (corners[on] - corners[on].mean(axis=0)) @ across.T

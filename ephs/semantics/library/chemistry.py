@@ -21,6 +21,7 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import dissipated, stored
 from ephs.semantics.library.made import finite, positive
 from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.special import log_mean
 
 __all__ = [
@@ -227,7 +228,7 @@ def element_potentials(potentials: Mapping[Species, float]) -> dict[str, float]:
     """
     elements = sorted({element for one in potentials for element, _ in one.elements})
     rows = np.array([[dict(one.elements).get(element, 0.0) for element in elements] for one in potentials])
-    found = np.linalg.lstsq(rows, np.array(list(potentials.values())), rcond=None)[0]
+    found = least_squares(rows, np.array(list(potentials.values())))
     return dict(zip(elements, map(float, found), strict=True))
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from ephs.operad.quantities import name_pair
 from ephs.semantics.spaces import codes, groups
 from ephs.semantics.spaces import rotations as so3
+from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.spaces.errors import SpaceError
 from ephs.semantics.spaces.manifold import Array, Manifold, register_manifold
 
@@ -145,7 +146,7 @@ class Pair:
 @cache
 def left_inverse(of: Pair) -> Array:
     """(d, 6), read-only: the least matrix B⁺ with B⁺ B = 1."""
-    out = np.asarray(np.linalg.pinv(of.basis), dtype=float)
+    out = np.asarray(pseudoinverse(of.basis), dtype=float)
     out.setflags(write=False)
     return out
 

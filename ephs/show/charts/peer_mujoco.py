@@ -9,6 +9,7 @@ import numpy as np
 
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
 from ephs.show.charts.peer_scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, Ending, Setting
@@ -121,7 +122,7 @@ def mjcf(given: PeerScene, method: str, step: float) -> str:
         body = bodies[branch.outer]
         base = SE3.identity() if branch.inner == GROUND else bodies[branch.inner].pose
         pose = SE3.compose(SE3.inverse(base), body.pose)
-        values, axes = np.linalg.eigh(body.inertia)
+        values, axes = symmetric_eigen(body.inertia)
         axes[:, 2] *= np.linalg.det(axes)
         turn = _text(matrix_to_quaternion(axes))
         own = f'<inertial pos="0 0 0" quat="{turn}" mass="{body.mass!r}" diaginertia="{_text(values)}"/>'

@@ -11,6 +11,7 @@ import numpy as np
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import Method, on_joints
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import FOLLOWED
 from ephs.show.charts.runs import Array
 from ephs.solve.control import Control
@@ -52,7 +53,7 @@ class _OnLoops(ReducedMethod):
                 return z
             before = size
             columns = [(residual(z + DIFFERENCE * unit) - here) / DIFFERENCE for unit in np.eye(z.size)]
-            z = z - np.linalg.lstsq(np.column_stack(columns), here, rcond=FOLLOWED)[0]
+            z = z - least_squares(np.column_stack(columns), here, part=FOLLOWED)
         raise SolveError(Outcome.DIVERGED, "", "")
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.linear.sparse import sparse_lu
+from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING, Order, OrderOf
@@ -260,7 +261,7 @@ def _compliance(model: Model, values: Array) -> Any:
         these = storing[t.dims[storing, 0] == n]
         places = t.jacobian[t.jacobian_at[these, None] + np.arange(n * n)]
         block = -np.where(places >= 0, values[places], 0.0).reshape(-1, n, n)
-        sigma, vectors = np.linalg.eigh(0.5 * (block + block.swapaxes(1, 2)))
+        sigma, vectors = symmetric_eigen(0.5 * (block + block.swapaxes(1, 2)))
         sound = (sigma[:, -1] > 0.0) & (sigma[:, 0] > REGULAR * sigma[:, -1])
         index = t.e_index[t.e_at[these[sound], None] + np.arange(n)]
         rows.append(np.repeat(index, n, axis=1).ravel())
@@ -282,7 +283,7 @@ def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
     matrix = np.zeros((size, size))
     np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
     matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)[:, None]
-    _, sizes, vectors = np.linalg.svd(matrix)
+    _, sizes, vectors = svd(matrix)
     least = min(rank_of(sizes, IMPLICIT), size - 1)
     moved = np.linalg.norm(vectors[least:], axis=0)
     return int(np.flatnonzero(moved >= (1.0 - ALIKE) * moved.max())[0])

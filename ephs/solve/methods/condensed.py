@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.numbering import Index, starts
+from ephs.semantics.spaces.decompositions import least_squares, singular_values
 from ephs.semantics.spaces.rank import IMPLICIT
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.stored import guessed_efforts
@@ -121,9 +122,10 @@ class _System:
             return found
         matrix = np.zeros((rows.size, columns.size))
         np.add.at(matrix, at, self.value)
-        if rows.size and np.linalg.cond(matrix) < 1.0 / IMPLICIT:  # scaling preserves the digits of small unknowns
+        sizes = singular_values(matrix) if rows.size else np.zeros(1)
+        if sizes[-1] > IMPLICIT * sizes[0]:  # scaling preserves the digits of small unknowns
             return np.linalg.solve(matrix, self.right[rows]).astype(float)
-        return np.asarray(np.linalg.lstsq(matrix, self.right[rows], rcond=IMPLICIT)[0], dtype=float)
+        return np.asarray(least_squares(matrix, self.right[rows], part=IMPLICIT), dtype=float)
 
 
 @final

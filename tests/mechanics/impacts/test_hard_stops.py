@@ -185,3 +185,76 @@ def test_joints_carry_what_hard_contacts_and_stops_press(tmp_path):
     stopped = sliding(tmp_path, "limits = [0.0, nan]\nlimit_restitution = 0.0", gravity=G)
     wrench = run(stopped, 0.1, "rk54", 2.0**-5).joint("slide").wrench[-1]
     assert wrench == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0, 2.0 * G], abs=1e-5)
+
+
+SPRUNG = """
+[bodies.light]
+mass = {mass}
+inertia = [{mass}, {mass}, {mass}]
+[bodies.heavy]
+mass = 1.0
+inertia = [0.004, 0.004, 0.004]
+position = [0.0, 0.0, {at}]
+[joints.light]
+type = "prismatic"
+bodies = ["ground", "light"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+stiffness = {stiffness}
+friction = {friction}
+[joints.heavy]
+type = "prismatic"
+bodies = {bodies}
+at = [0.0, 0.0, {at}]
+axis = [0.0, 0.0, 1.0]
+rate = -1.0
+"""
+STOPPED = "limits = [-0.1, nan]\nlimit_restitution = 0.0\n"
+MET = """
+[surfaces.light]
+body = "light"
+shape = { plane = {} }
+restitution = 0.0
+[surfaces.heavy]
+body = "heavy"
+shape = { sphere = 0.1 }
+restitution = 0.0
+[contacts.blow]
+surfaces = ["light", "heavy"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("met", "method", "most", "mass", "stiffness"),
+    [
+        ("stop", "rk87", 25, 1e-3, 2000.0), ("stop", "rk87", 25, 1e-5, 2000.0), ("stop", "rk87", 25, 1e-3, 0.0),
+        ("stop", "gauss4", 60, 1e-3, 2000.0), ("stop", "radau", 80, 1e-3, 2000.0),
+        ("contact", "rk87", 25, 1e-3, 2000.0),
+    ],
+)  # fmt: skip
+def test_a_light_body_with_much_friction_rests_on_a_heavy_one(met, method, most, mass, stiffness, tmp_path):
+    """After the blow both move as one oscillator: (m₁ + m₂) ẍ + c ẋ + k x = 0. Steps follow that, not the light body's
+    own c/m₁, which is up to 10⁵ times faster."""
+    friction, way, until = 20.0, 0.1, 0.15
+    bodies = '["light", "heavy"]' if met == "stop" else '["ground", "heavy"]'
+    text = SPRUNG.format(mass=mass, at=2.0 * way, stiffness=stiffness, friction=friction, bodies=bodies)
+    sol = run(scene_of(tmp_path, text + (STOPPED if met == "stop" else MET)), until, method, max_steps=most)
+    m = 1.0 + mass
+    roots = np.roots([m, friction, stiffness]).astype(complex)
+    parts = np.linalg.solve(np.vander(roots, increasing=True).T, [0.0, -1.0 / m])
+    at = parts @ np.exp(roots * (until - way))
+    assert sol.joint("light").coordinate[-1, 0] == pytest.approx(at.real, abs=1e-6)
+    assert sol.stats["steps"] + sol.stats["rejected"] <= most
+
+
+def test_a_step_that_is_rejected_ends_where_its_error_shows(tmp_path):
+    """A rebound leaves a light body in stiff flight; no part of such a step is taken after its error is known."""
+    scene = scene_of(
+        tmp_path,
+        SPRUNG.format(
+            mass=1e-3, at=0.2, stiffness=2000.0, friction=20.0,
+            bodies='["light", "heavy"]',
+        ) + "limits = [-0.1, nan]\nlimit_restitution = 0.5\n",
+    )  # fmt: skip
+    sol = run(scene, 0.11)
+    assert sol.stats["parts"] <= 300

@@ -15,6 +15,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ASSEMBLY, TINY
 from ephs.solve.sparse import Index
 
@@ -74,7 +75,7 @@ def _of_gravity(reduced: "Reduced") -> Array:
     size = float(np.linalg.norm(pull))
     if size == 0.0:
         return np.zeros((6, 0))
-    axes = np.linalg.svd(pull[:, None])[0]
+    axes = svd(pull[:, None])[0]
     return np.vstack([np.column_stack([np.zeros(3), axes[:, 1:]]), np.column_stack([axes[:, 0], np.zeros((3, 2))])])
 
 
@@ -94,5 +95,5 @@ def complement(columns: Array) -> Array:
     if not columns.shape[1]:
         return np.eye(6)
     whole = np.hstack([columns / max(float(np.linalg.norm(columns, axis=0).max()), TINY), np.zeros((6, 6))])
-    left, sizes, _ = np.linalg.svd(whole, full_matrices=False)  # there may be thousands of columns
+    left, sizes, _ = svd(whole, full_matrices=False)  # there may be thousands of columns
     return np.asarray(left[:, int(np.sum(sizes > ASSEMBLY)) :])

@@ -21,7 +21,7 @@ from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.prescribed import Prescribed
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.mechanics.tree.equations.stages import evaluated
-from ephs.mechanics.tree.equations.state import ReducedState
+from ephs.mechanics.tree.equations.state import Holding, ReducedState
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
@@ -70,7 +70,6 @@ class Equations:
         self._moving = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
         self.careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
-        self._q = np.zeros(reduced.coordinates)
         self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
         self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
         self.prescribed = Prescribed(reduced)
@@ -91,11 +90,10 @@ class Equations:
         self.constant, self.held = problem.constant, problem.held and not problem.constant
         self.steady, self.timed = self.constant or self.held, problem.timed
         self._paper, self.layout = PaperStates(reduced, problem), Layout.of(reduced)
-        self.booking = Booking(self, self._paper)
-        self.evaluations, self.accounts = 0, Accounts(self)
-        self.gravity = reduced.gravity
-        self.driven = self.prescribed.freedoms
+        self.booking, self.accounts, self.evaluations = Booking(self, self._paper), Accounts(self), 0
+        self.gravity, self.driven = reduced.gravity, self.prescribed.freedoms
         self._momenta = False
+        self.holding: Holding | None = None
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
 
@@ -139,6 +137,8 @@ class Equations:
             status, component = self.dense.rates(q, y, self.given, self.heats, out)
             self.engine.velocities(y, y[self.nv : self.nv + self.n], out)
         self.refuse(status, component)
+        if self.holding is not None:
+            out[nv : nv + n] += self.holding(t, q, y[nv : nv + n], out[nv : nv + n])
         return out
 
     def stages(

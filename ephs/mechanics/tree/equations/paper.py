@@ -13,6 +13,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3, manifold
+from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigen
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.problem import Problem
@@ -172,7 +173,7 @@ class PaperStates:
                 here = int(tables.parent[here])
             own = twists[i] - carried @ twists[here]
             root = _root(tables.inertia[i])  # what hardly has inertia knows little of its twist
-            rates[freedoms] = np.linalg.lstsq(root @ np.column_stack(columns), root @ own, rcond=None)[0]
+            rates[freedoms] = least_squares(root @ np.column_stack(columns), root @ own)
         return rates
 
     def _joint(self, q: Array, i: int) -> tuple[Array, Array]:
@@ -188,5 +189,5 @@ class PaperStates:
 
 def _root(inertia: Array) -> Array:
     """A symmetric root (6, 6) of an inertia, its size taken where it is negative."""
-    moments, axes = np.linalg.eigh(inertia)
+    moments, axes = symmetric_eigen(inertia)
     return (axes * np.sqrt(np.abs(moments))) @ axes.T

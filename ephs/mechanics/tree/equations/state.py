@@ -1,7 +1,7 @@
 """State of a mechanism in joint coordinates, and sums since the start."""
 
 from dataclasses import dataclass, field
-from typing import final
+from typing import Protocol, final
 
 import numpy as np
 
@@ -34,3 +34,15 @@ class ReducedState:
     totals: Array
     memory: tuple[Array, ...] = ()
     account: Array = field(default_factory=lambda: np.zeros(0))
+
+
+class Holding(Protocol):
+    """Forces that act besides, from what the accelerations would be without them: of closed contacts."""
+
+    def __call__(self, t: float, q: Array, r: Array, rates: Array) -> Array:
+        """(n,) what they add to the accelerations."""
+        ...
+
+    def slopes(self, state: ReducedState, free: Array) -> Array:
+        """(n, size) what they add to slopes of the accelerations."""
+        ...

@@ -19,6 +19,7 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept, once
 from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError
@@ -315,7 +316,7 @@ def _complement(basis: Array, group: Array, length: float) -> Array:
     scale = np.array([length] * 3 + [1.0] * 3)
     whole = np.linalg.qr(scale[:, None] * group)[0] if group.shape[1] < 6 else np.eye(6)
     if basis.shape[1]:
-        left, sizes, _ = np.linalg.svd(whole.T @ (scale[:, None] * basis), full_matrices=True)
+        left, sizes, _ = svd(whole.T @ (scale[:, None] * basis))
         whole = whole @ left[:, sizes.size :]
     return scale * whole.T
 

@@ -1,0 +1,93 @@
+"""Decompositions where LAPACK's fast drivers fail: the slow ones give the same, and what is not finite is named."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs.semantics.spaces import decompositions as of
+
+EPS = np.finfo(float).eps
+SHAPES = st.tuples(st.integers(0, 3), st.integers(1, 7), st.integers(1, 7))
+
+
+def failing(*_args, **_options):
+    raise np.linalg.LinAlgError("SVD did not converge")
+
+
+def drawn(shape, seed, rank):
+    """(count, m, n) matrices, or one (m, n), of at most a rank."""
+    count, m, n = shape
+    rng = np.random.default_rng(seed)
+    out = rng.standard_normal((count, m, rank)) @ rng.standard_normal((count, rank, n))
+    return out if count else rng.standard_normal((m, rank)) @ rng.standard_normal((rank, n))
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1), st.integers(1, 7), st.booleans(), st.booleans())
+def test_singular_values_whichever_driver_gives_them(shape, seed, rank, fails, full):
+    a = drawn(shape, seed, rank)
+    with pytest.MonkeyPatch.context() as patch:
+        if fails:
+            patch.setattr(np.linalg, "svd", failing)
+        u, sigma, vt = of.svd(a, full)
+        alone, inverse = of.singular_values(a), of.pseudoinverse(a, 1e-10)
+    k = sigma.shape[-1]
+    near = 8 * sum(a.shape[-2:]) * EPS * max(1.0, sigma.max())
+    assert np.abs((u[..., :k] * sigma[..., None, :]) @ vt[..., :k, :] - a).max() <= near
+    assert np.abs(u.mT @ u - np.eye(u.shape[-1])).max() <= near
+    assert np.abs(alone - sigma).max() <= near
+    assert np.all(np.diff(sigma) <= 0.0)
+    assert u.shape[-1] == (a.shape[-2] if full else k)
+    assert np.abs(a @ inverse @ a - a).max() <= 10.0 * near * max(1.0, np.abs(inverse).max() * sigma.max())
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1), st.integers(1, 7), st.booleans())
+def test_least_squares_have_least_norm_whichever_driver_gives_them(shape, seed, rank, fails):
+    a = drawn((0, *shape[1:]), seed, rank)
+    right = np.random.default_rng(seed).standard_normal((a.shape[0], 2))
+    inverse = of.pseudoinverse(a, 1e-10)
+    with pytest.MonkeyPatch.context() as patch:
+        if fails:
+            patch.setattr(np.linalg, "lstsq", failing)
+        found, one = of.least_squares(a, right, 1e-10), of.least_squares(a, right[:, 0], 1e-10)
+    kappa = max(1.0, float(np.abs(inverse).max() * np.abs(a).max()) * a.size)
+    near = 10.0 * kappa * EPS * a.size * max(1.0, float(np.abs(inverse).max()) * a.shape[0])
+    assert np.abs(found - inverse @ right).max() <= near
+    assert np.abs(one - found[:, 0]).max() <= near
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1), st.booleans())
+def test_eigenvalues_whichever_driver_gives_them(shape, seed, fails):
+    a = drawn((shape[0], shape[1], shape[1]), seed, shape[1])
+    a = a + a.mT
+    with pytest.MonkeyPatch.context() as patch:
+        if fails:
+            patch.setattr(np.linalg, "eigh", failing)
+            patch.setattr(np.linalg, "eigvalsh", failing)
+        values, ways = of.symmetric_eigen(a)
+        alone = of.symmetric_eigenvalues(a)
+    near = 8 * a.shape[-1] * EPS * max(1.0, float(np.abs(values).max()))
+    assert np.abs((ways * values[..., None, :]) @ ways.mT - a).max() <= 4.0 * near
+    assert np.abs(alone - values).max() <= near
+
+
+def test_a_matrix_that_is_not_finite_is_named():
+    a = np.full((3, 2), np.nan)
+    for take in (of.svd, of.singular_values, of.pseudoinverse, lambda m: of.least_squares(m, np.ones(3))):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(np.linalg, "svd", failing)
+            patch.setattr(np.linalg, "lstsq", failing)
+            with pytest.raises(ArithmeticError, match=r"of a matrix of 3 × 2 .*are not finite"):
+                take(a)
+
+
+def test_no_other_place_takes_the_fast_drivers():
+    bare = re.compile(r"np\.linalg\.(svd|svdvals|eigh|eigvalsh|lstsq|pinv|matrix_rank|cond)\(")
+    package = Path(ephs.__file__).parent
+    files = [path for path in package.rglob("*.py") if path.name != "decompositions.py"]
+    found = [f"{path.relative_to(package)}: {line}" for path in files for line in bare.findall(path.read_text("utf-8"))]
+    assert not found
