@@ -309,21 +309,25 @@ class Evaluation:
         self._x, self._z = np.zeros(d.point_size), np.zeros(model.unknowns)
         self._scal, self._inputs, self._sums = model.scal(0.0), inputs, np.zeros(4 + model.tables.kind.size)
         calls, t, m = natural_program().compiled(), parts_of(model.tables), parts_of(self.memory)
-        self._evaluate = calls["evaluate"].bind(t, self._x, self._z, self._scal, self._inputs, m)
+        self._evaluate = calls["evaluate"].bind(t, self._x, self._z, self._scal, self._inputs, m, 0.0)
         self._calls, self._parts = calls, (t, m)
 
-    def at(self, x: Array, z: Array, h: float, inputs: Array | None = None) -> tuple[int, int]:
+    def at(
+        self, x: Array, z: Array, h: float, inputs: Array | None = None, weight: float | None = None
+    ) -> tuple[int, int]:
         """Evaluate at states and unknowns, over a step: (status, component).
 
         Parameters
         ----------
         inputs
             Values at the outer ports, the model's own where None.
+        weight
+            Of derivatives by increments of states in the matrix; h where None.
         """
         self._x[:], self._z[:], self._scal[0] = x, z, h
         given = self.model.input_values() if inputs is None else inputs
         self._inputs[: given.size] = given
-        fault = int(self._evaluate())
+        fault = int(self._evaluate(h if weight is None else weight))
         return fault % FAULTS, fault // FAULTS
 
     def ledgers(self, h: float) -> Array:

@@ -68,7 +68,7 @@ def tangent_program() -> Program:
     def whole(
         on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch, sums: Vector
     ) -> Integer:
-        fault = evaluated(on, t, x, z, scal, inputs, m)
+        fault = evaluated(on, t, x, z, scal, inputs, m, scal[0])
         on.when(on.same(fault, 0), lambda: _counted(on, t, z, scal, inputs, m, sums))
         return fault
 

@@ -111,10 +111,7 @@ class Continuous:
 
         self._evaluate(x, z, 0.0, inputs)
         unknowns = self._memory.data.copy()
-        # Increments of unit length but zero size: the sums are derivatives by the increments.
-        rest = z.copy()
-        rest[: t.counts[0]] = 0.0
-        self._evaluate(x, rest, 1.0, inputs)
+        self._evaluate(x, z, 0.0, inputs, 1.0)
         states = 2.0 * (self._memory.data - unknowns)
         entries, empty = cancelled(self.model, x)
         unknowns[entries] = states[entries] = 0.0
@@ -128,7 +125,7 @@ class Continuous:
         energies = np.where(self.model.tables.kind == STORING, m.energy, 0.0)  # ledgers write to unused memory
         return Instant(self._evaluation.ledgers(1.0), m.flows.copy(), z, energies)
 
-    def _evaluate(self, x: Array, z: Array, h: float, inputs: Array) -> None:
-        status, component = self._evaluation.at(x, z, h, inputs)
+    def _evaluate(self, x: Array, z: Array, h: float, inputs: Array, weight: float | None = None) -> None:
+        status, component = self._evaluation.at(x, z, h, inputs, weight)
         if status:
             raise SolveError.of_component(status, self.model, component)

@@ -204,7 +204,7 @@ def advance(
         return on.negate(once)
 
     def book(i: Integer) -> None:
-        evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m)
+        evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m, still[0])
         weight = on.select(on.same(i, 0), WEIGHTS[0], on.select(on.same(i, 1), WEIGHTS[1], WEIGHTS[2]))
         h = scal[0] * weight
         balance(on, t, z.row(i), h, m, s.whole, h, s.energy)

@@ -250,7 +250,7 @@ def newton(
         on.when(on.same(outcome[0], RUNNING), step)
 
     def iterate() -> Truth:
-        fault = evaluated(on, t, x, z, scal, inputs, m)
+        fault = evaluated(on, t, x, z, scal, inputs, m, scal[0])
 
         def fail() -> None:
             outcome[0], outcome[1] = fault % FAULTS, fault // FAULTS
@@ -333,7 +333,7 @@ def natural_program() -> Program:
             inputs=vector(), sums=vector(), states=matrix(), energies=matrix(), ledgers=matrix(5), outcome=indices(4),
             steps=integer(),
         ),
-        evaluate=Entry(evaluated, t=TABLES, **point, m=MEMORY),
+        evaluate=Entry(evaluated, t=TABLES, **point, m=MEMORY, weight=real()),
         measure=Entry(measure, t=TABLES, z=vector(), dropped=indices(), m=MEMORY),
         account=Entry(account, t=TABLES, z=vector(), h=real(), inputs=vector(), m=MEMORY, sums=vector()),
         reach=Entry(reach, t=TABLES, m=MEMORY),

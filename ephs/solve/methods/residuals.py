@@ -14,9 +14,15 @@ FAULTS: Final = 64
 
 
 @staged
-def evaluated(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch) -> Integer:
-    """Residual, its scale, and the matrix at z; 0, or COMPONENT + status + FAULTS · component."""
-    h, fault = scal[0], on.counter(0)
+def evaluated(
+    on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch, weight: Real
+) -> Integer:
+    """Residual, its scale, and the matrix at z; 0, or COMPONENT + status + FAULTS · component.
+
+    The weight is that of derivatives by increments of states in the matrix: the step, scal[0], for derivatives by rates
+    over the step. With 1 at a step of 0 they are those by the states where they are.
+    """
+    fault = on.counter(0)
     copy(on, t.template, m.data)
     fill(on, m.residual, 0.0)
     fill(on, m.scale, 0.0)
@@ -30,10 +36,10 @@ def evaluated(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, inp
                 fault.value = COMPONENT + status + FAULTS * i
 
             def stored() -> None:
-                _store(on, part, z, h, m)
+                _store(on, part, z, weight, m)
 
             def related() -> None:
-                _relate(on, part, z, h, m)
+                _relate(on, part, z, weight, m)
 
             on.when(on.same(status, 0), lambda: on.when(on.same(t.kind[i], STORING), stored, related), fail)
 
@@ -111,7 +117,7 @@ def balance(
     on.loop(t.kind.size, component)
 
 
-def _store(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
+def _store(on: Evaluator, part: Part, z: Vector, weight: Real, m: Scratch) -> None:
     """e = ∂H, and the rate as a flow."""
     t, n = part.t, part.n
     m.energy[part.i] = m.c[0]
@@ -125,14 +131,14 @@ def _store(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
 
         def entry(q: Integer) -> None:
             place = t.jacobian[part.j_at + j * n + q]
-            on.when(place >= 0, lambda: add_to(m.data, place, -(h * m.f[j * n + q])))
+            on.when(place >= 0, lambda: add_to(m.data, place, -(weight * m.f[j * n + q])))
 
         on.loop(n, entry)
 
     on.loop(n, row)
 
 
-def _relate(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
+def _relate(on: Evaluator, part: Part, z: Vector, weight: Real, m: Scratch) -> None:
     """Flows into the balances, and conditions."""
     t, n, k = part.t, part.n, part.k
     own = n + k
@@ -147,7 +153,7 @@ def _relate(on: Evaluator, part: Part, z: Vector, h: Real, m: Scratch) -> None:
 
         def by_increment(q: Integer) -> None:
             place = t.jacobian[first + q]
-            on.when(place >= 0, lambda: add_to(m.data, place, h * m.jac[j * width + q]))
+            on.when(place >= 0, lambda: add_to(m.data, place, weight * m.jac[j * width + q]))
 
         on.loop(own, by_unknown)
         on.loop(width, by_increment, start=own)

@@ -139,11 +139,11 @@ def linearise(
     on.loop(n, mean, start=n_rate)
     on.loop(g.velocity.size // Velocity.integer_width, velocity)
     # the step as a whole: discrete gradients, and whether joints close
-    fault.value = evaluated(on, t, somewhere(on, x), mean_at, scal, inputs.row(zero), m)
+    fault.value = evaluated(on, t, somewhere(on, x), mean_at, scal, inputs.row(zero), m, h)
 
     def stage(i: Integer) -> None:
         def still_there() -> None:
-            fault.value = evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m)
+            fault.value = evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m, still[0])
             on.when(on.same(fault.value, 0), keep)
 
         def keep() -> None:
@@ -166,7 +166,7 @@ def linearise(
 
             on.loop(n_rate, none)
             on.loop(n, take, start=n_rate)
-            fault.value = evaluated(on, t, s.x.row(i), mean_at, unit, inputs.row(i), m)
+            fault.value = evaluated(on, t, s.x.row(i), mean_at, unit, inputs.row(i), m, unit[0])
             on.when(on.same(fault.value, 0), lambda: on.loop(s.data.columns, slope))
 
         on.when(on.same(fault.value, 0), still_there)
