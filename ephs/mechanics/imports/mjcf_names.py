@@ -14,8 +14,8 @@ class Names:
     """Names of bodies and joints by their numbers, and the joints' kinds."""
 
     def __init__(self, model: Any) -> None:
-        given = [model.raw.body(b).name for b in range(model.nbody)]
-        joints = [model.raw.joint(j).name for j in range(model.njnt)]
+        given = [model.body(b).name for b in range(model.nbody)]
+        joints = [model.joint(j).name for j in range(model.njnt)]
         taken = {name for name in (*given, *joints) if name}
         self.bodies = [WORLD, *(_made(name, f"body_{b}", taken) for b, name in enumerate(given) if b)]
         self.joints = [
