@@ -58,8 +58,10 @@ class Links:
         return self._residual.rigid(self._q, self._r, gravity=False)
 
     def momenta(self, states: States) -> Array:
-        """(n,) the bodies' momenta on the tree's degrees of freedom: M r where joints are closed."""
-        out = np.zeros(self.equations.n)
+        """(n,) momenta of bodies and of rotors on the tree's degrees of freedom: M r where joints are closed."""
+        out, attaching = np.zeros(self.equations.n), self.equations.reduced.attaching
+        for rotor in attaching.network.inertias:
+            out[attaching.ports[rotor.rate]] += rotor.ratio * states[rotor.state.path][0]
         for i, link in enumerate(self.equations.reduced.places):
             if link.momentum is not None:
                 out += self._residual.twists(i).T @ states[link.momentum.path]

@@ -148,6 +148,36 @@ def test_other_states_come_from_coordinates_and_rates():
     assert state.rates[names[0]] == pytest.approx([-0.2], abs=1e-12)
 
 
+ROTORS = {
+    "none": ("", 0.0, 0.0),
+    "armature": ("armature = 0.3", 0.3, 0.0),
+    "motor": (
+        "[motors.m]\njoint = 'pin'\nconstant = 0.1\nresistance = 1.0\ngear = 20.0\ninertia = 1e-3",
+        20.0**2 * 1e-3,
+        (20.0 * 0.1) ** 2 / 1.0,
+    ),
+}
+"""Lines of a scene, the rotor's inertia seen at the joint, and what its circuit resists with, in N m s."""
+
+
+@pytest.mark.parametrize("rotor", ROTORS)
+@pytest.mark.parametrize("way", ["adjusted", "natural", "natural4"])
+def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way, tmp_path):
+    """What asks for states and not for rates finds them from momenta: of J + g² J of the rotor, too."""
+    text = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n"
+    pin = "[joints.pin]\ntype = 'revolute'\nbodies = ['ground', 'arm']\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n"
+    file = tmp_path / "arm.toml"
+    lines, seen, resisting = ROTORS[rotor]
+    file.write_text(text + pin + lines)
+    dynamics, rate, step = ephs.dynamics(ephs.load(file)), 2.0, 1e-3
+    state = dynamics.state({}, {"pin": rate}, adjust=way == "adjusted")
+    lost = 0.0
+    if way != "adjusted":
+        state = dynamics.step(state, step, method=way)
+        lost = resisting / (0.1 + seen) * step
+    assert abs(state.rates["pin"][0] - rate * np.exp(-lost)) <= rate * (lost**3 + 64 * EPS)  # order 2 at least
+
+
 def test_energy_stays_where_nothing_acts():
     scene = ephs.load(SCENES[0].parent / "mbs.toml")
     model = ephs.dynamics(scene)
