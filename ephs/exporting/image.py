@@ -35,8 +35,8 @@ MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")
 @final
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What an input adds to the arrays of a run: ``ratio`` times its value, at a place of the forces on joints or, with
-    ``supplied``, of what is supplied to attachments, such as tensions of tendons."""
+    """Contribution of an input to the arrays of a run: ``ratio`` times its value, at a place of the joint forces or,
+    with ``supplied``, of the supplies of attachments, such as tensions of tendons."""
 
     supplied: bool
     place: int

@@ -57,6 +57,12 @@ def read_state(path: Path, quantity: Quantity, value: object) -> Array:
     return manifold(space).normalise(array)
 
 
+def saved_at(times: Array, t: float) -> int | None:
+    """Place of a time among those of a solution, (n,) in s; None where it is none of them."""
+    k = int(np.argmin(np.abs(times - t)))
+    return k if abs(times[k] - t) <= SLIVER * max(1.0, abs(t)) else None
+
+
 def saved_state(solution: Any, t: float) -> dict[Path, Array]:
     """The states of a solution at one of its times.
 
@@ -66,7 +72,7 @@ def saved_state(solution: Any, t: float) -> dict[Path, Array]:
         The solution has no state at that time.
     """
     times = np.asarray(solution.t)
-    k = int(np.argmin(np.abs(times - t)))
-    if abs(times[k] - t) > SLIVER * max(1.0, abs(t)):
+    k = saved_at(times, t)
+    if k is None:
         raise AssemblyError("no-time", "time", found=t, first=float(times.min()), last=float(times.max()))
     return dict(solution.state_at(k))

@@ -17,7 +17,7 @@ from ephs.semantics.system import System
 PROBES = 3
 """States and efforts at which a structure is evaluated again, whatever its verdict."""
 DOUBTS = "doubts"
-"""The check that names what can hardly be meant; it never fails."""
+"""Name of the check of likely mistakes, which never fails."""
 
 
 @final

@@ -58,7 +58,7 @@ class GearHold:
     Attributes
     ----------
     name
-        How to call it.
+        Of the gear.
     body1, body2
         Two bodies of its joints, by index.
     rows

@@ -1,7 +1,7 @@
-"""Doubts about a scene that is usable, as it can hardly be meant; and bodies whose motion nothing determines.
+"""Likely mistakes in a valid scene, and massless bodies of undetermined motion.
 
-A mechanism that nothing can move, gears that hold joints still, meshes that are not there, and lengths or masses that
-lie as far from all others as millimetres from metres, or grams from kilograms.
+Likely mistakes are locked mechanisms, gears that hold joints still, missing meshes, and lengths or masses as far from
+all others as millimetres from metres, or grams from kilograms.
 """
 
 from collections.abc import Iterator, Mapping
@@ -23,12 +23,12 @@ LARGEST = 60
 
 
 def doubts(scene: Scene) -> tuple[str, ...]:
-    """What can hardly be meant, a sentence each."""
+    """Likely mistakes of a scene, a sentence each."""
     return (*_files(scene), *_units(scene), *_held(scene))
 
 
 def _files(scene: Scene) -> Iterator[str]:
-    """Meshes that are not there."""
+    """Missing meshes."""
     for name, body in scene.all_bodies():
         for shape in filter(None, (body.shape, *body.shapes)):
             if "mesh" in shape and not Path(str(shape["mesh"])).is_file():
@@ -52,7 +52,7 @@ def _units(scene: Scene) -> Iterator[str]:
 
 
 def _beyond(sizes: Mapping[str, float], least: float, most: float) -> Iterator[tuple[str, float, float]]:
-    """Name and size of what is so many times as large as the largest of the others, and that."""
+    """Name and size of the largest, and the next size, where their ratio lies between the bounds."""
     order = sorted(sizes, key=lambda name: sizes[name])
     if len(order) > 1:
         size, rest = (sizes[name] for name in order[-1:-3:-1])
@@ -82,8 +82,8 @@ def _held(scene: Scene) -> Iterator[str]:
         yield f"the mechanism is locked: {enumerated(free[:5])} cannot move, although nothing prescribes a motion"
 
 
-def unmoved(scene: Scene) -> Iterator[str]:
-    """Bodies without mass that can move while all others rest: nothing determines their motion."""
+def undetermined_bodies(scene: Scene) -> Iterator[str]:
+    """Massless bodies that can move while all others rest, so that their motion is undetermined; a sentence each."""
     of, bodies = Mechanism.of(scene), list(scene.all_bodies())
     if all(body.mass > 0.0 for _, body in bodies):
         return

@@ -16,7 +16,7 @@ import numpy as np
 
 from ephs.mechanics.constraints.directions import Axes, Direction, Place, describe, enumerated, name_directions
 from ephs.mechanics.constraints.holding import GearHold, Hold, Mechanism, redundant
-from ephs.mechanics.constraints.plausible import unmoved
+from ephs.mechanics.constraints.plausible import undetermined_bodies
 from ephs.mechanics.scene.adjust import close_loops
 from ephs.mechanics.scene.kinematics import Scale
 from ephs.mechanics.scene.model import Scene
@@ -107,7 +107,7 @@ def dependences(scene: Scene) -> tuple[Dependence, ...]:
 
 def explain(scene: Scene) -> str:
     """The scene's dependences and undetermined bodies, as advice for a run that failed; "" where there are none."""
-    return "; ".join(filter(None, [in_words(dependences(scene)), *unmoved(scene)]))
+    return "; ".join(filter(None, [in_words(dependences(scene)), *undetermined_bodies(scene)]))
 
 
 def in_words(found: Sequence[Dependence]) -> str:

@@ -32,7 +32,7 @@ PRESSING = 1e-6
 
 @final
 class Holding:
-    """What holds some of the closed contacts of a state over a part of h s.
+    """Forces that hold closed contacts of a state over a part of h s.
 
     Parameters
     ----------

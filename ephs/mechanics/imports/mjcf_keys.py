@@ -1,6 +1,6 @@
-"""What is read of a compiled MJCF: reads of its arrays are recorded.
+"""Record of the reads of a compiled MJCF's arrays.
 
-Attributes of MuJoCo's specification that differ from their defaults and were not read are named.
+Unread attributes of MuJoCo's specification are named, where they differ from their defaults.
 """
 
 from collections.abc import Callable, Iterator, Mapping

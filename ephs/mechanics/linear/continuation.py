@@ -284,7 +284,7 @@ def _critical(
 
 
 def _distinct(known: list[float], found: list[float]) -> list[float]:
-    """What is found besides the known ones; several directions may lose their stiffness at one load."""
+    """Critical shares besides the known ones, each once: several directions may lose their stiffness at one load."""
     out: list[float] = []
     for share in found:
         if not any(abs(share - other) <= ALIKE * max(abs(share), abs(other)) for other in [*known[-1:], *out]):

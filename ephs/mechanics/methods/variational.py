@@ -141,7 +141,7 @@ class Variational(ReducedMethod):
                 self._matrix = self._slope(state, h, xi, middle)
             try:
                 change, impulse = _least(self._matrix, before, rows, -residual, -gap)
-            except np.linalg.LinAlgError as error:
+            except ArithmeticError as error:
                 raise SolveError(Outcome.SINGULAR, "", "") from error
             xi, push = xi + change, push + impulse
             middle = self._middle(state, h, xi)

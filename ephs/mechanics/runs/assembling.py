@@ -154,7 +154,7 @@ def _coupled(wiring: Wiring, junction: int) -> Iterator[tuple[int, float]]:
 def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection[Path]) -> dict[Path, Array]:
     """The states with poses that are not ``given`` set from relative poses, and then these from those.
 
-    What hangs on nothing stays where it is.
+    Bodies that no joint links to others keep their poses.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What follows from the coordinates and rates of joints: joints tied by gears, stretches of belts and tendons.
+"""States that follow from coordinates and rates of joints: joints tied by gears, stretches of belts and tendons.
 
 A gear ties rates; what it says of coordinates is that they keep their distance from it. So a scene in another state has
 the offsets of its gears as before, and belts are stretched by what their joints moved.
@@ -52,7 +52,7 @@ def stretched(gear: Gear, path: str, before: Mapping[str, Array], after: Mapping
     return replace(gear, stretch=gear.stretch + moved[0] - float(gear.ratio @ moved[1:]))
 
 
-def left(of: Attachment, at: Path, states: Mapping[Path, Array]) -> Attachment:
+def attachment_at(of: Attachment, at: Path, states: Mapping[Path, Array]) -> Attachment:
     """An attachment in the states of the system of its scene, in which it has the box ``at``."""
 
     def of_state(path: str) -> float:

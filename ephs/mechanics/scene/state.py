@@ -13,17 +13,17 @@ from ephs.mechanics.scene.assembly import gyration, measure
 from ephs.mechanics.scene.attached import ATTACHED, Attachment, Gear
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
-from ephs.mechanics.scene.following import left, stretched, tied
+from ephs.mechanics.scene.following import attachment_at, stretched, tied
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.semantics.bundle import Array
+from ephs.semantics.initial import saved_at
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
-from ephs.solve.control import SLIVER
 
 MOVED = 1e-12
 """Least reported change of a body's state in m, rad, m/s, rad/s: rounding of poses of size one."""
@@ -227,8 +227,8 @@ def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequen
 def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     """See `Scene.at`."""
     times = np.asarray(solution.t)
-    k = int(np.argmin(np.abs(times - time)))
-    if abs(times[k] - time) > SLIVER * max(1.0, abs(time)):
+    k = saved_at(times, time)
+    if k is None:
         raise SceneError(scene.name, [fault("no time", "time", time, first=times[0], last=times[-1])])
     now, named = Snapshot.of(scene), {name for name, _ in scene.all_joints()}
     poses, twists = now.poses.copy(), now.twists.copy()
@@ -247,7 +247,7 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     states = solution.state_at(k)
 
     def attached(section: str) -> Callable[[str, Attachment], Attachment]:
-        return lambda path, of: left(of, component_path(section, path + of.name), states)
+        return lambda path, of: attachment_at(of, component_path(section, path + of.name), states)
 
     return mapped(
         there,

@@ -97,7 +97,7 @@ def _assemble(
 
 def newton(
     on: Evaluator, t: Columns, g: GroupColumns, o: Elimination, x: Vector, z: Matrix, scal: Vector, still: Vector,
-    unit: Vector, inputs: Matrix, scheme: Vector, m: Scratch, s: StageScratch, outcome: Integers,
+    inputs: Matrix, scheme: Vector, m: Scratch, s: StageScratch, outcome: Integers,
 ) -> None:  # fmt: skip
     """Solve one step in place of z, run to stagnation; outcome = status, component, and iterations added."""
     before, part, iteration, fresh = on.variable(FAR), on.variable(1.0), on.counter(0), on.counter(1)
@@ -151,7 +151,7 @@ def newton(
         on.when(on.same(outcome[0], RUNNING), move)
 
     def iterate() -> Truth:
-        fault = linearise(on, t, g, o.dropped, x, z, scal, still, unit, inputs, m, s, fresh.value)
+        fault = linearise(on, t, g, o.dropped, x, z, scal, still, inputs, m, s, fresh.value)
 
         def fail() -> None:
             outcome[0], outcome[1] = fault % FAULTS, fault // FAULTS
@@ -169,12 +169,12 @@ def newton(
 
 def advance(
     on: Evaluator, t: Columns, g: GroupColumns, o: Elimination, m: Scratch, s: StageScratch, x: Vector, z: Matrix,
-    previous: Matrix, scal: Vector, still: Vector, unit: Vector, inputs: Matrix, scheme: Vector, sums: Vector,
+    previous: Matrix, scal: Vector, still: Vector, inputs: Matrix, scheme: Vector, sums: Vector,
     states: Matrix, energies: Matrix, ledgers: Matrix, outcome: Integers, steps: Integer,
 ) -> None:  # fmt: skip
     """Take ``steps`` steps; arguments and results as of `newton.advance`, z and previous of all stages.
 
-    ``still`` and ``unit`` are scal for an instant, and for the step over which derivatives by increments are taken.
+    ``still`` is scal for an instant.
     """
     n, tries, least = z.columns, on.counter(0), on.variable(0.0)
     ahead = AHEAD.tolist()
@@ -192,7 +192,7 @@ def advance(
                 previous[STAGES * k + i, j] = values[k]
 
     def again() -> Truth:
-        newton(on, t, g, o, x, z, scal, still, unit, inputs, scheme, m, s, outcome)
+        newton(on, t, g, o, x, z, scal, still, inputs, scheme, m, s, outcome)
         tries.value = tries.value + 1
         once = on.both(on.negate(on.same(outcome[0], DONE)), tries.value < 2)
 
@@ -249,7 +249,7 @@ def advance(
 @cache
 def gauss_program() -> Program:
     """Return the program of the natural method of order 4."""
-    step = {"scal": vector(3), "still": vector(3), "unit": vector(3), "inputs": matrix()}
+    step = {"scal": vector(3), "still": vector(3), "inputs": matrix()}
     return Program(
         "gauss",
         advance=Entry(

@@ -67,9 +67,6 @@ from ephs.solve.model import Model
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index, order
 
-INSTANT = 1e-7
-"""The step, in s, over which derivatives by increments are taken at a stage: so short that it is an instant."""
-
 
 @final
 class Natural4:
@@ -207,14 +204,12 @@ class Natural4:
         if self._bound is None or self._bound.order is not o or self._bound.room < steps:
             model = self.model
             parts = map(parts_of, (model.tables, self._groups, o, self._memory, self._scratch))
-            scals = model.scal(0.0), model.scal(INSTANT)
+            still = model.scal(0.0)
 
             def bind(state: Sequence[Array], scal: Array, inputs: Array, results: Sequence[Any]) -> Any:
                 x, z, previous, sums = state
                 advance = gauss_program().compiled()["advance"]
-                return advance.bind(
-                    *parts, x, z, previous, scal, *scals, inputs, SCHEME.ravel(), sums, *results
-                )  # fmt: skip
+                return advance.bind(*parts, x, z, previous, scal, still, inputs, SCHEME.ravel(), sums, *results)
 
             self._bound = Loop(model, o, steps, bind, (STAGES,))
         return self._bound
@@ -227,8 +222,8 @@ class Natural4:
         dropped = self._dropped = dependent_rows(model, x, ranked, self._dropped, self._closing)
         s = self._scratch
         fault = gauss_program().compiled()["linearise"](
-            parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), model.scal(INSTANT),
-            inputs, parts_of(self._memory), parts_of(s), 1,
+            parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), inputs,
+            parts_of(self._memory), parts_of(s), 1,
         )  # fmt: skip
         if fault:
             raise SolveError.of_component(fault % FAULTS, model, fault // FAULTS)

@@ -96,7 +96,7 @@ def exponents(
 @staged
 def linearise(
     on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers, x: Vector, z: Matrix, scal: Vector, still: Vector,
-    unit: Vector, inputs: Matrix, m: Scratch, s: StageScratch, fresh: Integer,
+    inputs: Matrix, m: Scratch, s: StageScratch, fresh: Integer,
 ) -> Integer:  # fmt: skip
     """Residuals of the stages with their corrections, and where fresh their matrices; 0 or a fault of `evaluated`."""
     n_rate, n, h = t.counts[0], z.columns, scal[0]
@@ -155,18 +155,10 @@ def linearise(
         def derivatives() -> None:
             copy(on, m.data, s.data.row(i))
 
-            def none(j: Integer) -> None:
-                s.mean[j] = 0.0
-
-            def take(j: Integer) -> None:
-                s.mean[j] = z[i, j]
-
             def slope(j: Integer) -> None:
-                s.slope[i, j] = 2.0 / unit[0] * (m.data[j] - s.data[i, j])
+                s.slope[i, j] = 2.0 * (m.data[j] - s.data[i, j])
 
-            on.loop(n_rate, none)
-            on.loop(n, take, start=n_rate)
-            fault.value = evaluated(on, t, s.x.row(i), mean_at, unit, inputs.row(i), m, unit[0])
+            fault.value = evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m, on.variable(1.0).value)
             on.when(on.same(fault.value, 0), lambda: on.loop(s.data.columns, slope))
 
         on.when(on.same(fault.value, 0), still_there)

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.tree.engine.build import engine_of
 from ephs.mechanics.tree.equations.accounts import Accounts
 from ephs.mechanics.tree.equations.booking import Booking
-from ephs.mechanics.tree.equations.dense import Dense, unmoved
+from ephs.mechanics.tree.equations.dense import Dense, undetermined_bodies
 from ephs.mechanics.tree.equations.given import Given
 from ephs.mechanics.tree.equations.heat import heats_of
 from ephs.mechanics.tree.equations.led import Led
@@ -21,7 +21,7 @@ from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.prescribed import Prescribed
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.mechanics.tree.equations.stages import evaluated
-from ephs.mechanics.tree.equations.state import Holding, ReducedState
+from ephs.mechanics.tree.equations.state import Reactions, ReducedState
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
@@ -93,7 +93,7 @@ class Equations:
         self.booking, self.accounts, self.evaluations = Booking(self, self._paper), Accounts(self), 0
         self.gravity, self.driven = reduced.gravity, self.prescribed.freedoms
         self._momenta = False
-        self.holding: Holding | None = None
+        self.holding: Reactions | None = None
         self._acted = self.given.acted(set(self._moving) if pushed else set())
         self._build(None)
 
@@ -182,7 +182,7 @@ class Equations:
         if status == Status.UNSETTLED:
             raise SolveError(Outcome.DIVERGED, "", "the stages of a step")
         if status == Status.STILL:
-            raise unmoved(self.reduced, int(component))
+            raise undetermined_bodies(self.reduced, int(component))
         if status == Status.LAWLESS:
             raise SolveError(Outcome.LAWLESS, str(self.model.path_of(int(component))), "")
         if status:

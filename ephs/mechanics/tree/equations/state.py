@@ -36,7 +36,7 @@ class ReducedState:
     account: Array = field(default_factory=lambda: np.zeros(0))
 
 
-class Holding(Protocol):
+class Reactions(Protocol):
     """Forces that act besides, from what the accelerations would be without them: of closed contacts."""
 
     def __call__(self, t: float, q: Array, r: Array, rates: Array) -> Array:
