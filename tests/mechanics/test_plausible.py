@@ -1,4 +1,4 @@
-"""What can hardly be meant is said by name, and nothing that can."""
+"""Likely mistakes are said by name, and sound scenes stay quiet."""
 
 from pathlib import Path
 

@@ -29,7 +29,7 @@ STOPPED = 1e-10
 """Part of the rates before that rounding leaves of constraints where a mechanism is brought to rest."""
 
 
-def undetermined_bodies(reduced: Reduced, freedom: int) -> SolveError:
+def unmoved(reduced: Reduced, freedom: int) -> SolveError:
     """A degree of freedom whose motion no inertia determines."""
     at = reduced.tables.r_at[: reduced.links]
     link = int(np.flatnonzero(at <= freedom)[-1])
@@ -227,7 +227,7 @@ class Dense:
 
     def _assemble(self, q: Array, r: Array) -> None:
         if found := self.residual.assemble(q, r):
-            raise undetermined_bodies(self.reduced, found - 1)
+            raise unmoved(self.reduced, found - 1)
 
     def _orthonormalised(self) -> None:
         self._rank = int(self._orthonormalise()) if self._m else 0

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.tree.engine.build import engine_of
 from ephs.mechanics.tree.equations.accounts import Accounts
 from ephs.mechanics.tree.equations.booking import Booking
-from ephs.mechanics.tree.equations.dense import Dense, undetermined_bodies
+from ephs.mechanics.tree.equations.dense import Dense, unmoved
 from ephs.mechanics.tree.equations.given import Given
 from ephs.mechanics.tree.equations.heat import heats_of
 from ephs.mechanics.tree.equations.led import Led
@@ -182,7 +182,7 @@ class Equations:
         if status == Status.UNSETTLED:
             raise SolveError(Outcome.DIVERGED, "", "the stages of a step")
         if status == Status.STILL:
-            raise undetermined_bodies(self.reduced, int(component))
+            raise unmoved(self.reduced, int(component))
         if status == Status.LAWLESS:
             raise SolveError(Outcome.LAWLESS, str(self.model.path_of(int(component))), "")
         if status:
