@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ephs.mechanics.imports.draft import Draft
-from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.semantics.bundle import Array
 
 
-def named(root: Node, tag: str, faults: list[Fault]) -> dict[str, Node]:
+def named(root: FileElement, tag: str, faults: list[Fault]) -> dict[str, FileElement]:
     """The elements of a kind by their names; a fault for each without a name of its own."""
-    found: dict[str, Node] = {}
+    found: dict[str, FileElement] = {}
     for number, element in enumerate(root.findall(tag)):
         name = element.get("name")
         if not name:
@@ -24,7 +24,7 @@ def named(root: Node, tag: str, faults: list[Fault]) -> dict[str, Node]:
     return found
 
 
-def check_kind(name: str, joint: Node, kinds: Iterable[str], faults: list[Fault]) -> None:
+def check_kind(name: str, joint: FileElement, kinds: Iterable[str], faults: list[Fault]) -> None:
     """A fault where a joint's type is unknown."""
     kind, known = joint.get("type"), list(kinds)
     if kind not in known:
@@ -33,7 +33,7 @@ def check_kind(name: str, joint: Node, kinds: Iterable[str], faults: list[Fault]
         faults.append(fault("unknown type", f"joints.{name}.type", found, known=", ".join(known), hint=hint))
 
 
-def check_link(link: str, key: str, links: Mapping[str, Node], faults: list[Fault]) -> None:
+def check_link(link: str, key: str, links: Mapping[str, FileElement], faults: list[Fault]) -> None:
     """A fault where a joint names a missing link."""
     if link not in links:
         hint = did_you_mean(link, links, f"there are: {listing(links)}")

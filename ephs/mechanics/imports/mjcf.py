@@ -51,7 +51,7 @@ READ = (
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Inertia:
+class GivenInertia:
     """A mass, and an inertia (3, 3) in the axes of its body, or else in those of the inertial frame."""
 
     mass: float
@@ -110,7 +110,7 @@ def read_mjcf(root: Any, draft: Draft) -> None:
     model.leave_unread()
 
 
-def _numbers(model: Any, own: Mapping[int, Inertia]) -> Iterator[Any]:
+def _numbers(model: Any, own: Mapping[int, GivenInertia]) -> Iterator[Any]:
     """All that is read of a compiled model."""
     yield model.opt.gravity
     for inertia in own.values():
@@ -130,19 +130,19 @@ def _directions(model: Any) -> Iterator[Any]:
     yield model.eq_data[welds, 6:10]
 
 
-def _impossible_inertias(spec: Any, draft: Draft) -> list[tuple[Any, Inertia]]:
+def _impossible_inertias(spec: Any, draft: Draft) -> list[tuple[Any, GivenInertia]]:
     """Inertias that MuJoCo refuses, each with its body, to which the nearest possible one is given for compilation.
 
     Left alone are models that change them as they are compiled.
     """
-    c, found = spec.compiler, list[tuple[Any, Inertia]]()
+    c, found = spec.compiler, list[tuple[Any, GivenInertia]]()
     if c.balanceinertia or c.boundmass > 0.0 or c.boundinertia > 0.0 or c.settotalmass > 0.0 or c.inertiafromgeom == 1:
         return found
     for number, body in enumerate(spec.bodies[1:], 1):
         if not body.explicitinertial:
             continue
         whole = bool(np.isfinite(body.fullinertia).all())
-        given = Inertia(float(body.mass), _tensor(body.fullinertia) if whole else np.diag(body.inertia), whole)
+        given = GivenInertia(float(body.mass), _tensor(body.fullinertia) if whole else np.diag(body.inertia), whole)
         if not (np.isfinite(given.mass) and np.isfinite(given.tensor).all()):  # the check of all numbers refuses them
             body.mass, body.inertia, body.fullinertia = 1.0, np.ones(3), [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
             found.append((body, given))
@@ -176,9 +176,9 @@ def _tensor(entries: Any) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _body(model: Compiled, b: int, own: Mapping[int, Inertia], names: Names, draft: Draft) -> None:
+def _body(model: Compiled, b: int, own: Mapping[int, GivenInertia], names: Names, draft: Draft) -> None:
     principal = pose(rotation=model.body_iquat[b])[:4]
-    given = own.get(b, Inertia(float(model.body_mass[b]), np.diag(model.body_inertia[b]), in_body=False))
+    given = own.get(b, GivenInertia(float(model.body_mass[b]), np.diag(model.body_inertia[b]), in_body=False))
     tensor = given.tensor if given.in_body else turned_tensor(principal, given.tensor)
     draft.body(names.bodies[b], given.mass, tensor, model.body_ipos[b])
 

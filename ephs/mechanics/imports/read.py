@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ephs.mechanics.imports.draft import Draft
-from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.imports.sdf import read_sdf
 from ephs.mechanics.imports.urdf import read_urdf
 from ephs.mechanics.imports.xml import read_tree
@@ -40,7 +40,7 @@ def read_model(
     draft = Draft(path.stem, path.parent, faults, contact=contact)
     match root.tag:
         case "robot" | "sdf":
-            node = Node(root)
+            node = FileElement(root)
             if root.tag == "sdf":
                 read_sdf(node, draft)
             else:

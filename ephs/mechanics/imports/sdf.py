@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_mass, draw, tensor
-from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.imports.sdf_contacts import ground_surfaces, link_surfaces, solids
 from ephs.mechanics.imports.sdf_frames import MODEL, End, Scope, global_name, is_true, joint_ends, read_pose, world_of
 from ephs.mechanics.imports.sdf_keys import LINK, ROOT, joint_keys
@@ -44,7 +44,7 @@ _PASSED_BY = {
 }
 
 
-def read_sdf(root: Node, draft: Draft) -> None:
+def read_sdf(root: FileElement, draft: Draft) -> None:
     """Links and joints of the models of a file; static models beside others are the ground, and unattached links move
     freely by a joint ``root_joint``."""
     world = world_of(root, draft.faults)
@@ -55,7 +55,7 @@ def read_sdf(root: Node, draft: Draft) -> None:
     _pass_by(world, draft)
     if world.models and not any(scope.links for scope in scopes):
         draft.faults.append(fault("no link", "links", "none"))
-    joints: dict[tuple[Scope, str], tuple[Node, tuple[End, End]]] = {}
+    joints: dict[tuple[Scope, str], tuple[FileElement, tuple[End, End]]] = {}
     for scope in (world, *scopes):
         for name, joint in scope.joints.items():
             if joint.get("type") == "gearbox":  # a ratio of two rates is no lower pair
@@ -88,7 +88,7 @@ def read_sdf(root: Node, draft: Draft) -> None:
         _joint(name, joint, ends, scope, version, draft)
 
 
-def _name(root: Node, world: Scope, draft: Draft) -> None:
+def _name(root: FileElement, world: Scope, draft: Draft) -> None:
     """Names of the scene, and of elements in notes."""
     moving = [model.name for model in world.models.values() if not model.grounded]
     draft.name = (moving[0] if len(moving) == 1 else world.name) or draft.name
@@ -100,7 +100,7 @@ def _name(root: Node, world: Scope, draft: Draft) -> None:
             scope.element.named("models", scope.prefix.removesuffix("::") or scope.name, MODEL_KEYS)
 
 
-def _gravity(root: Node, draft: Draft) -> None:
+def _gravity(root: FileElement, draft: Draft) -> None:
     """Gravity of the world, by default that of the specification; before SDF 1.6 ``physics`` has it."""
     for world in root.findall("world"):
         given = [each for path in ("gravity", "physics/gravity") for each in world.findall(path)]
@@ -158,7 +158,7 @@ def _hold(scopes: Sequence[Scope], ends: Sequence[tuple[End, End]], draft: Draft
             waiting += near.get(here, set()) - reached
 
 
-def _link(name: str, link: Node, place: np.ndarray, draft: Draft) -> None:
+def _link(name: str, link: FileElement, place: np.ndarray, draft: Draft) -> None:
     inertial, key, faults = link.find("inertial"), f"links.{name}.inertial", draft.faults
     if inertial is None:
         draft.leave("absence of an inertia, which is 1 kg and 1 kg m² by the specification, of", name)
@@ -184,7 +184,9 @@ def _link(name: str, link: Node, place: np.ndarray, draft: Draft) -> None:
             draw(draft, name, *solid)
 
 
-def _joint(name: str, joint: Node, ends: tuple[End, End], scope: Scope, version: tuple[int, ...], draft: Draft) -> None:
+def _joint(
+    name: str, joint: FileElement, ends: tuple[End, End], scope: Scope, version: tuple[int, ...], draft: Draft
+) -> None:
     key, (kind, count), faults = scope.key("joints", name), KINDS[str(joint.get("type"))], draft.faults
     whole, origin = f"{scope.prefix}{name}", scope.at(name, f"{key}.pose")
     joint.named("joints", whole, joint_keys(count, fixed=kind == "fixed"))
@@ -217,7 +219,7 @@ def _inside(end: End, at: np.ndarray, scope: Scope) -> np.ndarray:
 
 
 def _direction(
-    axis: Node | None, key: str, origin: np.ndarray, scope: Scope, version: tuple[int, ...], draft: Draft
+    axis: FileElement | None, key: str, origin: np.ndarray, scope: Scope, version: tuple[int, ...], draft: Draft
 ) -> np.ndarray:
     """The direction of an axis in the joint's frame."""
     xyz = None if axis is None else axis.find("xyz")
@@ -233,7 +235,7 @@ def _direction(
     return quaternion_to_matrix(origin[:4]).T @ there @ given
 
 
-def _dynamics(name: str, joint: Node, kind: str, count: int, draft: Draft) -> dict[str, Any]:
+def _dynamics(name: str, joint: FileElement, kind: str, count: int, draft: Draft) -> dict[str, Any]:
     """Friction, stiffness and rest, a number an axis; damping of a ball joint is about all axes."""
     words = {"friction": "damping", "dry": "friction"}
     words |= {"stiffness": "spring_stiffness", "rest": "spring_reference"} if count else {}
@@ -256,7 +258,7 @@ def _dynamics(name: str, joint: Node, kind: str, count: int, draft: Draft) -> di
     return dict(rows) if count > 1 else {entry: values[0] for entry, values in rows.items()} | dry
 
 
-def _limits(name: str, joint: Node, count: int, draft: Draft) -> None:
+def _limits(name: str, joint: FileElement, count: int, draft: Draft) -> None:
     """Stops of a joint of one degree of freedom, as far as its limits are finite, or a note of them."""
     for tag in AXES[: max(count, 1)]:
         limit, key = joint.find(f"{tag}/limit"), f"joints.{name}.{tag}.limit"
@@ -270,7 +272,7 @@ def _limits(name: str, joint: Node, count: int, draft: Draft) -> None:
             draft.leave("limits of", name)
 
 
-def _pitch(joint: Node, key: str, draft: Draft) -> float:
+def _pitch(joint: FileElement, key: str, draft: Draft) -> float:
     """Metres a radian. The older entry counts radians a metre, of a left-handed thread."""
     newer, older = joint.findtext("screw_thread_pitch"), joint.findtext("thread_pitch")
     if newer is not None or older is None:

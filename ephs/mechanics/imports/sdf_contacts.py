@@ -8,7 +8,7 @@ from typing import Any
 
 from ephs.mechanics.imports.collisions import FRICTION, collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along
-from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.imports.sdf_frames import Scope, is_true, read_pose
 from ephs.mechanics.imports.sdf_keys import COLLISION
 from ephs.mechanics.imports.xml import numbers
@@ -21,7 +21,7 @@ RIGID = 1e12
 _TRUE = ("true", "1")
 
 
-def solids(element: Node, key: str, draft: Draft) -> Iterator[tuple[str, Any, Array]]:
+def solids(element: FileElement, key: str, draft: Draft) -> Iterator[tuple[str, Any, Array]]:
     """Kind, sizes and pose of the solids of a visual or collision element; a mesh has a file and a scale."""
     geometry, faults = element.find("geometry"), draft.faults
     place = read_pose(element, f"{key}.pose", faults)
@@ -29,7 +29,7 @@ def solids(element: Node, key: str, draft: Draft) -> Iterator[tuple[str, Any, Ar
         at, value, there = f"{key}.{solid.tag}", None, place
 
         def sizes(
-            words: str, count: int = 1, default: tuple[float, ...] = (), *, of: Node = solid, at: str = at
+            words: str, count: int = 1, default: tuple[float, ...] = (), *, of: FileElement = solid, at: str = at
         ) -> Any:
             found = [numbers(of.value(word), count, f"{at}.{word}", faults, default) for word in words.split()]
             return [entry for entries in found for entry in entries]
@@ -84,7 +84,9 @@ def ground_surfaces(model: Scope, draft: Draft) -> None:
     model.element.pass_by_all_but("link", "model")
 
 
-def _surfaces(element: Node, link: str, name: str, place: Array | None, law: Mapping[str, Any], draft: Draft) -> None:
+def _surfaces(
+    element: FileElement, link: str, name: str, place: Array | None, law: Mapping[str, Any], draft: Draft
+) -> None:
     if not draft.contact:
         if element.has("collision"):
             draft.leave("contacts of", name)
@@ -101,14 +103,14 @@ def _surfaces(element: Node, link: str, name: str, place: Array | None, law: Map
             collide(draft, link, own, kind, value, at if place is None else SE3.compose(place, at), {**law, **given})
 
 
-def _meets(collision: Node) -> bool:
+def _meets(collision: FileElement) -> bool:
     """Whether a collision makes forces: not with a bit mask of 0, and not where it is for sensors alone."""
     bits = collision.peek("surface/contact/collide_bitmask").strip().lower()
     sensed = (collision.findtext("surface/contact/collide_without_contact") or "").strip().lower()
     return not (bits and not bits.removeprefix("0x").strip("0")) and sensed not in _TRUE
 
 
-def _law(collision: Node, name: str, key: str, draft: Draft) -> dict[str, float]:
+def _law(collision: FileElement, name: str, key: str, draft: Draft) -> dict[str, float]:
     """Stiffness and friction of a collision; a note of other numbers."""
     found: dict[str, float] = {}
     stiffness, friction = "surface/contact/ode/kp", "surface/friction/ode/mu"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import WORLD, pose
 from ephs.mechanics.imports.elements import named
-from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.imports.xml import MOST_LEVELS, numbers
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.semantics.bundle import Array
@@ -34,7 +34,9 @@ class Scope:
         Whether it is static, by itself or by a model around it.
     """
 
-    def __init__(self, element: Node, parent: "Scope | None", prefix: str, grounded: bool, faults: list[Fault]) -> None:
+    def __init__(
+        self, element: FileElement, parent: "Scope | None", prefix: str, grounded: bool, faults: list[Fault]
+    ) -> None:
         self.element, self.parent, self.prefix, self.grounded = element, parent, prefix, grounded
         self._faults = faults
         self.name = element.get("name") or ""
@@ -129,10 +131,10 @@ class Scope:
         self._faults.append(fault("no link", self.key("models"), "none"))
         return None
 
-    def _elements(self) -> dict[str, Node]:
+    def _elements(self) -> dict[str, FileElement]:
         return {**{k: m.element for k, m in self.models.items()}, **self.frames, **self.joints, **self.links}
 
-    def _default(self, name: str, element: Node) -> str:
+    def _default(self, name: str, element: FileElement) -> str:
         """Default reference of a pose: a joint's child, the frame that it is attached to, the model."""
         own = MODEL if self.parent is not None else GROUND
         if element.tag == "joint":
@@ -141,7 +143,7 @@ class Scope:
         return self._attached[name] if element.tag == "frame" else own
 
 
-def world_of(root: Node, faults: list[Fault]) -> Scope:
+def world_of(root: FileElement, faults: list[Fault]) -> Scope:
     """The world of a file with its models. A model that moves alone gives its links no prefix; static ones beside
     others that move are the ground."""
     worlds = root.findall("world")
@@ -172,12 +174,12 @@ def global_name(end: "End") -> str:
     return WORLD if end is None else f"{end[0].prefix}{end[1]}"
 
 
-def is_true(element: Node, word: str) -> bool:
+def is_true(element: FileElement, word: str) -> bool:
     """Whether a child says true."""
     return (element.findtext(word) or "").strip().lower() in _TRUE
 
 
-def read_pose(element: Node, key: str, faults: list[Fault]) -> Array:
+def read_pose(element: FileElement, key: str, faults: list[Fault]) -> Array:
     """The numbers of an element's pose, (7,), whatever they are relative to; ``<origin pose=…>`` in SDF 1.0."""
     given = element.find("pose")
     older = element.find("origin") if given is None else None
@@ -196,12 +198,12 @@ def read_pose(element: Node, key: str, faults: list[Fault]) -> Array:
     return pose(x[:3], np.radians(x[3:]) if degrees else np.array(x[3:]))
 
 
-def _base(element: Node) -> str:
+def _base(element: FileElement) -> str:
     given = element.find("pose")
     return "" if given is None else (given.get("relative_to") or given.get("frame") or "")
 
 
-def _end(joint: Node, end: str) -> str:
+def _end(joint: FileElement, end: str) -> str:
     """The name of an end of a joint; in SDF 1.0 it is an attribute ``link``."""
     given = joint.find(end)
     return "" if given is None else ((given.text or "").strip() or given.get("link") or "")

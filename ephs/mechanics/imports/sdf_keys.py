@@ -1,6 +1,6 @@
 """Elements of SDF without an effect on motion, and values of others that have none: defaults of the specification."""
 
-from ephs.mechanics.imports.node import Plain
+from ephs.mechanics.imports.file_element import Plain
 
 # Step sizes and the like are of a solver.
 _SOLVERS = (

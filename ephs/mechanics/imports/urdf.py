@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.imports.collisions import collide, default_law
 from ephs.mechanics.imports.draft import WORLD, Draft, along, pose, turned_tensor
 from ephs.mechanics.imports.elements import check_kind, check_link, check_mass, draw, named, tensor
-from ephs.mechanics.imports.node import Node, Plain
+from ephs.mechanics.imports.file_element import FileElement, Plain
 from ephs.mechanics.imports.sdf_contacts import soft
 from ephs.mechanics.imports.sdf_keys import LINK as SDF_LINK
 from ephs.mechanics.imports.xml import bound, numbers, vector
@@ -57,11 +57,11 @@ _PLAIN_GAZEBO: Plain = {
     **dict.fromkeys(("provideFeedback", "implicitSpringDamper"), ()),
     **dict.fromkeys(("turnGravityOff", "selfCollide", "dampingFactor", "static"), ("0",)),
 }
-Settings = Mapping[str, list[Node]]
+Settings = Mapping[str, list[FileElement]]
 """Name of a link or joint -> its elements ``<gazebo reference=…>``."""
 
 
-def read_urdf(root: Node, draft: Draft, base: str) -> None:
+def read_urdf(root: FileElement, draft: Draft, base: str) -> None:
     """The links and joints of a robot, its root on the ground by a joint ``root_joint``, fixed or free."""
     draft.name = root.get("name") or draft.name
     if any("xacro" in element.tag for element in root.everything()):
@@ -100,9 +100,11 @@ def read_urdf(root: Node, draft: Draft, base: str) -> None:
     root.named("robots", draft.name, _PLAIN_ROBOT)
 
 
-def _gazebo(root: Node, links: Mapping[str, Node], joints: Mapping[str, Node], draft: Draft) -> Settings:
+def _gazebo(
+    root: FileElement, links: Mapping[str, FileElement], joints: Mapping[str, FileElement], draft: Draft
+) -> Settings:
     """Tags for Gazebo, by the link or joint that they are of."""
-    found: dict[str, list[Node]] = {}
+    found: dict[str, list[FileElement]] = {}
     for element in root.findall("gazebo"):
         name = element.get("reference") or ""
         kind = "links" if name in links else "joints" if name in joints else "robots"
@@ -115,7 +117,7 @@ def _gazebo(root: Node, links: Mapping[str, Node], joints: Mapping[str, Node], d
     return found
 
 
-def _tag(settings: list[Node], tag: str) -> str | None:
+def _tag(settings: list[FileElement], tag: str) -> str | None:
     """The last value of a tag for Gazebo, written as a text or as an attribute."""
     for element in reversed(settings):
         if (found := element.find(tag)) is not None:
@@ -123,7 +125,7 @@ def _tag(settings: list[Node], tag: str) -> str | None:
     return None
 
 
-def _ends(name: str, joint: Node, links: Mapping[str, Node], draft: Draft) -> tuple[str, str]:
+def _ends(name: str, joint: FileElement, links: Mapping[str, FileElement], draft: Draft) -> tuple[str, str]:
     """The parent and the child of a joint; its type is checked."""
     check_kind(name, joint, KINDS, draft.faults)
     ends: list[str] = []
@@ -135,7 +137,7 @@ def _ends(name: str, joint: Node, links: Mapping[str, Node], draft: Draft) -> tu
     return ends[0], ends[1]
 
 
-def _outwards(links: Mapping[str, Node], ends: Mapping[str, tuple[str, str]], draft: Draft) -> list[str]:
+def _outwards(links: Mapping[str, FileElement], ends: Mapping[str, tuple[str, str]], draft: Draft) -> list[str]:
     """The links from the root outwards; a fault if they do not form a tree."""
     faults, parents, children = draft.faults, dict[str, str](), dict[str, list[str]]()
     for name, (parent, child) in ends.items():
@@ -166,7 +168,7 @@ def _outwards(links: Mapping[str, Node], ends: Mapping[str, tuple[str, str]], dr
     return order
 
 
-def _link(name: str, link: Node, draft: Draft) -> None:
+def _link(name: str, link: FileElement, draft: Draft) -> None:
     inertial = link.find("inertial")
     if inertial is None:
         draft.body(name)
@@ -186,7 +188,7 @@ def _link(name: str, link: Node, draft: Draft) -> None:
             draw(draft, name, *solid)
 
 
-def _solids(element: Node, key: str, draft: Draft) -> Iterator[tuple[str, Any, np.ndarray]]:
+def _solids(element: FileElement, key: str, draft: Draft) -> Iterator[tuple[str, Any, np.ndarray]]:
     """Kind, sizes and pose of the solids of a visual or collision element; a mesh has a file and a scale."""
     geometry, faults = element.find("geometry"), draft.faults
     place = _origin(element, key, draft)
@@ -207,7 +209,7 @@ def _solids(element: Node, key: str, draft: Draft) -> Iterator[tuple[str, Any, n
         yield solid.tag, value, place
 
 
-def _collisions(name: str, link: Node, law: Mapping[str, Any], gazebo: list[Node], draft: Draft) -> None:
+def _collisions(name: str, link: FileElement, law: Mapping[str, Any], gazebo: list[FileElement], draft: Draft) -> None:
     """Surfaces of a link, or a note of its contacts."""
     if not draft.contact or not link.has("collision"):
         if link.has("collision"):
@@ -236,7 +238,7 @@ def _collisions(name: str, link: Node, law: Mapping[str, Any], gazebo: list[Node
         collision.named("collisions", name, _PLAIN_COLLISION)
 
 
-def _joint(name: str, joint: Node, parent: str, child: str, gazebo: list[Node], draft: Draft) -> None:
+def _joint(name: str, joint: FileElement, parent: str, child: str, gazebo: list[FileElement], draft: Draft) -> None:
     key, kind = f"joints.{name}", KINDS[str(joint.get("type"))]
     origin, turned = _origin(joint, key, draft), pose()
     if kind in AXIAL:
@@ -270,7 +272,7 @@ def _joint(name: str, joint: Node, parent: str, child: str, gazebo: list[Node], 
     joint.named("joints", name, _PLAIN_JOINT if d else _PLAIN_FIXED)
 
 
-def _mimic(name: str, joint: Node, joints: Mapping[str, Node], draft: Draft) -> None:
+def _mimic(name: str, joint: FileElement, joints: Mapping[str, FileElement], draft: Draft) -> None:
     """Couple a joint to its mimicked joint, if both have one degree of freedom and the latter starts at 0."""
     mimic = joint.find("mimic")
     if mimic is None:
@@ -289,7 +291,7 @@ def _mimic(name: str, joint: Node, joints: Mapping[str, Node], draft: Draft) -> 
         draft.gear(name, name, other, ratio, offset)
 
 
-def _transmission(element: Node, name: str, joints: Mapping[str, Node], draft: Draft) -> None:
+def _transmission(element: FileElement, name: str, joints: Mapping[str, FileElement], draft: Draft) -> None:
     """An actuator of a transmission between one actuator and one joint; its control is the actuator's effort."""
     tied, motors = element.findall("joint"), element.findall("actuator")
     joint = "" if len(tied) != 1 or len(motors) != 1 else tied[0].get("name") or ""
@@ -311,14 +313,14 @@ def _transmission(element: Node, name: str, joints: Mapping[str, Node], draft: D
     element.named("transmissions", name, _PLAIN_TRANSMISSION)
 
 
-def _effort(name: str, joint: Node, draft: Draft) -> float:
+def _effort(name: str, joint: FileElement, draft: Draft) -> float:
     """The largest effort of a joint, which is infinite where none is given."""
     limit = joint.find("limit")
     text = None if limit is None else limit.get("effort")
     return abs(bound(text, f"joints.{name}.limit.effort", draft.faults, math.inf))
 
 
-def _origin(element: Node, key: str, draft: Draft) -> np.ndarray:
+def _origin(element: FileElement, key: str, draft: Draft) -> np.ndarray:
     """The pose (7,) of an origin, turned by ``rpy``, or by ``quat_xyzw`` as in URDF 1.1."""
     origin = element.find("origin")
     at, faults = f"{key}.origin", draft.faults
@@ -336,6 +338,6 @@ def _origin(element: Node, key: str, draft: Draft) -> np.ndarray:
     return pose(place, [w, x, y, z])
 
 
-def _attribute(element: Node | None, name: str, key: str, draft: Draft, default: float | None = None) -> float:
+def _attribute(element: FileElement | None, name: str, key: str, draft: Draft, default: float | None = None) -> float:
     text = None if element is None else element.get(name)
     return numbers(text, 1, f"{key}.{name}", draft.faults, () if default is None else (default,))[0]

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from ephs.mechanics.imports.draft import UNLIMITED
-from ephs.mechanics.imports.node import Node
+from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.scene.text import file_text
@@ -97,7 +97,7 @@ def bound(text: str | None, key: str, faults: list[Fault], default: float) -> fl
 
 
 def vector(
-    element: Node | None, name: str, key: str, faults: list[Fault], default: Iterable[float] = (0.0, 0.0, 0.0)
+    element: FileElement | None, name: str, key: str, faults: list[Fault], default: Iterable[float] = (0.0, 0.0, 0.0)
 ) -> list[float]:
     """Three numbers in an attribute of an element, which may be missing."""
     return numbers(None if element is None else element.get(name), 3, f"{key}.{name}", faults, default)

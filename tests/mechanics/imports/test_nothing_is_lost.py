@@ -11,7 +11,7 @@ from collections import Counter
 import pytest
 
 import ephs
-from ephs.mechanics.imports import mjcf_keys, node
+from ephs.mechanics.imports import file_element, mjcf_keys
 from ephs.mechanics.imports.read import read_model
 
 USED, SILENT = object(), None
@@ -370,7 +370,7 @@ def test_a_read_that_is_deleted_in_the_source_is_told(monkeypatch, tmp_path):
     def recorded(word, original):
         def read(self, *of):
             frame = sys._getframe(1)
-            while frame.f_code.co_filename in (node.__file__, __file__):
+            while frame.f_code.co_filename in (file_element.__file__, __file__):
                 frame = frame.f_back
             line = frame.f_code.co_filename, frame.f_lineno
             if line in gone:
@@ -383,8 +383,10 @@ def test_a_read_that_is_deleted_in_the_source_is_told(monkeypatch, tmp_path):
         return read
 
     for word in ("get", "find", "findall"):
-        monkeypatch.setattr(node.Node, word, recorded(word, getattr(node.Node, word)))
-    monkeypatch.setattr(node.Node, "text", property(recorded("text", node.Node.text.fget)))
+        monkeypatch.setattr(file_element.FileElement, word, recorded(word, getattr(file_element.FileElement, word)))
+    monkeypatch.setattr(
+        file_element.FileElement, "text", property(recorded("text", file_element.FileElement.text.fget))
+    )
     for suffix, text in FULL.items():
         reads.clear()
         before = told(tmp_path, text, suffix)[1]

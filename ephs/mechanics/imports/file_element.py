@@ -12,7 +12,7 @@ _DECLARED = "xmlns"
 
 
 @final
-class Node:
+class FileElement:
     """An element of a file. Attributes, texts and children count as read when they are asked for.
 
     Attributes
@@ -27,7 +27,7 @@ class Node:
         self.tag = element.tag
         self._attributes = {k: v for k, v in element.attrib.items() if k.partition(":")[0] != _DECLARED}
         self._text = element.text
-        self._children = [Node(child) for child in element]
+        self._children = [FileElement(child) for child in element]
         self._seen: set[str] = set()  # names of attributes, and "" for the text
         self._kind = self._name = ""
         self._plain: Plain = {}
@@ -48,7 +48,7 @@ class Node:
         """Whether a child has one of these tags, or an attribute this name; it does not count as read."""
         return any(child.tag in tags for child in self._children) or any(tag in self._attributes for tag in tags)
 
-    def findall(self, path: str) -> list["Node"]:
+    def findall(self, path: str) -> list["FileElement"]:
         """The children with a tag, or those that a path of tags leads to; ``*`` stands for any tag."""
         tag, _, rest = path.partition("/")
         found = [child for child in self._children if tag in (child.tag, "*")]
@@ -56,7 +56,7 @@ class Node:
             child._passed = child._passed or False
         return [below for child in found for below in child.findall(rest)] if rest else found
 
-    def find(self, path: str) -> "Node | None":
+    def find(self, path: str) -> "FileElement | None":
         """The first of them; the others do not count as read."""
         tag, _, rest = path.partition("/")
         for child in self._children:
@@ -99,7 +99,7 @@ class Node:
         self._seen |= set(self._attributes)
         self.pass_by(*{child.tag for child in self._children}.difference(tags))
 
-    def everything(self) -> Iterator["Node"]:
+    def everything(self) -> Iterator["FileElement"]:
         """The element and all below it; they do not count as read."""
         yield self
         for child in self._children:
@@ -110,7 +110,7 @@ class Node:
         for path, kind, name in self._unread("", self):
             draft.leave(f"{path} of {kind}", name)
 
-    def _unread(self, path: str, owner: "Node") -> Iterator[tuple[str, str, str]]:
+    def _unread(self, path: str, owner: "FileElement") -> Iterator[tuple[str, str, str]]:
         kind, name, plain = owner._kind, owner._name, owner._plain
         for key, value in self._attributes.items():
             if key not in self._seen and _tells(value, plain.get(path + key)):
