@@ -16,7 +16,7 @@ from ephs.semantics.stage import Program
 from ephs.solve.methods.analysis import analyse
 from ephs.solve.methods.gauss import gauss_program
 from ephs.solve.methods.natural import Natural
-from ephs.solve.methods.natural4 import INSTANT, Natural4
+from ephs.solve.methods.natural4 import Natural4
 from ephs.solve.methods.newton import BEFORE, natural_program
 from ephs.solve.methods.records import DONE, parts_of
 from ephs.solve.methods.scheme import STAGES
@@ -100,7 +100,7 @@ def test_the_stages_of_order_4(name, seed):
     def given():
         return [
             parts_of(made.tables), parts_of(method._groups), np.zeros(made.unknowns, dtype=np.int64), x.copy(),
-            z.copy(), made.scal(h), made.scal(0.0), made.scal(INSTANT), inputs,
+            z.copy(), made.scal(h), made.scal(0.0), inputs,
             copied(made.memory()), copied(method._scratch), 1,
         ]  # fmt: skip
 
