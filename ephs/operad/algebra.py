@@ -11,6 +11,7 @@ from operator import eq
 from typing import Any, Generic, Protocol, TypeVar, cast, final
 
 from ephs.operad.errors import PatternError
+from ephs.operad.frames import in_frames_of
 from ephs.operad.matching import require_interface
 from ephs.operad.names import ROOT, Path, paths_text
 from ephs.operad.nesting import Nesting
@@ -158,11 +159,14 @@ def apply(algebra: Algebra[T], pattern: Pattern, elements: Mapping[Path, T], at:
         wrong = min(elements.keys() ^ pattern.boxes.keys())
         found, expected = paths_text(elements), paths_text(pattern.boxes)
         raise PatternError("fillings", box=at / wrong, found=found, expected=expected)
+    given_by: dict[Path, Interface] = {}
     for box, content in pattern.boxes.items():
         given = algebra.interface_of(elements[box])
         if given is None:
             raise PatternError("foreign", box=at / box, found=type(elements[box]).__name__, expected=algebra.name)
         require_interface(at / box, content.interface, given)
+        given_by[box] = given
+    pattern = in_frames_of(pattern, given_by)
     return algebra.compose(pattern, {box: elements[box] for box in pattern.boxes})
 
 

@@ -29,6 +29,7 @@ _TEXTS = {
     "link-size": "link {found}: expected two junctions or more that share their state",
     "link-quantity": "link between junctions {junction}: found the quantities {found}, expected one quantity;"
     " only equal quantities can share a state",
+    "frames": "one state in two frames: found {found}, expected {expected}; put a change of frame between them",
     "unknown-box": "box {box}: there is no such box; the boxes are {expected}",
     "filling-type": "box {box}: the filling is {found}, expected {expected}",
     "interface": "box {box}: the filling's interface does not match: {ports}. Found {found}, expected"

@@ -5,6 +5,7 @@ data, not up to isomorphism, because paths concatenate associatively and boxes a
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from ephs.operad.algebra_laws import ALGEBRA_LAWS, MAP_LAWS
@@ -13,6 +14,7 @@ from ephs.operad.equations import Equation, Law
 from ephs.operad.names import ROOT, Path
 from ephs.operad.nesting import Nesting
 from ephs.operad.pattern import Pattern
+from ephs.operad.quantities import PortType
 
 __all__ = ["ALGEBRA_LAWS", "LAWS", "MAP_LAWS", "law"]
 
@@ -74,7 +76,12 @@ def _port_names(f: Pattern, a: Path, g: Pattern, names: Names) -> Equation:
 
 
 def _interface(f: Pattern, fillings: Mapping[Path, Pattern]) -> Equation:
-    return Equation(f.substitute(fillings).interface, f.interface)
+    found, given = f.substitute(fillings).interface, f.interface
+    return Equation(found.map(_without_frame), given.map(_without_frame))
+
+
+def _without_frame(port: PortType) -> PortType:
+    return replace(port, quantity=port.quantity.in_frame(None))
 
 
 def _nested(nesting: Nesting) -> Equation:
@@ -116,7 +123,7 @@ LAWS: tuple[Law, ...] = (
     ),
     Law("flattening from below", "all levels at once = innermost patterns first", ("nesting",), _nested),
     Law("flattening from above", "all levels at once = outermost patterns first", ("nesting",), _from_above),
-    Law("interface", "f ∘ (g) has the interface of f", ("f", "fillings"), _interface),
+    Law("interface", "f ∘ (g) has the interface of f, but for frames that it gains", ("f", "fillings"), _interface),
 )
 
 

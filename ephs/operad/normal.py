@@ -37,7 +37,7 @@ class PowerJunction:
 class StateClass:
     """Junctions of one state: power-bearing members, outer state ports, inner state ports (box, port).
 
-    The quantity is that of all of them, without frame; outer ports are given with theirs.
+    The quantity is that of all of them; outer ports are given with theirs, whose unit may be written otherwise.
     """
 
     quantity: Quantity
@@ -86,7 +86,7 @@ def normal_form(pattern: "Pattern") -> NormalForm:
     for members in {pattern.state_class(path) for path in stateful} | pattern.links:
         first = next(iter(members))
         found = StateClass(
-            pattern.junctions[first].quantity.in_frame(None),
+            pattern.junctions[first].quantity,
             frozenset(path for path in members if path in junctions),
             frozenset((p, j.quantity) for p in members if (j := pattern.junctions[p]).exposed and not j.power),
             frozenset(port for path in members for port in state_ports.get(path, ())),

@@ -57,9 +57,8 @@ class Pattern:
     Raises
     ------
     PatternError
-        If names clash (P5), a port lies on no junction (P2), a junction has no inner port (P4), or linked
-        junctions differ in quantity (P1). An outer port is named like its junction, so it has one at most
-        (P3).
+        If names clash (P5), a port lies on no junction (P2), a junction has no inner port (P4), or linked junctions
+        differ in quantity (P1) or frame. An outer port is named like its junction, so it has one at most (P3).
 
     Examples
     --------
@@ -93,9 +92,11 @@ class Pattern:
         self._set(found, wired, read_links(links, found))
 
     def _set(self, junctions: Directory[Junction], boxes: Directory[Box], links: Iterable[Iterable[Path]]) -> None:
+        from ephs.operad.frames import in_united_frames
         from ephs.operad.wellformed import require_pattern
 
-        self._assign(junctions, boxes, require_pattern(junctions, boxes, links))
+        classes = require_pattern(junctions, boxes, links)
+        self._assign(*in_united_frames(junctions, boxes, classes), classes)
 
     def _assign(
         self, junctions: Directory[Junction], boxes: Directory[Box], classes: Mapping[Path, frozenset[Path]]
@@ -193,7 +194,7 @@ class Pattern:
         Raises
         ------
         PatternError
-            For an unknown box, a filling that is no pattern, or an interface that differs.
+            For an unknown box, a filling that is no pattern, an interface that differs, or a state in two frames.
         """
         from ephs.operad.substitution import substitute
         from ephs.operad.wellformed import read_fillings
@@ -222,7 +223,7 @@ class Pattern:
         Raises
         ------
         PatternError
-            A box without filling, a filling without box, what is no element, or an interface that differs.
+            A box without filling, a filling without box, no element, another interface, or a state in two frames.
         """
         from ephs.operad.algebra import apply
         from ephs.operad.wellformed import read_fillings

@@ -75,8 +75,8 @@ class Quantity:
     parity
         +1 if it is even under time reversal, -1 if it is odd, as momenta and flux linkages are.
     frame
-        Name of the frame in which it is given, to find ports connected across frames. It has no bearing on
-        the semantics and is compared only where both sides carry one.
+        Name of the frame in which it is given, to find ports connected across frames (`ephs.operad.frames`). It has
+        no bearing on the semantics, and none on which interfaces match.
     domain
         Open interval of its numbers, such as (0, inf); for states on vector spaces only.
     charges
@@ -121,14 +121,12 @@ class Quantity:
     def matches(self, other: "Quantity") -> bool:
         """Whether ports of the two quantities may be connected.
 
-        The frames decide only where both quantities carry one, so matching is transitive among quantities
-        which all carry a frame and among those without, not across. Units are compared by what they are made of.
+        An equivalence: frames do not count, and units are compared by what they are made of.
         """
         if self == other:
             return True
-        tagged = self.frame is not None and other.frame is not None
         same = replace(other, frame=self.frame, unit=self.unit) == self
-        return same and dimension(self.unit) == dimension(other.unit) and (not tagged or self.frame == other.frame)
+        return same and dimension(self.unit) == dimension(other.unit)
 
     def in_frame(self, frame: str | None) -> "Quantity":
         """The same quantity, given in the named frame."""

@@ -1,19 +1,20 @@
 """Substitution: patterns into boxes of a pattern. This is the one place where names of levels are joined."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
+from ephs.operad.frames import in_united_frames, met, retyped, with_junctions
 from ephs.operad.links import closure
 from ephs.operad.matching import require_interface
-from ephs.operad.names import ROOT, Path, PathLike, paths_text
+from ephs.operad.names import ROOT, Path, paths_text
 from ephs.operad.nesting import Nesting
 from ephs.operad.normal import powered
 from ephs.operad.parts import Box, Junction, Port
 from ephs.operad.pattern import Pattern
-from ephs.operad.quantities import Interface
+from ephs.operad.quantities import Quantity
 from ephs.operad.wellformed import box_of, require_one_quantity
 
 
@@ -29,7 +30,7 @@ def flatten(nesting: Nesting) -> Pattern:
         nesting = _through_identity(ROOT, nesting)
     if not nesting.children:
         return nesting.pattern
-    whole = _Whole(dict(nesting.pattern.junctions), {}, [tuple(group) for group in nesting.pattern.links])
+    whole = _Whole(dict(nesting.pattern.junctions), {}, [tuple(group) for group in nesting.pattern.links], set())
     # Each level knows what its junctions are called in the whole. A list, as recursion would bound the depth;
     # of iterators, as boxes keep their order.
     top = _Level(ROOT, nesting, {path: path for path in nesting.pattern.junctions})
@@ -44,7 +45,9 @@ def flatten(nesting: Nesting) -> Pattern:
                 require_interface(path, content.interface, child.pattern.interface)
                 while child.pattern.is_identity and child.children:
                     child = _through_identity(path, child)
-            if child is None or child.pattern.is_identity:  # an identity changes nothing: its box keeps the name
+            if child is None or child.pattern.is_identity:  # an identity gives frames alone: its box keeps the name
+                for port, kind in child.pattern.interface.items() if child is not None else ():
+                    changed |= whole.met(level.target[content.ports[port].junction], kind.quantity, path, port)
                 whole.boxes[path] = _moved(content, level, whole.junctions)
                 continue
             changed = True
@@ -58,11 +61,19 @@ def flatten(nesting: Nesting) -> Pattern:
 @final
 @dataclass(frozen=True, slots=True)
 class _Whole:
-    """Parts of the flattened pattern under construction."""
+    """Parts of the flattened pattern under construction, and its junctions that gained a frame."""
 
     junctions: dict[Path, Junction]
     boxes: dict[Path, Box]
     links: list[tuple[Path, ...]]
+    gained: set[Path]
+
+    def met(self, junction: Path, quantity: Quantity, box: Path, port: Path) -> bool:
+        """Unite the frame of a port of a filling with that of its junction; whether the junction gained one."""
+        found = met(self.junctions, junction, quantity, box, port)
+        if found:
+            self.gained.add(junction)
+        return found
 
 
 @final
@@ -82,6 +93,7 @@ def _opened(box: Path, content: Box, child: Nesting, outer: _Level, whole: _Whol
     for path, inner in filling.junctions.items():
         if inner.exposed and inner.power:
             target[path] = outer.target[content.ports[path].junction]  # absorbed
+            whole.met(target[path], inner.quantity, box, path)
             continue
         target[path] = kept = box / path
         whole.junctions[kept] = Junction(inner.quantity) if inner.exposed else inner
@@ -108,12 +120,14 @@ def _moved(content: Box, level: _Level, new: Mapping[Path, Junction]) -> Box:
 
 def _tidied(whole: _Whole) -> Pattern:
     """The pattern without redundant handles: junctions whose state another junction of their class has, too."""
-    junctions = Directory.trusted(whole.junctions)
-    if not whole.links:
-        return Pattern.trusted(junctions, Directory.trusted(whole.boxes), {})
-    bearing = powered(whole.junctions, whole.boxes)
     classes = closure(whole.links)
-    require_one_quantity(junctions, classes)
+    require_one_quantity(whole.junctions, classes)
+    if whole.gained:
+        whole.boxes.update(retyped(whole.boxes, whole.junctions, whole.gained))
+    junctions, found = in_united_frames(Directory.trusted(whole.junctions), Directory.trusted(whole.boxes), classes)
+    if not whole.links:
+        return Pattern.trusted(junctions, found, {})
+    bearing = powered(whole.junctions, whole.boxes)
     moved: dict[Path, Path] = {}
     for members in set(classes.values()):
         handles = {path for path in members if path not in bearing and not junctions[path].exposed}
@@ -123,8 +137,8 @@ def _tidied(whole: _Whole) -> Pattern:
     if moved:
         junctions = Directory.trusted({path: value for path, value in junctions.items() if path not in moved})
         classes = closure([path for path in group if path not in moved] for group in set(classes.values()))
-    boxes = whole.boxes
-    for box, content in boxes.items():
+    boxes = dict(found)
+    for box, content in found.items():
         if not moved.keys().isdisjoint(port.junction for port in content.ports.values()):
             boxes[box] = box_of(_redirected(content.ports, moved), junctions)
     return Pattern.trusted(junctions, Directory.trusted(boxes), classes)
@@ -145,21 +159,14 @@ def _redirected(ports: Mapping[Path, Port], moved: Mapping[Path, Path]) -> Direc
 
 
 def _through_identity(box: Path, nesting: Nesting) -> Nesting:
-    """Filling of an identity's box, in the frames of the identity's interface."""
+    """Filling of an identity's box, in the frames of both."""
     (child,) = nesting.children.values()
-    interface = nesting.pattern.interface
-    require_interface(box, interface, child.pattern.interface)
-    return Nesting(_adopted(child.pattern, interface), child.children)
-
-
-def _adopted(filling: Pattern, interface: Interface) -> Pattern:
-    if filling.interface == interface:
-        return filling
-    pairs: list[tuple[PathLike, Junction]] = [
-        (path, replace(inner, quantity=interface[path].quantity) if inner.exposed else inner)
-        for path, inner in filling.junctions.items()
-    ]
-    return Pattern.identity(interface) if filling.is_identity else Pattern(pairs, filling.boxes, filling.links)
+    interface, filling = nesting.pattern.interface, child.pattern
+    require_interface(box, interface, filling.interface)
+    junctions = dict(filling.junctions)
+    if any([met(junctions, path, kind.quantity, box, path) for path, kind in interface.items()]):
+        filling = with_junctions(filling, junctions)
+    return Nesting(filling, child.children)
 
 
 def _require_pattern(pattern: Pattern, box: Path, filling: object) -> Pattern:

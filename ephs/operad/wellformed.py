@@ -129,11 +129,9 @@ def require_one_quantity(junctions: Mapping[Path, Junction], classes: Mapping[Pa
     for members in sorted(set(classes.values()), key=min):
         paths = sorted(members)
         quantities = [junctions[path].quantity for path in paths]
-        # Frames need not all be given, but those that are given must agree.
-        reference = next((q for q in quantities if q.frame is not None), quantities[0])
         for path, quantity in zip(paths, quantities, strict=True):
-            if not quantity.matches(reference):
-                found = f"{quantity} at {path}, {reference} at {paths[quantities.index(reference)]}"
+            if not quantity.matches(quantities[0]):
+                found = f"{quantity} at {path}, {quantities[0]} at {paths[0]}"
                 names = " and ".join(map(str, paths))
                 raise PatternError("link-quantity", junction=names, found=found, expected="one quantity")
 

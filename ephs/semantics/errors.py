@@ -67,6 +67,8 @@ _TEXTS = {
         "scene.with_state(rates=…)"
     ),
     "unknown-state": "{path}: no such state; the states are {expected}",
+    "unknown-component": "{path}: no such component; the components are {expected}",
+    "efforts": "{path}: the efforts are {found!r}, expected finite numbers of shape {expected}",
     "no-time": "{path}: the solution has no state at {found!r} s; it has times from {first!r} to {last!r} s",
     "unknown-port": "{path}: no such outer port; the outer ports are {expected}",
     "references": (

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, final
 import numpy as np
 
 from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Pattern, Quantity
+from ephs.operad.frames import in_frames_of
+from ephs.operad.links import closure
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError, listed
@@ -44,6 +46,8 @@ class System:
     ------
     SemanticsError
         A box without filling, a filling without box, or an interface that does not match.
+    PatternError
+        A state has two frames: those of the pattern, and of what fills its boxes.
     """
 
     pattern: Pattern
@@ -52,6 +56,24 @@ class System:
 
     def __post_init__(self) -> None:
         require_fillings(self.pattern, self.fillings)
+        interfaces = {box: filling.interface for box, filling in self.fillings.items()}
+        object.__setattr__(self, "pattern", in_frames_of(self.pattern, interfaces, self._joined))
+
+    def _joined(self) -> list[list[Path]]:
+        """The junctions that share their state since a subsystem has it at several ports."""
+        return [
+            [self.pattern.boxes[box].ports[port].junction for port in group]
+            for box, filling in self.fillings.items()
+            if isinstance(filling, System)
+            for group in filling.shared_ports
+        ]
+
+    @property
+    def shared_ports(self) -> list[list[Path]]:
+        """The outer ports that share a state, two or more, by state."""
+        classes = set(closure([*self.pattern.links, *self._joined()]).values())
+        groups = [sorted(path for path in each if path in self.interface) for each in classes]
+        return [group for group in groups if len(group) > 1]
 
     @staticmethod
     def of(pattern: Pattern, fillings: Mapping[str, "Filling"] | Mapping[Path, "Filling"]) -> "System":

@@ -148,7 +148,7 @@ REFUSED = {
             {"x": {"a": "a", "b": "b", "c": "c"}},
             [("a", "b"), ("b", "c")],
         ),
-        {"kind": "link-quantity", "junction": "a and b and c"},
+        {"kind": "frames", "junction": "a"},
     ),
     "link to nowhere": (
         lambda: Pattern({"q": junction(Q)}, {"a": {"q": "q"}}, [("q", "r")]),

@@ -132,7 +132,7 @@ def test_patterns_without_state_ports_substitute_without_links(f):
     assert not whole.links
 
 
-def test_what_fills_an_identity_takes_its_frames():
+def test_what_fills_an_identity_is_in_the_frames_of_both():
     """And keeps all else: inner junctions, links, and what fills it in turn."""
     plain, tagged = PortType(Q), PortType(Q.in_frame("C"))
     lower = Pattern(
@@ -145,11 +145,11 @@ def test_what_fills_an_identity_takes_its_frames():
         {"x": {"y": "q", "z": "r", "w": "s"}},
     )
     whole = Nesting(Pattern.identity({"q": plain}), {".": Nesting(lower, {"a": deep})}).flatten()
-    assert whole.interface == Directory({"q": plain})
+    assert whole.interface == Directory({"q": tagged})
     assert whole.junctions["r"] == junction(Q.in_frame("C")) and [names(g) for g in whole.links] == [{"q", "r"}]
     assert names(whole.boxes) == {"a.x"}
     inner = Nesting(Pattern.identity({"q": plain}), {".": Pattern.identity({"q": tagged})}).flatten()
-    assert inner.is_identity and inner.interface == Directory({"q": plain})
+    assert inner.is_identity and inner.interface == Directory({"q": tagged})
     with pytest.raises(PatternError, match=r"box b: .*differing q"):
         upper = Pattern({"q": junction(Q)}, {"b": {"q": "q"}})
         wrong = Nesting(
@@ -171,19 +171,6 @@ def test_interfaces_stay_the_same_objects_where_no_frame_changes():
     framed = Pattern({"q": junction(Q.in_frame("C"))}, {"a": {"q": "q"}}).substitute(a=lower)
     assert framed.boxes["a.x"].interface["q"].quantity == Q.in_frame("C")
     assert framed.boxes["a.x"].interface["r"].quantity == Q
-
-
-def test_frames_keep_wires_apart():
-    lower = Pattern({"q": junction(Q.in_frame("C"), exposed=True)}, {"a": {"q": "q"}})
-    for frame, fits in (("C", True), (None, True), ("B", False)):
-        upper = Pattern({"q": junction(Q.in_frame(frame))}, {"box": {"q": "q"}})
-        if fits:
-            assert upper.substitute(box=lower).junctions["q"].quantity == Q.in_frame(frame)
-            identity = Pattern.identity(upper.boxes["box"].interface)
-            assert identity.substitute({".": lower}).interface == identity.interface
-        else:
-            with pytest.raises(PatternError, match=r"in frame C.*in frame B"):
-                upper.substitute(box=lower)
 
 
 UPPER = Pattern({"q": junction(Q), "s": junction(quantity.entropy)}, {"a": {"q": "q", "s": "s"}, "b": {"s": "s"}})

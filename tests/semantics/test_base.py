@@ -261,3 +261,29 @@ def as_relation(primitive):
 def test_points_that_are_none_are_refused_by_name(state, ports, words):
     with pytest.raises(AssemblyError, match=words):
         OPEN(r=READER, **COIL).relation().at(state, ports)
+
+
+FRICTION = Pattern.from_text("p: momentum, exposed; s: entropy, exposed; mf(p, s)")(mf=lib.friction(d=1.0)).relation()
+
+
+def test_efforts_are_named_by_text_as_by_path():
+    """The matrix of friction depends on the velocity at which it is taken."""
+    e = np.array([2.0, 100.0])
+    named, pathed = FRICTION.at(efforts={"mf": e}), FRICTION.at(efforts={Path.of("mf"): e})
+    assert named.distance(pathed) == 0.0
+    assert named.distance(FRICTION.at()) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("efforts", "words"),
+    [
+        ({"fm": [1.0, 2.0]}, "fm: no such component; the components are mf"),
+        ({"mf.p": [1.0, 2.0]}, "mf.p: no such component; the components are mf"),
+        ({"mf": 1.0}, r"mf: the efforts are 1.0, expected finite numbers of shape \(2,\)"),
+        ({"mf": [1.0, np.inf]}, r"mf: the efforts are \[1.0, inf\], expected finite numbers of shape \(2,\)"),
+        ({"mf": "much"}, "mf: the efforts are 'much', expected finite numbers"),
+    ],
+)
+def test_efforts_of_no_component_are_refused_by_name(efforts, words):
+    with pytest.raises(AssemblyError, match=words):
+        FRICTION.at(efforts=efforts)

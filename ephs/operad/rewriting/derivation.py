@@ -163,8 +163,7 @@ def _add(
     for group in set(right.classes.values()):
         number = next((states[path] for path in sorted(group & kept.junctions.keys())), len(elements.states))
         if number == len(elements.states):
-            quantity = right.junctions[min(group)].quantity.in_frame(None)
-            elements.states.append(State(quantity, set(), set(), set()))
+            elements.states.append(State(right.junctions[min(group)].quantity, set(), set(), set()))
         for path in group - kept.junctions.keys():
             elements.state_of[junctions[path]] = number
             if path in rule.powered:

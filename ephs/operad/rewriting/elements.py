@@ -65,7 +65,7 @@ class Elements:
         for path, junction in pattern.junctions.items():
             if path not in found.state_of:
                 found.state_of.update(dict.fromkeys(pattern.state_class(path), len(found.states)))
-                found.states.append(State(junction.quantity.in_frame(None), set(), set(), set()))
+                found.states.append(State(junction.quantity, set(), set(), set()))
             state = found.states[found.state_of[path]]
             if path in bearing:
                 found.junctions[path] = (junction.quantity, junction.exposed and junction.power)

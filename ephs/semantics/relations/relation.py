@@ -18,7 +18,7 @@ import numpy as np
 
 from ephs.operad import ROOT, Algebra, Directory, Interface, Path, Pattern
 from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.relations.base import BasePoint, StateClass, Values, component_classes, glued_classes, place
 from ephs.semantics.relations.flat import Flat, flat_classes
@@ -78,7 +78,7 @@ class Relation:
         state: Values | None = None,
         ports: Values | None = None,
         *,
-        efforts: Mapping[Path, Array] | None = None,
+        efforts: Values | None = None,
     ) -> LinearRelation:
         """The fibre over a point of the base; empty where values of one state differ.
 
@@ -101,17 +101,19 @@ class Relation:
         AssemblyError
             An unknown path, a wrong shape, or a number that is not finite.
         """
+        components = dict(self.fibre.leaves())
+        at = _efforts(components, efforts or {})
         states, contradiction = place(self.classes, state or {}, ports or {})
         if contradiction:
             rates = sorted((path, each.quantity.space.dim) for each in self.classes for path in each.stores)
             return LinearRelation.nothing(tuple(rates), power_ports(self.interface), contradiction)
         unit = 1.0
-        for path, primitive in self.fibre.leaves():
+        for path, primitive in components.items():
             if isinstance(primitive, Storage):
                 point = {port: states[path / port] for port in primitive.reads}
                 effort = primitive.effort(point, self.reference)
                 unit = max(unit, float(np.abs(effort).max(initial=0.0)))
-        return self.fibre.at(ROOT, BasePoint(states, dict(efforts or {}), self.reference, unit))
+        return self.fibre.at(ROOT, BasePoint(states, at, self.reference, unit))
 
     def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "Relation":
         """Fill the boxes of a pattern with relations, systems and primitives; the latter mean their relations.
@@ -181,3 +183,21 @@ class _Glued:
 
     def at(self, path: Path, point: BasePoint) -> LinearRelation:
         return compose_linear(self.pattern, {box: part.at(path / box, point) for box, part in self.parts.items()})
+
+
+def _efforts(components: Mapping[Path, Primitive], values: Values) -> dict[Path, Array]:
+    """The given efforts by component, (n,) each."""
+    found: dict[Path, Array] = {}
+    for name, value in values.items():
+        path = Path.of(name)
+        if path not in components:
+            raise AssemblyError("unknown-component", path, expected=listed(path, sorted(map(str, components))))
+        shape = (components[path].bundle.size,)
+        try:
+            array = np.atleast_1d(np.asarray(value, dtype=float))
+        except (TypeError, ValueError):
+            array = np.array(np.nan)
+        if array.shape != shape or not np.all(np.isfinite(array)):
+            raise AssemblyError("efforts", path, found=value, expected=shape)
+        found[path] = array
+    return found
