@@ -102,7 +102,7 @@ def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[C
 
 def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
     """Each condition with its proof, or without one."""
-    from ephs.semantics.checks import STATEMENTS, constant
+    from ephs.semantics.checks import STATEMENTS
     from ephs.semantics.search import simplest
 
     if primitive.kind == "environment":
@@ -110,8 +110,10 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
     if primitive.proof is not None:
         return primitive.proof()
     simplest(primitive)  # what fails here needs no symbols
-    if constant(primitive):
-        return proved("it is constant, and was evaluated", *STATEMENTS[primitive.kind])
+    if primitive.kind == "reversible" and not primitive.reads:
+        from ephs.semantics.verdicts.constant import decided
+
+        return decided(primitive)
     if primitive.formula is None:
         return tuple(Condition(statement, False, "") for statement in STATEMENTS[primitive.kind])
     from ephs.semantics.proving import conditions_of

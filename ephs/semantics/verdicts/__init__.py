@@ -1,0 +1,4 @@
+"""Verdicts on structures: what is decided of the numbers as they are given.
+
+In: a primitive. Out: its conditions, proved or searched, or the error that refutes one. Start in `constant`.
+"""

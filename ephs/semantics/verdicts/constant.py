@@ -1,0 +1,143 @@
+"""Constant Dirac structures f = L e + Cᵀ λ, 0 = C e, decided.
+
+A float is a rational number, so a condition holds of the numbers as given, or it does not. What fails may hold of the
+decimals as they are written (0.1 + 0.2 − 0.3), or up to the rounding of each single number; then it is proved, too. A
+defect within the rounding of other numbers *of the same units*, as products of matrices leave it, is neither proved nor
+refuted. Anything larger is refuted, however large the numbers beside it are.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.semantics.algebra.elimination import eliminated
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.errors import StructureError
+from ephs.semantics.spaces.rank import TINY
+from ephs.semantics.trials import Trial
+from ephs.semantics.verdict import Condition
+
+if TYPE_CHECKING:
+    from ephs.semantics.primitives import Reversible
+
+ROUNDED = 8.0 * float(np.finfo(float).eps)
+"""Relative error of a number that was computed in a few operations."""
+READINGS: Mapping[str, Callable[[float], Fraction]] = {
+    "as given": Fraction,
+    "as written in decimals": lambda number: Fraction(repr(number)),
+}
+"""How a float is read as a rational number, the strictest first."""
+CRUMBS = "up to the rounding of numbers of the same units"
+
+
+def decided(reversible: "Reversible") -> tuple[Condition, ...]:
+    """The conditions on a reversible primitive that reads no state.
+
+    Raises
+    ------
+    StructureError
+        One is refuted, with the entry that does.
+    """
+    skew, constraint = (np.asarray(matrix, dtype=float) for matrix in reversible.structure({}))
+    isotropic, conserved, mirrored, turned = STATEMENTS["reversible"]
+    return (
+        _isotropy(reversible, isotropic, skew),
+        _conservation(reversible, conserved, skew, constraint),
+        _parity(reversible, mirrored, skew, constraint),
+        Condition(turned, True, "no rotation is read"),
+    )
+
+
+def _isotropy(reversible: "Reversible", statement: str, skew: Array) -> Condition:
+    """L + Lᵀ = 0, entry by entry; as it is of two numbers each, decimals say the same as the numbers given."""
+    defect = np.abs(skew + skew.T)
+    if not defect.any():
+        return _proved(statement, "as given")
+    own = ROUNDED * np.maximum(np.abs(skew), np.abs(skew.T))
+    np.fill_diagonal(own, 0.0)
+    if np.all(defect <= own):
+        return _proved(statement, "up to the rounding of each number")
+    beside = ROUNDED * _beside(reversible, skew)
+    return _crumbs(reversible, statement, "isotropy", skew + skew.T, np.maximum(beside, beside.T))
+
+
+def _conservation(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
+    """L w = 0 and C w = 0 of the amounts w of each charge, row by row."""
+    how: list[str] = []
+    for kind in reversible.bundle.charges:
+        amounts = reversible.bundle.indicator(kind)
+        rows = np.concatenate([skew, constraint])
+        reading = next(
+            (words for words, read in READINGS.items() if all(not _dot(row, amounts, read) for row in rows)), None
+        )
+        defect, own = rows @ amounts, ROUNDED * (np.abs(rows) @ np.abs(amounts))
+        if reading is None and not np.all(np.abs(defect) <= own):
+            worst = int(np.argmax(np.abs(defect) / np.maximum(own, TINY)))
+            raise _refuted(reversible, "conservation", float(defect[worst]), (worst,), quantity=kind)
+        how.append(f"{kind} {reading or 'up to the rounding of each number'}")
+    return Condition(statement, True, "decided: " + ", ".join(how) if how else "it has no port with a charge")
+
+
+def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
+    """(f, e) ∈ D ⇔ (−ϵf, ϵe) ∈ D: by single entries where each row of C is of one parity, else as relations over ℚ."""
+    parity = reversible.bundle.parity()
+    alike = np.where(np.multiply.outer(parity, parity) > 0.0, skew, 0.0)
+    pure = all(len(set(parity[row != 0.0])) <= 1 for row in constraint)
+    if pure and not alike.any():
+        return _proved(statement, "as given")
+    mirrored = -parity[:, None] * skew * parity, constraint * parity
+    for words, read in READINGS.items():
+        if _relation(skew, constraint, read) == _relation(*mirrored, read):
+            return _proved(statement, words)
+    if pure:
+        return _crumbs(reversible, statement, "parity", alike, ROUNDED * _beside(reversible, skew))
+    return Condition(statement, False, "equal up to rounding")
+
+
+def _relation(skew: Array, constraint: Array, read: Callable[[float], Fraction]) -> list[object]:
+    """Equations in f and e alone, in reduced form: equal for equal structures."""
+    n, rows = len(skew), list[dict[tuple[str, int], Fraction]]()
+    for i, (of_efforts, of_multipliers) in enumerate(zip(skew.tolist(), constraint.T.tolist(), strict=True)):
+        row = {("f", i): Fraction(-1)}
+        row |= {("e", j): read(entry) for j, entry in enumerate(of_efforts) if entry}
+        row |= {("λ", k): read(entry) for k, entry in enumerate(of_multipliers) if entry}
+        rows.append(row)
+    rows += [{("e", j): read(entry) for j, entry in enumerate(row) if entry} for row in constraint.tolist()]
+    return list(eliminated(rows, [(letter, i) for letter in "fe" for i in range(n)], lambda key: key))
+
+
+def _dot(row: Array, amounts: Array, read: Callable[[float], Fraction]) -> Fraction:
+    pairs: Iterable[tuple[float, float]] = zip(row.tolist(), amounts.tolist(), strict=True)
+    return sum((read(a) * read(b) for a, b in pairs if a and b), Fraction(0))
+
+
+def _beside(reversible: "Reversible", matrix: Array) -> Array:
+    """(n, n) the largest entry between ports of the same units, for each."""
+    units = [quantity.unit for _, where, quantity in reversible.bundle.items() for _ in range(where.start, where.stop)]
+    kinds = np.unique(units, return_inverse=True)[1] if units else np.zeros(0, dtype=int)
+    largest = np.zeros((kinds.max(initial=-1) + 1,) * 2)
+    np.maximum.at(largest, (kinds[:, None], kinds), np.abs(matrix))
+    return largest[kinds[:, None], kinds]
+
+
+def _proved(statement: str, words: str) -> Condition:
+    return Condition(statement, True, f"decided: it holds of the numbers {words}")
+
+
+def _crumbs(reversible: "Reversible", statement: str, kind: str, defect: Array, allowed: Array) -> Condition:
+    """What is left of a condition that does not hold of the numbers: rounding, or a counterexample."""
+    off = np.abs(defect) / np.maximum(allowed, TINY)
+    if off.max(initial=0.0) <= 1.0:
+        return Condition(statement, False, f"the numbers are off by {np.abs(defect).max():.1e}, {CRUMBS}")
+    entry = tuple(int(i) for i in np.unravel_index(int(np.argmax(off)), off.shape))
+    raise _refuted(reversible, kind, float(defect[entry]), entry)
+
+
+def _refuted(
+    reversible: "Reversible", kind: str, found: float, entry: tuple[int, ...], **facts: object
+) -> StructureError:
+    witness = Trial({}, np.zeros(reversible.bundle.size), Reference()).witness(reversible, entry, found)
+    return StructureError(kind, reversible.name, found=found, entry=entry, witness=witness, **facts)
