@@ -19,7 +19,16 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".semantics.stage"],),
         ([".semantics.spaces", ".semantics.linear"],),
         ([".semantics.derive"],),
-        ([".semantics", ".semantics.library", ".semantics.algebra", ".semantics.relations", ".semantics.symbols"],),
+        (
+            [
+                ".semantics",
+                ".semantics.library",
+                ".semantics.algebra",
+                ".semantics.relations",
+                ".semantics.symbols",
+                ".semantics.verdicts",
+            ],
+        ),
         ([".solve", ".solve.march", ".solve.methods", ".solve.result", ".solve.auditing", ".solve.exchange"],),
         ([".mechanics.shapes"], [".modelica"]),
         ([".mechanics.elements"],),

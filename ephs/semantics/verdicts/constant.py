@@ -67,6 +67,8 @@ def _isotropy(reversible: "Reversible", statement: str, skew: Array) -> Conditio
 def _conservation(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
     """L w = 0 and C w = 0 of the amounts w of each charge, row by row."""
     how: list[str] = []
+    of_rows = np.broadcast_to(np.abs(constraint).max(axis=1, keepdims=True, initial=0.0), constraint.shape)
+    proved, largest = True, np.concatenate([_beside(reversible, skew), of_rows])
     for kind in reversible.bundle.charges:
         amounts = reversible.bundle.indicator(kind)
         rows = np.concatenate([skew, constraint])
@@ -75,10 +77,13 @@ def _conservation(reversible: "Reversible", statement: str, skew: Array, constra
         )
         defect, own = rows @ amounts, ROUNDED * (np.abs(rows) @ np.abs(amounts))
         if reading is None and not np.all(np.abs(defect) <= own):
-            worst = int(np.argmax(np.abs(defect) / np.maximum(own, TINY)))
-            raise _refuted(reversible, "conservation", float(defect[worst]), (worst,), quantity=kind)
+            off = np.abs(defect) / np.maximum(ROUNDED * (largest @ np.abs(amounts)), TINY)
+            if off.max() > 1.0:
+                worst = int(np.argmax(off))
+                raise _refuted(reversible, "conservation", float(defect[worst]), (worst,), quantity=kind)
+            proved, reading = False, CRUMBS
         how.append(f"{kind} {reading or 'up to the rounding of each number'}")
-    return Condition(statement, True, "decided: " + ", ".join(how) if how else "it has no port with a charge")
+    return Condition(statement, proved, "decided: " + ", ".join(how) if how else "it has no port with a charge")
 
 
 def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
