@@ -139,6 +139,7 @@ def _write_live(model: "Scene | System", scene: str, page: Path, until: float) -
 
 def _run_on(folder: Path, audit: str, *, report: bool) -> int:
     """Continue the interrupted run of a result folder; its model is in the journal."""
+    from ephs.mechanics.runs.system_text import is_system_text
     from ephs.mechanics.scene.document import scene_from_text
     from ephs.solve.journal import read_journal
 
@@ -151,7 +152,7 @@ def _run_on(folder: Path, audit: str, *, report: bool) -> int:
     with addressed(str(file)):
         heading = read_journal(file).heading
     note = heading["note"]
-    if not heading["model"]:
+    if not heading["model"] or is_system_text(heading["model"]):
         raise BadInput(_TEXTS["own"].format(file=folder, scene=note["scene"], until=note["asked"]["until"]))
     return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"], audit, report=report)
 

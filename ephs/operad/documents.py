@@ -26,7 +26,11 @@ _EXPOSED = {"power": True, "state": False}
 
 def to_dict(pattern: Pattern) -> dict[str, Any]:
     """The pattern as nested dictionaries of text and numbers; see `Pattern.to_dict`."""
-    form = canonical(pattern)
+    return record_in_order(canonical(pattern))
+
+
+def record_in_order(form: Pattern) -> dict[str, Any]:
+    """The document of a pattern with junctions and boxes in their own order."""
     if form.is_identity:
         return {"format": FORMAT, "identity": {str(p): port_record(t) for p, t in form.interface.items()}}
     return {"format": FORMAT} | contents_record(form.junctions, form.boxes, form.links)
