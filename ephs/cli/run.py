@@ -236,7 +236,7 @@ def _write(solution: "Solution", folder: Path, *, report: bool) -> None:
     """Write the result folder and suggest next commands."""
     written = write_results(solution, folder, report=report)
     if len(solution.t) > 1:  # else nothing moved
-        say("next:", *after(folder, moves=solution.scene is not None, report=written))
+        say("next:", *after(folder, moves=solution.outline is not None, report=written))
 
 
 def _counted(parts: int | None) -> None:
