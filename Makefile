@@ -34,7 +34,7 @@ $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 	@touch $@
 
 demo: $(VENV)/.installed-viz
-	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE)
+	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE) --replace
 	@echo 'The report: out/$(SCENE)/report.html (open it in a browser; it needs no network)'
 
 # The short tests are run by programs that are compiled in a tenth of the time and run slower; those that look at

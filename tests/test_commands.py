@@ -189,9 +189,15 @@ def test_results_of_another_run_are_not_taken_for_this_one(tmp_path, capsys):
     assert main(words) == 2
     assert "results of another run with model = " in capsys.readouterr().err
     assert (tmp_path / "out/summary.json").read_bytes() == before
-    words[3] = "0.02"
-    assert main(words) == 0  # a later end is another run
+    shutil.copy(ROOT / "scenes/heavy-top.toml", scene)
+    words[3] = "0.02"  # a later end is another run
+    assert main(words) == 2
+    assert "results of another run with until = 0.01" in capsys.readouterr().err
+    assert (tmp_path / "out/summary.json").read_bytes() == before
+    assert main([*words[:-1], "--replace"]) == 0
     assert (tmp_path / "out/summary.json").read_bytes() != before
+    assert main([*words, "--replace"]) == 2
+    assert "expected one of them" in capsys.readouterr().err
 
 
 def _entries(journal):
@@ -212,9 +218,31 @@ def test_a_journal_that_is_not_resumed_is_kept(tmp_path, capsys):
     (tmp_path / "run.journal").write_text("of hours")
     assert main([*words, "--resume"]) == 2
     assert "expected a journal" in capsys.readouterr().err
-    assert main(words) == 0
+    assert main([*words, "--replace"]) == 0
     assert "run.journal.old" in capsys.readouterr().err
     assert (tmp_path / "run.journal.old").read_text() == "of hours"
+
+
+def test_no_run_replaces_results(tmp_path, capsys):
+    """The first stays as it is; the others are numbered, and so is a run beside an unfinished one."""
+    first = tmp_path / "top"
+    words = ["run", str(ROOT / "scenes/heavy-top.toml"), "--until", "0.01", "--no-report", "--out", str(first)]
+    assert main(words) == 0
+    assert "--replace" not in capsys.readouterr().err
+    kept = {file.name: file.read_bytes() for file in first.iterdir()}
+    for number in (2, 3):
+        assert main(words) == 0
+        said = capsys.readouterr()
+        assert f"{first} has the results of a run; this one goes to {first}-{number} (--replace" in said.err
+        assert f"ephs plot {first}-{number}" in said.out
+        assert {file.name for file in Path(f"{first}-{number}").iterdir()} == set(kept)
+    assert {file.name: file.read_bytes() for file in first.iterdir()} == kept
+    begun = tmp_path / "begun"
+    begun.mkdir()
+    (begun / "run.journal").write_text("of hours")
+    assert main([*words[:-1], str(begun)]) == 0
+    assert f"{begun} has an unfinished run; this one goes to {begun}-2 (--resume" in capsys.readouterr().err
+    assert [file.name for file in begun.iterdir()] == ["run.journal"]
 
 
 def test_a_journal_runs_no_code(tmp_path, capsys):

@@ -372,9 +372,8 @@ class Solution:
 
     def _moving(self, what: str) -> Motion:
         if self.motion is None:
-            raise TypeError(
-                f"{self.name} is not a scene, it has no {what}; states are read as sol['path'], temperatures as sol.temperature('path')"
-            )
+            read = "states are read as sol['path'], temperatures as sol.temperature('path')"
+            raise TypeError(f"{self.name} is not a scene, it has no {what}; {read}")
         return self.motion
 
 
