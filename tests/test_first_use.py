@@ -251,5 +251,5 @@ def test_a_run_without_a_terminal_tells_its_progress_on_stderr(tmp_path, monkeyp
     words = ["run", "scenes/heavy-top.toml", "--until", "0.02", "--no-report", "--out", str(tmp_path / "top")]
     assert cli.main(words) == 0
     said = capsys.readouterr()
-    assert re.search(r"^heavy-top: t = \S+ of 0.02 s, .* after 0 s$", said.err, re.MULTILINE)
+    assert re.search(r"^heavy-top: t = \S+ of 0.02 s, .* after \d+ s$", said.err, re.MULTILINE)
     assert "t = " not in said.out
