@@ -1,6 +1,7 @@
 """The commands on real models, from the file to the result folder."""
 
 import json
+import math
 import shutil
 import signal
 import subprocess
@@ -59,6 +60,24 @@ def test_run_takes_a_system_of_ones_own(tmp_path, name):
     assert (summary["heat"] > 0.0) == (name == "damped_oscillator")
     solution = ephs.load_solution(tmp_path / "solution.nc")
     assert (solution["osc.pe.q"][0], solution["osc.ke.p"][0]) == (1.0, 0.5)
+
+
+def test_systems_of_files_begin_as_their_components_say(tmp_path):
+    """x(t) = 0.7 cos t + 0.2 sin t for k = m = 1, with nothing given on the command line but one of the two."""
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import ephs\nfrom ephs import library as lib\n"
+        "pattern = ephs.Pattern.from_text('q: displacement; p: momentum; spring(q); mass(p); pkc(q, p)')\n"
+        "start = pattern(spring=lib.spring(k=1.0).with_initial({'q': 0.7}), mass=lib.point_mass(m=1.0)"
+        ".with_initial({'p': 0.2}), pkc=lib.pkc())\n"
+    )
+    run = ["run", f"{file}:start", "--until", "1", "--rtol", "1e-9", "--atol", "1e-9", "--no-report", "--out"]
+    for words, start in (([], (0.7, 0.2)), (["--initial", "spring.q=-1"], (-1.0, 0.2))):
+        folder = tmp_path / f"out{len(words)}"
+        assert main([*run, str(folder), *words]) == 0
+        sol = ephs.load_solution(folder / "solution.nc")
+        assert (sol["spring.q"][0], sol["mass.p"][0]) == start
+        assert sol["spring.q"][-1] == pytest.approx(start[0] * math.cos(1.0) + start[1] * math.sin(1.0), abs=1e-7)
 
 
 @pytest.mark.parametrize(

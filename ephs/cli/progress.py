@@ -7,7 +7,6 @@ from typing import Any
 
 from ephs.cli.input import complain
 
-
 FIRST, LONGER = 5.0, 1.5
 """Seconds until the first line of progress, and how many times longer than the one before each further wait is."""
 
