@@ -264,6 +264,17 @@ def test_no_run_replaces_results(tmp_path, capsys):
     assert [file.name for file in begun.iterdir()] == ["run.journal"]
 
 
+@pytest.mark.parametrize("what", ["compiler", "system"])
+def test_live_is_refused_before_the_run(tmp_path, capsys, monkeypatch, what):
+    """Where no page can be made, nothing is run, and no folder made."""
+    monkeypatch.setattr("ephs.exporting.linking.find_spec", lambda name: None if what == "compiler" else object())
+    model = "scenes/heavy-top.toml" if what == "compiler" else "examples/oscillator.py:damped_oscillator"
+    words = ["run", str(ROOT / model), "--until", "0.01", "--live", "--out", str(tmp_path / "out")]
+    assert main(words) == 2
+    assert ("ephs[export]" if what == "compiler" else "expected a scene") in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_journal_runs_no_code(tmp_path, capsys):
     """A result folder from a stranger may name a Python file: it is run only where the user names it."""
     own = tmp_path / "own.py"

@@ -90,7 +90,8 @@ def run(
     report
         Write report.html into the result folder.
     live
-        Write live.html, too: a page that simulates the scene while its sliders move.
+        Write live.html, too: a page that simulates the scene while its sliders for masses, stiffnesses and frictions
+        move.
     resume
         Continue an interrupted run in its result folder.
     replace
@@ -112,6 +113,8 @@ def run(
 
         for doubt in doubts(model):
             complain(f"{scene}: {doubt}")
+    if live:
+        _require_live(model, scene)
     name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
     folder = out or Path("out", name)
     if not (resume or replace):
@@ -148,12 +151,21 @@ def _free(folder: Path) -> Path:
     return found
 
 
-def _write_live(model: "Scene | System", scene: str, page: Path, until: float) -> None:
-    """Write a page that simulates."""
+def _require_live(model: "Scene | System", scene: str) -> None:
+    """Refuse, before the run, what no page that simulates can be made of, and without its compiler."""
     import ephs
+    from ephs.exporting.linking import require_tools
 
     if not isinstance(model, ephs.Scene):
         raise BadInput(_TEXTS["live"].format(found=scene))
+    with addressed(scene):
+        require_tools("WebAssembly")
+
+
+def _write_live(model: Any, scene: str, page: Path, until: float) -> None:
+    """Write a page that simulates."""
+    import ephs
+
     try:
         with addressed(scene, page):
             ephs.live_page(model, until=until).save(page)
