@@ -51,4 +51,4 @@ def nearest_name(name: str, known: Iterable[str]) -> str | None:
 def nearest_of(found: object, known: Iterable[str]) -> str:
     """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
     near = nearest_name(str(found), known)
-    return f"; did you mean {near!r}?" if near else ""
+    return f"; did you mean {near!r}?" if near and near != str(found) else ""
