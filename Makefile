@@ -27,14 +27,17 @@ help:
 
 # One stamp an extra: installing again is needed only when pyproject.toml has changed.
 $(BIN)/python:
+	@echo 'Making the environment $(VENV): some seconds'
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
+	@echo 'Installing ephs with [$*] and what they need into $(VENV): about a minute, by the network'
 	$(PIP) --editable '.[$*]'
 	@touch $@
 
 demo: $(VENV)/.installed-viz
-	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE)
+	@echo 'Simulating scenes/$(SCENE).toml for $(UNTIL) s: some 10 s the first time, which compiles, and 2 s afterwards'
+	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE) --replace
 	@echo 'The report: out/$(SCENE)/report.html (open it in a browser; it needs no network)'
 
 # The short tests are run by programs that are compiled in a tenth of the time and run slower; those that look at

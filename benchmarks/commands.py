@@ -32,8 +32,8 @@ def report() -> Report:
     with TemporaryDirectory() as folder:
         out = str(Path(folder, "out"))
         commands = {
-            "run": ["run", SCENE, "--until", "5", "--out", out],
-            "run --no-report": ["run", SCENE, "--until", "5", "--no-report", "--out", str(Path(folder, "bare"))],
+            "run": ["run", SCENE, "--until", "5", "--replace", "-o", out],
+            "run --no-report": ["run", SCENE, "--until", "5", "--no-report", "--replace", "-o", f"{folder}/bare"],
             "check": ["check", SCENE],
             "info": ["info", SCENE],
             "reduce": ["reduce", "scenes/four-bar.toml"],

@@ -135,7 +135,9 @@ def __getattr__(name: str) -> Any:
         return import_module(f"{_HOME[name]}.{name}") if name == "library" else getattr(home, name)
     if name in _PACKAGES:
         return import_module(f"ephs.{name}")
-    raise AttributeError(f"module 'ephs' has no attribute {name!r}")
+    from ephs.operad.messages import nearest_of
+
+    raise AttributeError(f"module 'ephs' has no attribute {name!r}{nearest_of(name, __all__)}")
 
 
 def __dir__() -> list[str]:

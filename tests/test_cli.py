@@ -48,7 +48,7 @@ class FakeSolution:
     """Stands for a Solution that ends at 0.25 s."""
 
     t = (0.0, 0.25)
-    scene = None
+    scene = outline = None
     audit = Audit()
 
     def summary(self):

@@ -1,6 +1,7 @@
 """The commands on real models, from the file to the result folder."""
 
 import json
+import math
 import shutil
 import signal
 import subprocess
@@ -59,6 +60,24 @@ def test_run_takes_a_system_of_ones_own(tmp_path, name):
     assert (summary["heat"] > 0.0) == (name == "damped_oscillator")
     solution = ephs.load_solution(tmp_path / "solution.nc")
     assert (solution["osc.pe.q"][0], solution["osc.ke.p"][0]) == (1.0, 0.5)
+
+
+def test_systems_of_files_begin_as_their_components_say(tmp_path):
+    """x(t) = 0.7 cos t + 0.2 sin t for k = m = 1, with nothing given on the command line but one of the two."""
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import ephs\nfrom ephs import library as lib\n"
+        "pattern = ephs.Pattern.from_text('q: displacement; p: momentum; spring(q); mass(p); pkc(q, p)')\n"
+        "start = pattern(spring=lib.spring(k=1.0).with_initial({'q': 0.7}), mass=lib.point_mass(m=1.0)"
+        ".with_initial({'p': 0.2}), pkc=lib.pkc())\n"
+    )
+    run = ["run", f"{file}:start", "--until", "1", "--rtol", "1e-9", "--atol", "1e-9", "--no-report", "--out"]
+    for words, start in (([], (0.7, 0.2)), (["--initial", "spring.q=-1"], (-1.0, 0.2))):
+        folder = tmp_path / f"out{len(words)}"
+        assert main([*run, str(folder), *words]) == 0
+        sol = ephs.load_solution(folder / "solution.nc")
+        assert (sol["spring.q"][0], sol["mass.p"][0]) == start
+        assert sol["spring.q"][-1] == pytest.approx(start[0] * math.cos(1.0) + start[1] * math.sin(1.0), abs=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -189,9 +208,15 @@ def test_results_of_another_run_are_not_taken_for_this_one(tmp_path, capsys):
     assert main(words) == 2
     assert "results of another run with model = " in capsys.readouterr().err
     assert (tmp_path / "out/summary.json").read_bytes() == before
-    words[3] = "0.02"
-    assert main(words) == 0  # a later end is another run
+    shutil.copy(ROOT / "scenes/heavy-top.toml", scene)
+    words[3] = "0.02"  # a later end is another run
+    assert main(words) == 2
+    assert "results of another run with until = 0.01" in capsys.readouterr().err
+    assert (tmp_path / "out/summary.json").read_bytes() == before
+    assert main([*words[:-1], "--replace"]) == 0
     assert (tmp_path / "out/summary.json").read_bytes() != before
+    assert main([*words, "--replace"]) == 2
+    assert "expected one of them" in capsys.readouterr().err
 
 
 def _entries(journal):
@@ -212,9 +237,42 @@ def test_a_journal_that_is_not_resumed_is_kept(tmp_path, capsys):
     (tmp_path / "run.journal").write_text("of hours")
     assert main([*words, "--resume"]) == 2
     assert "expected a journal" in capsys.readouterr().err
-    assert main(words) == 0
+    assert main([*words, "--replace"]) == 0
     assert "run.journal.old" in capsys.readouterr().err
     assert (tmp_path / "run.journal.old").read_text() == "of hours"
+
+
+def test_no_run_replaces_results(tmp_path, capsys):
+    """The first stays as it is; the others are numbered, and so is a run beside an unfinished one."""
+    first = tmp_path / "top"
+    words = ["run", str(ROOT / "scenes/heavy-top.toml"), "--until", "0.01", "--no-report", "--out", str(first)]
+    assert main(words) == 0
+    assert "--replace" not in capsys.readouterr().err
+    kept = {file.name: file.read_bytes() for file in first.iterdir()}
+    for number in (2, 3):
+        assert main(words) == 0
+        said = capsys.readouterr()
+        assert f"{first} has the results of a run; this one goes to {first}-{number} (--replace" in said.err
+        assert f"ephs plot {first}-{number}" in said.out
+        assert {file.name for file in Path(f"{first}-{number}").iterdir()} == set(kept)
+    assert {file.name: file.read_bytes() for file in first.iterdir()} == kept
+    begun = tmp_path / "begun"
+    begun.mkdir()
+    (begun / "run.journal").write_text("of hours")
+    assert main([*words[:-1], str(begun)]) == 0
+    assert f"{begun} has an unfinished run; this one goes to {begun}-2 (--resume" in capsys.readouterr().err
+    assert [file.name for file in begun.iterdir()] == ["run.journal"]
+
+
+@pytest.mark.parametrize("what", ["compiler", "system"])
+def test_live_is_refused_before_the_run(tmp_path, capsys, monkeypatch, what):
+    """Where no page can be made, nothing is run, and no folder made."""
+    monkeypatch.setattr("ephs.exporting.linking.find_spec", lambda name: None if what == "compiler" else object())
+    model = "scenes/heavy-top.toml" if what == "compiler" else "examples/oscillator.py:damped_oscillator"
+    words = ["run", str(ROOT / model), "--until", "0.01", "--live", "--out", str(tmp_path / "out")]
+    assert main(words) == 2
+    assert ("ephs[export]" if what == "compiler" else "expected a scene") in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_journal_runs_no_code(tmp_path, capsys):

@@ -37,3 +37,24 @@ def test_blocks_are_closed():
                 assert not (open_at and word), f"{page.name}: {line} within a block"
                 open_at = not open_at
         assert not open_at, page.name
+
+
+def test_links_have_texts_and_lead_to_pages():
+    """Links read in raw Markdown, too: their texts are not left to the builder of the pages."""
+    for page in (*DOCS.glob("*.md"), *DOCS.parent.glob("*.md")):
+        for words, target in re.findall(r"\[([^\[\]]*)\]\(([^()\s]+)\)", _prose(page)):
+            assert words.strip(), f"{page.name}: a link to {target} without a text"
+            file, _, part = target.partition("#")
+            if ":" in file or file.startswith("_static"):
+                continue
+            led = page.parent / file if file else page
+            assert led.exists(), f"{page.name}: {target}"
+            if part and led.suffix == ".md":
+                titles = re.findall(r"^#+ (.+)$", _prose(led), re.MULTILINE)
+                slugs = {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+                assert part in slugs or f"({part})=" in _prose(led), f"{page.name}: {target}"
+
+
+def _prose(page: Path) -> str:
+    """The text of a page without its blocks of code."""
+    return re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)

@@ -1,6 +1,7 @@
 """The first minutes: what one is told, what one is given to start from, and what a slip of the keys leads to."""
 
 import os
+import re
 import runpy
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from ephs import quantity as Q
 from ephs.cli import commands as cli
 from ephs.cli.new import TEMPLATES
 from ephs.cli.next import EXAMPLES, commands
-from ephs.cli.progress import said_of
+from ephs.cli.progress import said_of, seldom
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -231,3 +232,24 @@ def test_a_capacity_begins_at_its_temperature():
     one, two = lib.thermal_capacity(capacity=20.0, temperature=300.0), lib.thermal_capacity(c1=6000.0, c2=20.0)
     assert one == two
     assert one.energy_gradient({port: np.zeros(1) for port in one.reads})[0] == pytest.approx(300.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(4.0, 0), (60.0, 8), (3600.0, 18), (86400.0, 26)])
+def test_progress_without_a_terminal_is_some_lines(seconds, most):
+    """One after 5 s, and each further one after half as long again: 1 + log(T / 5) / log 1.5 of them."""
+    now, lines = [0.0], []
+    line = seldom(lines.append, lambda: now[0])
+    for k in range(20_001):
+        now[0] = seconds * (k / 20_000) ** 3
+        line(lambda spent: f"{spent:.1f} s")
+    assert most - 2 <= len(lines) <= most
+    assert not lines or re.fullmatch(r"5\.0 s, after 5 s", lines[0])
+
+
+def test_a_run_without_a_terminal_tells_its_progress_on_stderr(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("ephs.cli.progress.FIRST", 0.0)
+    words = ["run", "scenes/heavy-top.toml", "--until", "0.02", "--no-report", "--out", str(tmp_path / "top")]
+    assert cli.main(words) == 0
+    said = capsys.readouterr()
+    assert re.search(r"^heavy-top: t = \S+ of 0.02 s, .* after \d+ s$", said.err, re.MULTILINE)
+    assert "t = " not in said.out

@@ -129,3 +129,11 @@ def test_the_help_of_make_names_every_target():
     told = set(re.findall(r"make ([a-z][a-z-]*)", MAKEFILE.partition("help:\n")[2].partition("\n\n")[0]))
     phony = set(re.search(r"^\.PHONY: (.+)$", MAKEFILE, re.MULTILINE)[1].split())
     assert told == phony - {"help"} == TARGETS - {"help"}
+
+
+def test_make_demo_says_what_it_does_before_each_stage():
+    text = (ROOT / "Makefile").read_text("utf-8")
+    for target, stage in {"$(BIN)/python": "-m venv", "$(VENV)/.installed-%": "$(PIP)", "demo": "ephs run"}.items():
+        (recipe,) = re.findall(rf"^{re.escape(target)}:.*\n((?:\t.*\n)+)", text, re.MULTILINE)
+        first, second, *_ = recipe.splitlines()
+        assert first.startswith("\t@echo '") and re.search("second|minute| s[: ]", first) and stage in second

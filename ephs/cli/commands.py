@@ -25,6 +25,7 @@ from ephs.cli.input import (
     complain,
     heard,
     initial_values,
+    load_drawable,
     load_model,
     noted,
 )
@@ -171,7 +172,7 @@ def draw(
     Parameters
     ----------
     scene
-        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME.
+        Scene file (.toml), model (.urdf, .xml, .sdf), or FILE.py:NAME of a System, Scene or Pattern.
     output
         Picture to write: .svg, .tex (TikZ) or .png.
     flat
@@ -186,13 +187,17 @@ def draw(
         raise BadInput(
             TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=", ".join(_PICTURES)) + hint
         )
-    model = load_model(scene, loading)
+    model = load_drawable(scene, loading)
+    if flat and isinstance(model, ephs.Pattern):
+        raise BadInput(TEXTS["no-parts"].format(found=scene))
     with addressed(scene, output):
         from ephs.show import draw as draw_pattern
 
         system = model.system() if isinstance(model, ephs.Scene) else model
         output.parent.mkdir(parents=True, exist_ok=True)
-        drawing = draw_pattern(system.flatten() if flat else system, output, opened=opened)
+        drawing = draw_pattern(
+            system.flatten() if flat and isinstance(system, ephs.System) else system, output, opened=opened
+        )
     print(output)
     if drawing.faults:
         print(f"overlapping names and wires: {len(drawing.faults)}")

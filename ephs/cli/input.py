@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, final
 
 from cyclopts import Parameter
 
-from ephs.cli.nearest import MODELS, beside, did_you_mean
+from ephs.cli.nearest import MODELS, did_you_mean
 
 if TYPE_CHECKING:
-    from ephs import Scene, Solution, System
+    from ephs import Pattern, Scene, Solution, System
 
 TEXTS = {
     "initial": "--initial {found}: expected PATH=NUMBER or PATH=NUMBER,NUMBER,..., as in osc.pe.q=1.0",
@@ -26,10 +26,11 @@ TEXTS = {
     "not-a-result": "{found}: found a model, expected a result folder of ephs run or a saved solution (.nc); "
     "run it first: ephs run {found} --until 5",
     "no-scene": "{found}: found a System, expected a scene or a model, whose bodies have shapes to show",
-    "no-name": "{file}: found no System or Scene {name} in it, expected one of {found}",
+    "no-name": "{file}: found no {or_} {name} in it, expected one of {found}",
     "nameless": "{file}: found no NAME after the file; it holds {found}; give one as {file}:{example}",
-    "no-model": "{file}: found no System and no Scene in it; bind one to a name at the top level of the file",
-    "not-a-model": "{file}: {name} is a {found}, expected a System or a Scene; {others}",
+    "no-model": "{file}: found no {no} in it; bind one to a name at the top level of the file",
+    "not-a-model": "{file}: {name} is a {found}, expected a {or_}; {others}",
+    "no-parts": "--flat: {found} is a Pattern, expected a System or a Scene, whose boxes hold patterns",
     "user-code": "{file}: line {line}: {found}; correct the file, then run again",
     "extra": "{file}: the module {found} is not installed; python -m pip install 'ephs[{extra}]'",
     "no-report": "report.html was not written: the module {found} is not installed; the solution is saved; "
@@ -140,6 +141,16 @@ class Stepping:
 AS_CHOSEN = Stepping()
 
 
+def load_drawable(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System | Pattern":
+    """As `load_model`; NAME may be that of a Pattern, too."""
+    from ephs import Pattern
+
+    file, separator, name = scene.rpartition(":")
+    if separator and file.endswith(".py"):
+        return _from_python(Path(file), name, Pattern)
+    return _from_python(Path(scene), "", Pattern) if scene.endswith(".py") else load_model(scene, loading)
+
+
 def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
     """A scene file, a model in another format, or FILE.py:NAME, as a model.
 
@@ -156,7 +167,7 @@ def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
     if scene.endswith(".py"):
         return _from_python(Path(scene), "")
     if not Path(scene).is_file():
-        raise BadInput(TEXTS["no-file"].format(found=scene) + beside(Path(scene)))
+        raise BadInput(TEXTS["no-file"].format(found=scene) + _beside(Path(scene)))
     options: dict[str, Any] = {"base": loading.base, "adjust": loading.adjust}
     if loading.contact:
         options["contact"] = True
@@ -166,11 +177,11 @@ def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
         return ephs.load(scene, **options)
 
 
-def _from_python(file: Path, name: str) -> "Scene | System":
+def _from_python(file: Path, name: str, *more: type) -> Any:
     import ephs
 
     if not file.is_file():
-        raise BadInput(TEXTS["no-file"].format(found=file) + beside(file))
+        raise BadInput(TEXTS["no-file"].format(found=file) + _beside(file))
     sys.path.insert(0, str(file.parent.resolve()))  # as `python FILE.py` does, for modules beside the file
     try:
         names = runpy.run_path(str(file), run_name="__ephs__")
@@ -179,19 +190,30 @@ def _from_python(file: Path, name: str) -> "Scene | System":
         raise BadInput(TEXTS["user-code"].format(file=file, line=_line(error, file), found=found)) from error
     finally:
         sys.path.remove(str(file.parent.resolve()))
-    models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene))]
+    models = [key for key, value in names.items() if isinstance(value, (ephs.System, ephs.Scene, *more))]
+    kinds = ["System", "Scene", *(kind.__name__ for kind in more)]
+    or_ = " or a ".join(kinds)
     if name in names and name not in models:
         others = f"the file holds {', '.join(models)}" if models else "the file holds none"
         raise BadInput(
-            TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__, others=others)
+            TEXTS["not-a-model"].format(file=file, name=name, found=type(names[name]).__name__, others=others, or_=or_)
         )
     if not models:
-        raise BadInput(TEXTS["no-model"].format(file=file))
+        raise BadInput(TEXTS["no-model"].format(file=file, no=" and no ".join(kinds)))
     if name not in names:
         case = "no-name" if name else "nameless"
-        told = TEXTS[case].format(file=file, name=name, found=", ".join(models), example=models[0])
+        told = TEXTS[case].format(
+            file=file, name=name, or_=" or ".join(kinds), found=", ".join(models), example=models[0]
+        )
         raise BadInput(told + did_you_mean(name, models))
     return names[name]
+
+
+def _beside(file: Path) -> str:
+    from ephs.mechanics.scene.text import nearest_file
+
+    near = nearest_file(file, MODELS)
+    return f'; did you mean "{near}"?' if near else ""
 
 
 def solution_of(folder: Path) -> "Solution":

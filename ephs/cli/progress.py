@@ -1,14 +1,36 @@
-"""Progress bar of a run: remaining time, steps a second, energy defect so far."""
+"""Progress of a run: a bar with the remaining time on a terminal, lines elsewhere."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from ephs.cli.input import complain
+
+FIRST, LONGER = 5.0, 1.5
+"""Seconds until the first line of progress, and how many times longer than the one before each further wait is."""
+
+
+def seldom(
+    say: Callable[[str], None], clock: Callable[[], float] = time.perf_counter
+) -> Callable[[Callable[[float], str]], None]:
+    """Lines ever rarer, some 7 in a minute, 17 in an hour, 25 in a day; each made of the seconds since the start."""
+    begin = clock()
+    due = begin + FIRST
+
+    def line(words: Callable[[float], str]) -> None:
+        nonlocal due
+        now = clock()
+        if now >= due:
+            due = now + (LONGER - 1.0) * (now - begin)
+            say(f"{words(now - begin)}, after {now - begin:.0f} s")
+
+    return line
+
 
 @contextmanager
 def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any]], None]]:
-    """Show a bar with the remaining time and the program being compiled, on a terminal only."""
+    """Show a bar with the remaining time and the program being compiled; a line every so often without a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -16,7 +38,10 @@ def progress_bar(name: str) -> Iterator[Callable[[float, float, Mapping[str, Any
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield lambda t, until, stats: None
+        line = seldom(complain)
+        yield lambda t, until, stats: line(
+            lambda spent: f"{name}: {said_of(t, until, stats, float(stats.get('integrate_s') or spent))}"
+        )
         return
     note = TextColumn("{task.fields[note]}", markup=False)
     columns = (

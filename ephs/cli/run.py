@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 JOURNAL = "run.journal"
 RUN = "run.json"
 """Request of a run, stored beside the results of a complete run."""
+RESULTS = ("solution.nc", "summary.json", "report.html", JOURNAL, RUN)
+"""Files of a result folder, of which any says that it is taken."""
 KEPT = 500
 """Default number of output intervals with step-size control."""
 _TEXTS = {
@@ -43,9 +45,13 @@ _TEXTS = {
     "own": "{file}: its model is {scene}; Python files run only when named on the command line: "
     "ephs run {scene} --until {until!r} --out {file} --resume",
     "kept": f"{{found}} holds an unfinished run; it is kept as {JOURNAL}.old (--resume would have continued it)",
+    "numbered": "{folder} has the results of a run; this one goes to {found} (--replace writes over them)",
+    "numbered-journal": "{folder} has an unfinished run; this one goes to {found} (--resume continues that one, "
+    "--replace begins anew there)",
+    "both": "--resume and --replace: found both, expected one of them",
     "ended": "{folder}: that run has reached its end already",
     "other": "{folder}: found results of another run with {key} = {found}, expected {wanted}; "
-    "give another --out, or leave out --resume to replace them",
+    "give another --out, or --replace in place of --resume",
     "again": "continue with: ephs run {folder} --resume",
 }
 
@@ -62,6 +68,7 @@ def run(
     report: bool = True,
     live: bool = False,
     resume: bool = False,
+    replace: bool = False,
     audit: Literal["fail", "warn", "off"] = "fail",
     loading: Loading = AS_GIVEN,
 ) -> int:
@@ -79,18 +86,23 @@ def run(
     initial
         Initial value of a state, PATH=NUMBER or PATH=NUMBER,NUMBER,...; may be given several times.
     out
-        Result folder. Default: out/NAME.
+        Result folder. Default: out/NAME. One with results is kept as it is, and NAME-2, NAME-3, ... is written.
     report
         Write report.html into the result folder.
     live
-        Write live.html, too: a page that simulates the scene while its sliders move.
+        Write live.html, too: a page that simulates the scene while its sliders for masses, stiffnesses and frictions
+        move.
     resume
         Continue an interrupted run in its result folder.
+    replace
+        Write over the results in the result folder.
     audit
         Treatment of audit findings: fail ends with exit code 4, warn prints them, off records them in the summary.
     """
     import ephs
 
+    if resume and replace:
+        raise BadInput(_TEXTS["both"])
     if resume and Path(scene).is_dir():
         return _run_on(Path(scene), audit, report=report)
     if until is None:
@@ -101,8 +113,12 @@ def run(
 
         for doubt in doubts(model):
             complain(f"{scene}: {doubt}")
+    if live:
+        _require_live(model, scene)
     name = model.name if isinstance(model, ephs.Scene) else scene.rpartition(":")[2]
     folder = out or Path("out", name)
+    if not (resume or replace):
+        folder = _free(folder)
     with addressed(scene, folder):
         folder.mkdir(parents=True, exist_ok=True)
     asked: dict[str, Any] = {"until": until, **stepping.options()}
@@ -113,7 +129,7 @@ def run(
     if resume and not (folder / JOURNAL).exists() and _ended(folder, _identity(model, scene, asked)):
         say(_TEXTS["ended"].format(folder=folder))
         return 0
-    if not resume and (folder / JOURNAL).exists():
+    if replace and (folder / JOURNAL).exists():
         with addressed(scene, folder):
             os.replace(folder / JOURNAL, folder / f"{JOURNAL}.old")
         complain(_TEXTS["kept"].format(found=folder / JOURNAL))
@@ -123,12 +139,33 @@ def run(
     return code
 
 
-def _write_live(model: "Scene | System", scene: str, page: Path, until: float) -> None:
-    """Write a page that simulates."""
+def _free(folder: Path) -> Path:
+    """The folder itself, or the first of FOLDER-2, FOLDER-3, … that has no results."""
+    found, number = folder, 1
+    while any((found / name).exists() for name in RESULTS):
+        number += 1
+        found = folder.with_name(f"{folder.name}-{number}")
+    if number > 1:
+        case = "numbered-journal" if (folder / JOURNAL).exists() else "numbered"
+        complain(_TEXTS[case].format(folder=folder, found=found))
+    return found
+
+
+def _require_live(model: "Scene | System", scene: str) -> None:
+    """Refuse, before the run, what no page that simulates can be made of, and without its compiler."""
     import ephs
+    from ephs.exporting.linking import require_tools
 
     if not isinstance(model, ephs.Scene):
         raise BadInput(_TEXTS["live"].format(found=scene))
+    with addressed(scene):
+        require_tools("WebAssembly")
+
+
+def _write_live(model: Any, scene: str, page: Path, until: float) -> None:
+    """Write a page that simulates."""
+    import ephs
+
     try:
         with addressed(scene, page):
             ephs.live_page(model, until=until).save(page)
@@ -139,6 +176,7 @@ def _write_live(model: "Scene | System", scene: str, page: Path, until: float) -
 
 def _run_on(folder: Path, audit: str, *, report: bool) -> int:
     """Continue the interrupted run of a result folder; its model is in the journal."""
+    from ephs.mechanics.runs.system_text import is_system_text
     from ephs.mechanics.scene.document import scene_from_text
     from ephs.solve.journal import read_journal
 
@@ -151,7 +189,7 @@ def _run_on(folder: Path, audit: str, *, report: bool) -> int:
     with addressed(str(file)):
         heading = read_journal(file).heading
     note = heading["note"]
-    if not heading["model"]:
+    if not heading["model"] or is_system_text(heading["model"]):
         raise BadInput(_TEXTS["own"].format(file=folder, scene=note["scene"], until=note["asked"]["until"]))
     return _simulate(scene_from_text(heading["model"]), note["scene"], folder, note["asked"], audit, report=report)
 
@@ -215,14 +253,13 @@ def _ended(folder: Path, wanted: Mapping[str, Any]) -> bool:
     Raises
     ------
     BadInput
-        They are those of another run that reached the same end.
+        They are those of another run.
     """
     try:
         found = json.loads((folder / RUN).read_text(encoding="utf-8"))
-        reached = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["t_end"]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError):
         return False
-    if not isinstance(found, dict) or reached != wanted["until"]:
+    if not isinstance(found, dict):
         return False
     for key in (*wanted, *found):
         if found.get(key) != wanted.get(key):
@@ -235,7 +272,7 @@ def _write(solution: "Solution", folder: Path, *, report: bool) -> None:
     """Write the result folder and suggest next commands."""
     written = write_results(solution, folder, report=report)
     if len(solution.t) > 1:  # else nothing moved
-        say("next:", *after(folder, moves=solution.scene is not None, report=written))
+        say("next:", *after(folder, moves=solution.outline is not None, report=written))
 
 
 def _counted(parts: int | None) -> None:

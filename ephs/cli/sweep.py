@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from ephs.cli.input import AS_CHOSEN, AS_GIVEN, BadInput, Loading, Stepping, addressed, load_model, positive, say
+from ephs.cli.input import (
+    AS_CHOSEN,
+    AS_GIVEN,
+    BadInput,
+    Loading,
+    Stepping,
+    addressed,
+    complain,
+    load_model,
+    positive,
+    say,
+)
+from ephs.cli.progress import seldom
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,18 +134,22 @@ def _client(address: str | None) -> Iterator[Any]:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[int, int, int], None]]:
-    """Progress bar with finished members, failures and remaining time, on a terminal only."""
+    """Progress bar with finished members, failures and remaining time; a line every so often without a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
+    if not console.is_terminal:
+        line = seldom(complain)
+        yield lambda done, members, failed: line(lambda _: f"{done} of {members} members, {failed} failed")
+        return
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.fields[note]}", markup=False),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("members", total=None, note="")
 
         def progress(done: int, members: int, failed: int) -> None:

@@ -32,6 +32,18 @@ def webassembly(made: Exported) -> bytes:
         return linked.read_bytes()
 
 
+def require_tools(what: str) -> None:
+    """Refuse to make ``what`` without the cross compiler.
+
+    Raises
+    ------
+    ExportError
+        It is not installed.
+    """
+    if find_spec("ziglang") is None:
+        raise ExportError("tool", what=what, tool="ziglang", package="ephs[export]")
+
+
 def tool(what: str, *words: str | Path) -> None:
     """Run a tool of the cross compiler.
 
@@ -40,8 +52,7 @@ def tool(what: str, *words: str | Path) -> None:
     ExportError
         It is not installed, or refuses.
     """
-    if find_spec("ziglang") is None:
-        raise ExportError("tool", what=what, tool="ziglang", package="ephs[export]")
+    require_tools(what)
     done = subprocess.run(
         [sys.executable, "-m", "ziglang", *map(str, words)], capture_output=True, text=True, check=False
     )

@@ -51,4 +51,6 @@ __all__ = sorted(_HOME)  # pyright: ignore[reportUnsupportedDunderAll] - the nam
 def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
-    raise AttributeError(f"module 'ephs.mechanics' has no attribute {name!r}")
+    from ephs.operad.messages import nearest_of
+
+    raise AttributeError(f"module 'ephs.mechanics' has no attribute {name!r}{nearest_of(name, __all__)}")

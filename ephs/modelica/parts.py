@@ -32,9 +32,9 @@ class ModelicaComponent:
     name
         In Modelica.
     system
-        The system: ports as connectors, of charge, momentum, angular momentum or entropy. Its boxes are ``stored``,
-        ``dirac``, ``loss`` as far as it has them, and ``field`` where its coefficients change sign under time reversal,
-        as a magnet's do.
+        The system in its start: ports as connectors, of charge, momentum, angular momentum or entropy. Its boxes are
+        ``stored``, ``dirac``, ``loss`` as far as it has them, and ``field`` where its coefficients change sign under
+        time reversal, as a magnet's do.
     initial
         States at the start by box and port, from the component's start values.
     """
@@ -48,10 +48,6 @@ class ModelicaComponent:
         """Kinds of its primitives: ``"storage"``, ``"reversible"``, ``"irreversible"``."""
         boxes = (each for path, each in self.system.fillings.items() if str(path) != "field")
         return tuple(sorted({each.kind for each in boxes}, key=("storage", "reversible", "irreversible").index))
-
-    def starts(self, box: str) -> dict[str, float]:
-        """The initial states of the component in a box of a larger system."""
-        return {f"{box}.{key}": value for key, value in self.initial.items()}
 
 
 @dataclass(slots=True)
@@ -90,7 +86,8 @@ def component_of(flat: Flat) -> ModelicaComponent:
         box = {"storage": "stored", "reversible": "dirac"}.get(primitive.kind, "loss")
         parts = _Parts({port.name: quantity.entropy for port in flat.ports}, {}, {})
         parts.boxes[box] = ({inner: outer for outer, inner in names.items()}, primitive)
-        return ModelicaComponent(flat.name, parts.system(), {f"{box}.{key}": x for key, x in initial.items()})
+        start = {f"{box}.{key}": x for key, x in initial.items()}
+        return ModelicaComponent(flat.name, parts.system().with_initial(start), start)
     relation, warm = relation_of(flat, equations), warm_of(flat)
     hessian = stored_energy(flat.name, relation, warm)
     found = structure_of(flat.name, relation, hessian, warm)
@@ -144,7 +141,7 @@ def _built(flat: Flat, relation: Relation, hessian: Matrix, found: Structure) ->
         interface = power_ports(**{name: outer[name] for name in free})
         idle = constant_structure("open", interface, np.zeros((len(free), len(free))), np.zeros((0, len(free))))
         parts.boxes["open"] = ({name: name for name in free}, idle)
-    return ModelicaComponent(flat.name, parts.system(), initial)
+    return ModelicaComponent(flat.name, parts.system().with_initial(initial), initial)
 
 
 def _numbers(matrix: Matrix) -> np.ndarray:

@@ -12,10 +12,11 @@ from typing import Any, cast
 from ephs.operad.canonical import canonical
 from ephs.operad.charges import WHOLE, Domain
 from ephs.operad.errors import PatternError
+from ephs.operad.messages import nearest_of
 from ephs.operad.names import Path
 from ephs.operad.parts import Box, Junction
 from ephs.operad.pattern import Pattern
-from ephs.operad.quantities import PortType, Quantity, Space, known_quantity, quantity_word
+from ephs.operad.quantities import PortType, Quantity, Space, known_quantity, quantity_names, quantity_word
 from ephs.operad.reading import Reader
 
 FORMAT = 1
@@ -26,7 +27,11 @@ _EXPOSED = {"power": True, "state": False}
 
 def to_dict(pattern: Pattern) -> dict[str, Any]:
     """The pattern as nested dictionaries of text and numbers; see `Pattern.to_dict`."""
-    form = canonical(pattern)
+    return record_in_order(canonical(pattern))
+
+
+def record_in_order(form: Pattern) -> dict[str, Any]:
+    """The document of a pattern with junctions and boxes in their own order."""
     if form.is_identity:
         return {"format": FORMAT, "identity": {str(p): port_record(t) for p, t in form.interface.items()}}
     return {"format": FORMAT} | contents_record(form.junctions, form.boxes, form.links)
@@ -123,7 +128,8 @@ def quantity_from(where: str, record: Mapping[str, object]) -> Quantity:
         arguments = (_READ.text(f"{where}.pair", record["pair"]),) if "pair" in record else ()
         found = known_quantity(given, arguments, **parameters)
         if found is None:
-            _READ.refuse(f"{where}.quantity", given, "the name of a quantity, with a pair where it has one")
+            near = nearest_of(given, quantity_names())
+            _READ.refuse(f"{where}.quantity", given, f"the name of a quantity, with a pair where it has one{near}")
         return found.in_frame(frame)
     if extra := sorted({"pair", "pitch"} & record.keys()):
         _READ.refuse(where, f"key {extra[0]}", "none beside a quantity that is described")

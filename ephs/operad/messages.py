@@ -46,3 +46,9 @@ def nearest_name(name: str, known: Iterable[str]) -> str | None:
     if len(name) > _NEAR_LETTERS or len(names) > _NEAR_NAMES:
         return None
     return next(iter(get_close_matches(name, names, n=1, cutoff=0.6)), None)
+
+
+def nearest_of(found: object, known: Iterable[str]) -> str:
+    """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
+    near = nearest_name(str(found), known)
+    return f"; did you mean {near!r}?" if near and near != str(found) else ""

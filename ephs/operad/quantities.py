@@ -8,7 +8,7 @@ from typing import Any, TypeAlias, final
 from ephs.operad.charges import KINDS, PLAIN, POSITIVE, WHOLE, Charges, Domain, charges_of, require_domain
 from ephs.operad.directory import Directory
 from ephs.operad.errors import PatternError
-from ephs.operad.messages import nearest_name
+from ephs.operad.messages import nearest_of
 from ephs.operad.units import dimension
 
 # Kind of pair: dimension of its subgroup of SE(3), numbers stored for an element, names of its parameters.
@@ -221,8 +221,7 @@ class Quantities:
     direct_momentum: Quantity = Quantity("momentum", Space("so(3)xR3*", 6, 6), -1)
 
     def __getattr__(self, name: str) -> Any:
-        near = nearest_name(name, (word for word in dir(type(self)) if not word.startswith("_")))
-        raise AttributeError(f"there is no quantity {name!r}" + (f"; did you mean {near!r}?" if near else ""))
+        raise AttributeError(f"there is no quantity {name!r}{nearest_of(name, quantity_names())}")
 
     def species(self, name: str, /, **elements: float) -> Quantity:
         """The amount of a substance in mol, with its composition: atoms, or other units, of each element.
@@ -323,6 +322,11 @@ def quantity_word(value: Quantity) -> tuple[str, tuple[str, ...], dict[str, floa
         if make(pair, **values) == plain:
             return word, (pair,), values
     return None
+
+
+def quantity_names() -> list[str]:
+    """Names of the quantities of this package, and of its functions that make some."""
+    return [word for word in dir(type(quantity)) if not word.startswith("_")]
 
 
 def known_quantity(word: str, arguments: tuple[str, ...] = (), **parameters: float) -> Quantity | None:

@@ -22,10 +22,11 @@ from typing import NoReturn, TypeAlias, final
 from ephs.operad.directory import Directory
 from ephs.operad.documents import quantity_from, quantity_record
 from ephs.operad.errors import PatternError
+from ephs.operad.messages import nearest_of
 from ephs.operad.names import MOST_NAMES, ROOT, Path, PathLike
 from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
-from ephs.operad.quantities import PortType, Quantity, known_quantity, quantity_word
+from ephs.operad.quantities import PortType, Quantity, known_quantity, quantity_names, quantity_word
 
 _BARE = re.compile(r"[\w+\-*/'^]+")
 _TOKEN = re.compile(r"[ \t\r\f\v]*(?:#[^\n]*)?(\n|[;:,()~@=.]|\"(?:[^\"\\\n]|\\.)*\"|\{|[\w+\-*/'^]+|\S|$)")
@@ -225,7 +226,8 @@ class _Reader:
             arguments, parameters = self.arguments() if self.peek() == "(" else ((), {})
             known = known_quantity(word, arguments, **parameters)
             if known is None:
-                self.refuse(word, "the name of a quantity, with a pair where it has one")
+                near = nearest_of(word, quantity_names())
+                self.refuse(word, f"the name of a quantity, with a pair where it has one{near}")
             found = known
         if self.peek() == "@":
             self.take()

@@ -6,6 +6,7 @@ from typing import Any, cast
 from ephs.operad.directory import Directory, Entries, first_clash
 from ephs.operad.errors import PatternError
 from ephs.operad.links import closure
+from ephs.operad.messages import nearest_of
 from ephs.operad.names import ROOT, Path, PathLike, paths_text
 from ephs.operad.parts import Box, Junction, Port
 from ephs.operad.pattern import Boxes
@@ -41,7 +42,7 @@ def _read_box(box: Path, value: object, junctions: Mapping[Path, Junction]) -> B
         raise PatternError("root-port", box=box, port=ROOT, found="a port at the root path", expected="a name")
     for name, port in ports.items():
         if port.junction not in junctions:
-            expected = paths_text(junctions)
+            expected = paths_text(junctions) + nearest_of(port.junction, map(str, junctions))
             raise PatternError("unknown-junction", box=box, port=name, junction=port.junction, expected=expected)
     return box_of(ports, junctions)
 

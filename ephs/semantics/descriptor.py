@@ -19,7 +19,7 @@ from ephs.semantics.errors import AssemblyError, listed
 from ephs.semantics.kept import Kept
 from ephs.semantics.numbering import Index, Numbering, bearing_junctions, number_flat, starts
 from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
-from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces import Pair, manifold
 from ephs.semantics.system import System
 
 
@@ -42,6 +42,11 @@ class StateSlot:
     def rates(self) -> slice:
         """Slice of the rate vector."""
         return slice(self.rate, self.rate + self.quantity.space.dim)
+
+    def element(self, value: Array) -> Array:
+        """The state as the relations read it, of its value in a solution: a relative pose as element of its group."""
+        relative = self.quantity.kind == "relative_pose"
+        return Pair.from_space(self.quantity.space).element(value) if relative else value
 
 
 @final

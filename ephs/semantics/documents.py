@@ -5,12 +5,13 @@ than its own: what fills many boxes is written once, and nothing can contain its
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 from typing import Any, cast
 
-from ephs.operad import ROOT, Directory, Path
-from ephs.operad.documents import pattern_within
+from ephs.operad import ROOT, Directory, Path, Pattern
+from ephs.operad.documents import pattern_within, record_in_order
+from ephs.operad.documents import to_dict as pattern_record
 from ephs.operad.names import MOST_NAMES
 from ephs.operad.reading import Reader
 from ephs.semantics.errors import SemanticsError
@@ -26,6 +27,19 @@ _READ = Reader("system")
 
 def to_dict(system: System) -> dict[str, Any]:
     """The system as nested dictionaries of text and numbers; see `System.to_dict`."""
+    return _record(system, pattern_record, sorted)
+
+
+def to_dict_in_order(system: System) -> dict[str, Any]:
+    """The same with junctions and boxes in their own order: what is read back is computed in the same order, too."""
+    return _record(system, record_in_order, list)
+
+
+def _record(
+    system: System,
+    pattern_of: Callable[[Pattern], dict[str, Any]],
+    arranged: Callable[[Any], list[tuple[Path, Filling]]],
+) -> dict[str, Any]:
     parts: list[dict[str, Any]] = []
     known: dict[str, int] = {}
     numbers: dict[int, int] = {}
@@ -33,12 +47,12 @@ def to_dict(system: System) -> dict[str, Any]:
     while pending:
         path, filling = pending[-1]
         if isinstance(filling, System):
-            inner = sorted(filling.fillings.items())
+            inner = arranged(filling.fillings.items())
             if waiting := [(path / box, part) for box, part in reversed(inner) if id(part) not in numbers]:
                 pending += waiting
                 continue
             places = {str(box): numbers[id(part)] for box, part in inner}
-            entry: dict[str, Any] = {"pattern": filling.pattern.to_dict(), "fillings": places}
+            entry: dict[str, Any] = {"pattern": pattern_of(filling.pattern), "fillings": places}
         else:
             entry = {} if id(filling) in numbers else primitive_record(path, filling)
         pending.pop()

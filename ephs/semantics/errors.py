@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, final
 
-from ephs.operad.messages import nearest_name
+from ephs.operad.messages import nearest_of as nearest_of
 
 if TYPE_CHECKING:
     from ephs.semantics.trials import Witness
@@ -121,12 +121,6 @@ class SemanticsError(ValueError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, (type(self), self.kind, self.path, self.facts))
-
-
-def nearest_of(found: object, known: Iterable[str]) -> str:
-    """Suggestion of the known word nearest to a misspelled one, for the end of a message; empty if none is near."""
-    near = nearest_name(str(found), known)
-    return f"; did you mean {near!r}?" if near else ""
 
 
 def listed(found: object, known: Iterable[object]) -> str:

@@ -32,7 +32,7 @@ def balances(sol: Any, summary: dict[str, Any]) -> str:
         "Entropy": f"The entropy grew by {number(float(entropy[-1] - entropy[0]))} J/K. No component produced less "
         f"than {number(least)} J/K in a step.",
     }
-    if summary.get("max_constraint_error") is not None and sol.scene is not None:
+    if summary.get("max_constraint_error") is not None and sol.freedoms:
         residual = number(float(summary["max_constraint_error"]))
         sentences["Constraints"] = f"Joints hold to {residual} (m, rad) in position."
     words = "".join(f"<p><strong>{title}.</strong> {text}</p>" for title, text in sentences.items())

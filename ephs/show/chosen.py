@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ephs.mechanics.sweep.outputs import TOTALS, Output, known_outputs, unknown_output
+from ephs.mechanics.sweep.outputs import TOTALS, Output, known_outputs, made_by_hand, unknown_output
 from ephs.show.palette import CYCLE
 from ephs.show.panels import Curve, Panel
 from ephs.show.plots import panel_figure
@@ -20,7 +20,7 @@ def signal_names(sol: Any) -> dict[str, Labels]:
     """Names of all signals of a solution, with the names and units of their components."""
     model = sol.scene or sol.system
     if model is not None:
-        return known_outputs(model)
+        return made_by_hand(sol) | known_outputs(model)
     ledgers = {name: Labels("", (), (unit,)) for name, unit in TOTALS.items()}
     return ledgers | {str(path): sol.labels[path] for path in sol.states}
 

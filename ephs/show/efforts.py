@@ -38,9 +38,9 @@ def plot_wrenches(sol: Any, *joints: str) -> "Figure":
     """
     from matplotlib import rc_context
 
-    known = [name for name, _ in sol.scene.all_joints()] if sol.scene is not None else []
+    known = list(sol.freedoms)
     if not known:
-        raise ShowError("nothing", path=str(sol.name), found="joints", expected="a scene with joints")
+        raise ShowError("nothing", path=str(sol.name), found="joints", expected="a mechanism with joints")
     for name in joints:
         if name not in known:
             hint = did_you_mean(name, known, f"there are {listing(known)}")

@@ -19,7 +19,7 @@ MANY = 40
 
 def solution_html(solution: Any) -> str:
     """Balances of a run beside the schematic of its first instant."""
-    scene = solution.scene
+    scene = solution.outline
     if scene is None or not len(solution):
         return solution_table(solution)
     poses = {name: _first(solution.body(name)) for name, _ in _few(scene)}

@@ -6,7 +6,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.palette import BLACK, BLUE, CYCLE, GREEN, ORANGE, PURPLE, RED, SKY
-from ephs.show.series import Array, scene_panels, state_panels
+from ephs.show.series import Array, motion_lines, state_panels
 
 ROUNDING = 1e-12
 """Relative size of differences that count as rounding."""
@@ -49,8 +49,8 @@ class Panel:
 
 
 def motion_panels(sol: Any) -> list[Panel]:
-    """Joint coordinates, positions of the centres of mass and temperatures; for any other system, its states."""
-    found = scene_panels(sol) if sol.scene is not None else state_panels(sol)
+    """Joint coordinates, positions of the centres of mass and temperatures; of a system, its states, too."""
+    found = motion_lines(sol) | (state_panels(sol) if sol.scene is None else {})
     panels: list[Panel] = []
     for title, lines in (found or {"state": []}).items():
         curves = tuple(Curve(name, values, CYCLE[k % len(CYCLE)]) for k, (name, values) in enumerate(lines))

@@ -49,8 +49,8 @@ STYLE = {
 
 
 def plot_motion(sol: Any) -> "Figure":
-    """Joint coordinates, positions of the centres of mass and temperatures; for any other system, its states."""
-    return panel_figure(sol, "motion" if sol.scene is not None else "states", motion_panels(sol))
+    """Joint coordinates, positions of the centres of mass and temperatures; of a system, its states, too."""
+    return panel_figure(sol, "motion" if sol.outline is not None else "states", motion_panels(sol))
 
 
 def panel_figure(sol: Any, what: str, panels: list[Panel]) -> "Figure":

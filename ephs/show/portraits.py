@@ -36,7 +36,7 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
     Parameters
     ----------
     which : str or (str, str)
-        Degrees of freedom of a scene, as ``"pin"`` or ``"slider distance"``, or pairs of states of any system, as
+        Degrees of freedom of joints, as ``"pin"`` or ``"slider distance"``, or pairs of states of any system, as
         ``("osc.pe.q", "osc.ke.p")``: first what is drawn to the right. By default the first degrees of freedom that
         move, or one pair of states of either parity.
 
@@ -47,7 +47,7 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
     """
     from matplotlib import rc_context
 
-    known = _freedoms(sol) if sol.scene is not None else {}
+    known = _freedoms(sol)
     curves = [_curve(sol, each, known) for each in which] or _default(sol, known)
     columns = 2 if len(curves) == 4 else min(3, len(curves))
     rows = -(-len(curves) // columns)
@@ -67,8 +67,8 @@ def _freedoms(sol: Any) -> dict[str, _Curve]:
     def place(name: str) -> Any:
         return sol.joint(name).coordinate
 
-    places = freedom_lines(sol.scene, place, place)
-    rates = freedom_lines(sol.scene, place, lambda name: sol.joint(name).rate)
+    places = freedom_lines(sol.freedoms, place, place)
+    rates = freedom_lines(sol.freedoms, place, lambda name: sol.joint(name).rate)
     return {
         name: _Curve(f"{name} [{unit}]", f"rate [{unit}/s]", x, y)
         for (name, unit, x), (_, _, y) in zip(places, rates, strict=True)
@@ -94,7 +94,7 @@ def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _Curve]) -> 
 
 
 def _default(sol: Any, known: dict[str, _Curve]) -> list[_Curve]:
-    if sol.scene is not None:
+    if known:
         moving = [curve for curve in known.values() if float(np.nanmax(curve.x) - np.nanmin(curve.x)) > STILL]
         if moving:
             return moving[:MOST]

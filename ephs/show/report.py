@@ -195,7 +195,7 @@ def _animation(sol: Any) -> str:
 
 def _plots(sol: Any) -> str:
     groups = [
-        Group("Motion" if sol.scene is not None else "States", motion_panels(sol), shown=True),
+        Group("Motion" if sol.outline is not None else "States", motion_panels(sol), shown=True),
         Group("Energy", energy_panels(sol), shown=True),
         Group("Exergy", exergy_panels(sol), shown=False),
         Group("Entropy", entropy_panels(sol), shown=False),

@@ -1,13 +1,14 @@
 """Preparation of a plot's lines: units, thinning, number of names."""
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.motion.readout import freedoms_of
 from ephs.semantics.bundle import Array
+from ephs.solve.result.labels import Labels
+from ephs.solve.result.temperatures import heated
 
 MOVES = 1e-9
 """Least relative change of a drawn value."""
@@ -54,14 +55,13 @@ def state_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
 
 
 def freedom_lines(
-    scene: Any, places: Callable[[str], Any], read: Callable[[str], Any]
+    freedoms: Mapping[str, Labels], places: Callable[[str], Any], read: Callable[[str], Any]
 ) -> Iterator[tuple[str, str, Array]]:
     """Name, unit and values (n,) of each degree of freedom of each joint, from ``read(joint)``, (n, d).
 
     ``places(joint)`` gives the coordinates, which say where a line has to be broken: there values are NaN.
     """
-    for name, joint in scene.all_joints():
-        labels = freedoms_of(joint)
+    for name, labels in freedoms.items():
         values = np.array(read(name), dtype=float)
         turning = [k for k, freedom in enumerate(labels.names) if freedom in ("rx", "ry", "rz")]
         if turning:  # rotation vectors are principal values: where they start anew, a line ends
@@ -71,21 +71,28 @@ def freedom_lines(
             yield name if len(labels.names) == 1 else f"{name} {freedom}", labels.units[k], values[:, k]
 
 
-def scene_panels(sol: Any) -> dict[str, list[tuple[str, Array]]]:
+def motion_lines(sol: Any) -> dict[str, list[tuple[str, Array]]]:
     """Joint angles and distances, positions of bodies and temperatures, one panel for each unit and direction."""
-    scene = sol.scene
+    bodies = () if sol.outline is None else sol.outline.all_bodies()
     panels: dict[str, list[tuple[str, Array]]] = {}
     places: Callable[[str], Any] = lambda joint: sol.joint(joint).coordinate  # noqa: E731 - it is read twice
-    for name, unit, column in freedom_lines(scene, places, places):
+    for name, unit, column in freedom_lines(sol.freedoms, places, places):
         panel = "joint distance [m]" if unit == "m" else "joint angle [rad]"
         panels.setdefault(panel, []).append((name, column))
-    for name, _ in scene.all_bodies():
+    for name, _ in bodies:
         for axis, column in zip("xyz", np.asarray(sol.body(name).position, dtype=float).T, strict=True):
             panels.setdefault(f"position {axis} [m]", []).append((name, column))
-    for name, _ in scene.all_thermal():
-        panels.setdefault("temperature [K]", []).append((name, np.asarray(sol.thermal(name).temperature, dtype=float)))
+    if warm := temperatures(sol):
+        panels["temperature [K]"] = list(warm.items())
     # Constant directions are omitted.
     return {title: lines for title, lines in panels.items() if not title.startswith("position") or _moves(lines)}
+
+
+def temperatures(sol: Any) -> dict[str, Array]:
+    """(n,) temperatures in K of the thermal nodes of a scene, or of the storages of heat of a system."""
+    if sol.scene is None:
+        return heated(sol)
+    return {name: np.asarray(sol.thermal(name).temperature, dtype=float) for name, _ in sol.scene.all_thermal()}
 
 
 def _moves(lines: list[tuple[str, Array]]) -> bool:

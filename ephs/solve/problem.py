@@ -17,6 +17,7 @@ from ephs.solve.motion_law import MotionLaw
 
 if TYPE_CHECKING:
     from ephs.solve.result.dataset import Variable
+    from ephs.solve.result.labels import Labels
     from ephs.solve.result.record import Record
     from ephs.solve.result.solution import Solution
 
@@ -111,6 +112,15 @@ class Signal:
 class Linked(Protocol):
     """Motion of bodies and joints by name."""
 
+    @property
+    def freedoms(self) -> "Mapping[str, Labels]":
+        """Names and units of the coordinates of each joint."""
+        ...
+
+    def summary(self) -> dict[str, Any]:
+        """Additions to the summary."""
+        ...
+
     def body(self, name: str) -> Any:
         """The motion of a body."""
         ...
@@ -132,16 +142,8 @@ class Outlined(Linked, Protocol):
         ...
 
 
-class Motion(Protocol):
+class Motion(Linked, Protocol):
     """A motion in terms of mechanics: the solver itself has only states, efforts and flows."""
-
-    def body(self, name: str) -> Any:
-        """The motion of a body."""
-        ...
-
-    def joint(self, name: str) -> Any:
-        """The motion of a joint."""
-        ...
 
     def thermal(self, name: str) -> Any:
         """The temperature of a thermal node."""
@@ -187,10 +189,6 @@ class Motion(Protocol):
 
     def velocity_error(self) -> Array:
         """(n,) largest residual of the reported velocities, in m/s or rad/s."""
-        ...
-
-    def summary(self) -> dict[str, Any]:
-        """Additions to the summary."""
         ...
 
     def variables(self, *, wrenches: bool) -> "dict[str, Variable]":

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics import differentiating
 from ephs.mechanics.dynamics.control import Task, computed_torque, task_of
+from ephs.mechanics.dynamics.keeping import following
 from ephs.mechanics.dynamics.links import Links
 from ephs.mechanics.dynamics.loading import Loading
 from ephs.mechanics.dynamics.placing import ByJoint, Placing
@@ -98,7 +99,8 @@ class Dynamics:
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
         """The initial state with other joint coordinates; geared joints and stretches follow, see `Scene.with_state`.
 
-        Of a tree all joints' may be given as arrays (n,). Of a system the nearest state whose loops are closed.
+        Of a tree all joints' may be given as arrays (n,). Of a system loops close, and gears hold, by what is not
+        given; where they do not, it is the nearest state in which they do.
 
         Raises
         ------
@@ -110,7 +112,8 @@ class Dynamics:
             return made
         by_name = [self.layout.named("state", given) for given in (coordinates, rates)]
         if self.scene is None:
-            return self.closed(self.placing.moved(self.state0, *by_name))
+            moved = self._reduced(self.placing.moved(self.state0, *by_name))
+            return self.closed(self._state(following(self._equations, moved, *map(self.placing.places, by_name))))
         scene = self.scene.with_state(*by_name, adjust=adjust)
         return self._of_states(problem_of_scene(scene).initial)
 

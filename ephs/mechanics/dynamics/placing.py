@@ -12,6 +12,7 @@ from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import OptionError
+from ephs.solve.sparse import Index
 
 ByJoint: TypeAlias = Mapping[str, ArrayLike] | ArrayLike
 """Numbers of joints by name, or (n,) of all of the tree in the order of its freedoms."""
@@ -97,6 +98,11 @@ class Placing:
                 out[at] = pair.element(values[first : first + dim])
                 first += dim
         return out if np.isfinite(out).all() else None
+
+    def places(self, given: Mapping[str, ArrayLike]) -> Index:
+        """Freedoms of the tree that joints of these names have."""
+        found = np.concatenate([np.zeros(0, dtype=np.int64), *(self.layout.freedoms[name] for name in given)])
+        return found[found < self.layout.n]
 
     def rates(self, r: Array, given: ByJoint) -> Array | None:
         """Rates r with some joints at these; None where they do not fit."""

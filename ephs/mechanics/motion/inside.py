@@ -1,5 +1,6 @@
 """A mechanism that is a part of a larger system, read from the solution of the whole."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, final
 
 import numpy as np
@@ -9,6 +10,7 @@ from ephs.mechanics.motion.moving import Part
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.solve.result.labels import Labels
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -57,6 +59,11 @@ class Inside:
     def outline(self) -> "Scene":
         """The drawn scene."""
         return self.scene
+
+    @property
+    def freedoms(self) -> Mapping[str, Labels]:
+        """Names and units of the coordinates of each joint."""
+        return self._motion.freedoms
 
     @property
     def constraint_error(self) -> Array:

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from ephs.mechanics.motion.batch import compose
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion
 from ephs.mechanics.motion.moving import ByPath
+from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
@@ -19,6 +20,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import nearest_of
+from ephs.solve.result.labels import Labels, freedoms
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -55,6 +57,15 @@ class LinkMotion:
         """
         joint = self._joints[_known("joint", name, self._joints)]
         return JointMotion(self, name, self._solution[joint.state.path].reshape(-1, joint.pair.dim))
+
+    @property
+    def freedoms(self) -> dict[str, Labels]:
+        """Names and units of the coordinates of each joint, by the path of its box."""
+        return {name: freedoms(joint.pair) for name, joint in self._joints.items()}
+
+    def summary(self) -> dict[str, Any]:
+        """Bodies and joints at the end."""
+        return ends(self, self._links, self._joints)
 
     def outline(self) -> Scene:
         """Bodies, and joints between these and the ground, as a scene to be drawn; bodies have no shapes."""

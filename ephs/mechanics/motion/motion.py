@@ -17,7 +17,7 @@ from ephs.mechanics.motion.gaps import open_by, span_of
 from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
-from ephs.mechanics.motion.readout import summary, variables
+from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
@@ -27,6 +27,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.markup import table
 from ephs.semantics.spaces import SE3
 from ephs.solve.result.dataset import Variable
+from ephs.solve.result.labels import Labels
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -152,6 +153,11 @@ class SceneMotion:
         self._joints = dict(scene.all_joints())
         self._implicit = dict(scene.implicit_joints())
         self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
+
+    @property
+    def freedoms(self) -> Mapping[str, Labels]:
+        """Names and units of the coordinates of each joint."""
+        return {name: freedoms_of(joint) for name, joint in self._joints.items()}
 
     # ---- reading -----------------------------------------------------------------------------------------------
 

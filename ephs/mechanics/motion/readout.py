@@ -1,6 +1,6 @@
 """A motion of a scene as labelled arrays and in figures: bodies, joints, thermal nodes, markers."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any, Protocol
 
@@ -92,9 +92,18 @@ def summary(scene: Scene, solution: Solution, motion: Any, joints: Sequence[str]
         out["adjusted"] = asdict(scene.adjusted)
     if not len(solution):
         return out | {"bodies": {}, "joints": {}, "thermal": {}}
-    bodies = {name: motion.body(name) for name, _ in scene.all_bodies()}
-    turning = {name: motion.joint(name) for name in joints}
     return out | {
+        **ends(motion, [name for name, _ in scene.all_bodies()], joints),
+        "thermal": {
+            name: {"temperature": float(motion.thermal(name).temperature[-1])} for name, _ in scene.all_thermal()
+        },
+    }
+
+
+def ends(motion: Any, bodies: Iterable[str], joints: Iterable[str]) -> dict[str, Any]:
+    """Poses and velocities of bodies, coordinates and rates of joints at the end."""
+    read, turning = {name: motion.body(name) for name in bodies}, {name: motion.joint(name) for name in joints}
+    return {
         "bodies": {
             name: {
                 "position": body.position[-1].tolist(),
@@ -102,13 +111,10 @@ def summary(scene: Scene, solution: Solution, motion: Any, joints: Sequence[str]
                 "velocity": body.velocity[-1].tolist(),
                 "angular_velocity": body.angular_velocity[-1].tolist(),
             }
-            for name, body in bodies.items()
+            for name, body in read.items()
         },
         "joints": {
             name: {"coordinate": joint.coordinate[-1].tolist(), "rate": joint.rate[-1].tolist()}
             for name, joint in turning.items()
-        },
-        "thermal": {
-            name: {"temperature": float(motion.thermal(name).temperature[-1])} for name, _ in scene.all_thermal()
         },
     }

@@ -9,6 +9,7 @@ import numpy as np
 
 from ephs.mechanics.rewrite.folded import folded_problem
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.system_text import is_system_text, read_system_text
 from ephs.mechanics.scene.build import drive_ports, scene_inputs, wrench_port
 from ephs.mechanics.scene.document import scene_from_text
 from ephs.mechanics.scene.model import Scene
@@ -33,7 +34,7 @@ def load_solution(path: str | File, model: System | Scene | None = None) -> Solu
     Parameters
     ----------
     model
-        Of a journal, the system that ran; scenes are in it.
+        Of a journal, the system that ran, if it cannot be written (`System.to_dict`); others are in it.
 
     The file may come from anybody: it is read as data, and names no other files but meshes, which are drawn where they
     lie in its folder, in the working folder, or below one of them.
@@ -80,9 +81,10 @@ def _of_result(file: File, homes: tuple[File, ...]) -> Solution:
 def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...]) -> Solution:
     found = read_journal(file)
     run = found.heading["run"]
-    if model is None and not found.heading["model"]:
+    text = found.heading["model"]
+    if model is None and not text:
         raise ValueError(f"{file}: a journal of {found.heading['name']}, a system; give it as model=")
-    model = model or _scene(found.heading["model"], homes)
+    model = model or (read_system_text(text)[0] if is_system_text(text) else _scene(text, homes))
     if isinstance(model, Scene):
         inputs = {key: _known(given) for key, given in (run["inputs"] or {}).items()}
         problem = in_own_units(problem_of_scene(model, None, inputs))
@@ -130,7 +132,9 @@ def _scene(text: str, homes: tuple[File, ...]) -> Scene:
 
 
 def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array], homes: tuple[File, ...]) -> Problem:
-    """The problem of a scene, with inputs as they were at some instants."""
+    """The problem of a model, with inputs as they were at some instants."""
+    if is_system_text(text):
+        return _system_again(text, t, inputs)
     scene = _scene(text, homes)
     forced = [f"joints.{name}" for name, j in scene.all_joints() if any(p in inputs for p, _ in drive_ports(j))]
     pushed = [f"bodies.{name}" for name, _ in scene.all_bodies() if wrench_port(name) in inputs]
@@ -145,6 +149,22 @@ def _problem_again(text: str, t: Array, inputs: Mapping[Path, Array], homes: tup
         if t.size and path not in changing
     }
     return replace(problem, signals={**problem.signals, **signals})
+
+
+def _system_again(text: str, t: Array, inputs: Mapping[Path, Array]) -> Problem:
+    """The problem of a system, with inputs as they were at some instants."""
+    system, efforts, laws, reference = read_system_text(text)
+    given: dict[str, Any] = {}
+    for path, port in system.interface.items():
+        if port.power and (path in inputs or str(path) in laws):
+            side = "effort" if str(path) in efforts else "flow"
+            given[str(path)] = {side: laws.get(str(path), np.zeros(port.quantity.space.dim))}
+    problem = problem_of_system(system, None, given, reference, assemble=False)
+    kept = {path: signal for path, signal in problem.signals.items() if str(path) not in laws and t.size}
+    return replace(
+        problem,
+        signals={**problem.signals, **{path: _kept(t, inputs[path], signal.effort) for path, signal in kept.items()}},
+    )
 
 
 def _kept(t: Array, values: Array, effort: bool) -> Signal:

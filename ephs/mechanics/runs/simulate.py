@@ -1,6 +1,7 @@
 """`simulate`: from a system or a scene to its motion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from ephs.mechanics.runs.pace import longest_step
 from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
 from ephs.mechanics.runs.running import Course
 from ephs.mechanics.runs.signals import asked_of, check_mappings, jumps_of, signal, times_of
+from ephs.mechanics.runs.system_text import system_text
 from ephs.mechanics.scene.build import (
     drive_ports,
     initial_state,
@@ -325,7 +327,8 @@ def problem_of_system(
     gaps = joints.gaps if joints.links else None
     linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
     given = reference or Reference()
-    return Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked)
+    document = cache(lambda: system_text(system, signals, given))
+    return Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked, document=document)
 
 
 @paused_collector()

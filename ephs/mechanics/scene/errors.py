@@ -1,5 +1,7 @@
 """Faults of scenes: one exception for the layer, every text in one table."""
 
+import sys
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from heapq import nsmallest
@@ -91,18 +93,28 @@ class ModelWarning(UserWarning):
         super().__init__("\n  ".join([path, *map(_shortened, self.lines)]))
 
 
+def warn_caller(warning: Warning) -> None:
+    """Give a warning at the line of the first caller outside of this package."""
+    frame, level = sys._getframe(1), 2
+    while frame is not None and str(frame.f_globals.get("__name__")).partition(".")[0] in _INNER:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(warning, stacklevel=level)
+
+
 def _shortened(line: str) -> str:
     names = line.split(", ")
     more = len(names) - SHOWN
     return line if more < 2 else f"{', '.join(names[:SHOWN])}, and {more} more"
 
 
+_INNER = ("ephs", "contextlib")
+"""Modules whose lines say nothing to a user: this package, and what its decorators run in."""
 # code: (expected, advice); both may name the values given to `fault`.
 TEXTS: dict[str, tuple[str, str]] = {
     # the file
-    "no file": ("a scene file", "check the path"),
+    "no file": ("a scene file", "{hint}"),
     "not readable": ("a readable file", "check what the path names, and its permissions"),
-    "suffix": ("a file that ends in .toml, .urdf, .xml or .sdf", "check the file's name"),
+    "suffix": ("a file that ends in .toml, .urdf, .xml or .sdf", "{hint}"),
     "encoding": ("UTF-8 text", "save the file as UTF-8"),
     "syntax": ("valid TOML", "correct the syntax there; units are written as comments"),
     "base": ('"fixed" or "free"', "choose the connection of the imported root with the ground"),

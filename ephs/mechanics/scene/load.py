@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-import warnings
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,14 +16,14 @@ from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told
+from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told, warn_caller
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.resolve_attached import resolve_attached
 from ephs.mechanics.scene.state import Asked, adjusted
 from ephs.mechanics.scene.tendons import resolve_tendons, with_pulls
-from ephs.mechanics.scene.text import file_text
+from ephs.mechanics.scene.text import file_text, lost
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
@@ -110,9 +109,9 @@ def load(
     if r.faults:
         raise SceneError(str(path), r.faults)
     if odd := [*told(r.odd), *filter(None, [said])]:
-        warnings.warn("\n  ".join([f"{path}:", *map(str, odd)]), SceneWarning, stacklevel=2)
+        warn_caller(SceneWarning("\n  ".join([f"{path}:", *map(str, odd)])))
     if r.left:
-        warnings.warn(ModelWarning(f"{path}:", r.left), stacklevel=2)
+        warn_caller(ModelWarning(f"{path}:", r.left))
     return scene
 
 
@@ -201,7 +200,8 @@ def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
 
         return read_model(path, r.base, faults, r.left, contact=r.contact)
     if path.suffix != ".toml":
-        faults.append(fault("suffix", "", shown(path.suffix) if path.suffix else "a file without suffix"))
+        found = shown(path.suffix) if path.suffix else "a file without suffix"
+        faults.append(fault("suffix", "", found, hint=lost(path)))
         return None
     text = file_text(path, faults)
     if text is None:

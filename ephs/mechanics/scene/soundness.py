@@ -7,13 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
-from warnings import warn
 
 import numpy as np
 
 from ephs.mechanics.scene.attached import Attachment
 from ephs.mechanics.scene.element import OUTSIDE, Element
-from ephs.mechanics.scene.errors import ModelWarning, legible
+from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
@@ -76,7 +75,7 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
     found = mapped(scene, {"bodies": kept})
     if lost:
         files = ", ".join(map(legible, sorted(set(lost))))
-        warn(f"meshes outside of the file's folder and the working folder are not drawn: {files}", ModelWarning, 2)
+        warn_caller(ModelWarning(f"meshes outside of the file's folder and the working folder are not drawn: {files}"))
     return found if lost else scene
 
 

@@ -1,6 +1,6 @@
 """Outputs of every member by name, and their readers."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, final
 
@@ -12,6 +12,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
 from ephs.solve.errors import OptionError
 from ephs.solve.result.labels import POSE, WRENCH, Labels, labels_of
+from ephs.solve.result.temperatures import heat_storages
 
 if TYPE_CHECKING:
     from ephs.semantics.system import System
@@ -58,7 +59,9 @@ class Output:
         motion: Any = solution
         if self.name in TOTALS:
             return np.asarray(getattr(motion, self.name))
-        if solution.motion is not None and kind in _OF and what in _OF[kind] and thing:
+        if kind in _OF and what in _OF[kind] and thing:
+            if kind == "thermal" and solution.motion is None:
+                return solution.temperature(thing)
             return np.asarray(getattr(getattr(motion, kind_of(kind))(thing), what))
         return solution[self.name]
 
@@ -97,6 +100,24 @@ def known_outputs(model: "Scene | System") -> dict[str, Labels]:
     return dict(_known(model))
 
 
+def made_by_hand(solution: Any) -> dict[str, Labels]:
+    """Labels of what is read of joints, bodies and storages of heat of a system, by the paths of their boxes."""
+    if solution.scene is not None:
+        return {}
+    moving = {name: labels for name, labels in solution.freedoms.items() if labels.units}
+    bodies = [] if solution.outline is None else [name for name, _ in solution.outline.all_bodies()]
+    warm = [] if solution.problem is None else heat_storages(solution.problem.descriptor, environments=False)
+    return dict(_of_mechanism(moving, bodies)) | {f"thermal.{path}.temperature": _TEMPERATURE for path in warm}
+
+
+def _of_mechanism(joints: Mapping[str, Labels], bodies: Iterable[str]) -> "Iterator[tuple[str, Labels]]":
+    for name, labels in joints.items():
+        yield f"joints.{name}.coordinate", labels
+        yield f"joints.{name}.rate", replace(labels, units=tuple(f"{unit}/s" for unit in labels.units))
+        yield f"joints.{name}.wrench", WRENCH
+    yield from ((f"bodies.{name}.{key}", labels) for name in bodies for key, labels in _BODY.items())
+
+
 def unknown_output(option: str, name: str, known: Iterable[str]) -> OptionError:
     """Error of a name that no output has; suggestions are of the same kind: a joint's for a joint's."""
     kind = name.partition(".")[0]
@@ -112,12 +133,8 @@ def _known(model: "Scene | System") -> "Iterator[tuple[str, Labels]]":
 
         system = scene_system(model)
         joints = [(name, joint) for name, joint in model.all_joints() if joint.dim]
-        for name, joint in [*joints, *model.implicit_joints()]:
-            labels = freedoms_of(joint)
-            yield f"joints.{name}.coordinate", labels
-            yield f"joints.{name}.rate", replace(labels, units=tuple(f"{unit}/s" for unit in labels.units))
-            yield f"joints.{name}.wrench", WRENCH
-        yield from ((f"bodies.{name}.{key}", labels) for name, _ in model.all_bodies() for key, labels in _BODY.items())
+        moving = {name: freedoms_of(joint) for name, joint in [*joints, *model.implicit_joints()]}
+        yield from _of_mechanism(moving, (name for name, _ in model.all_bodies()))
         yield from ((f"thermal.{name}.temperature", _TEMPERATURE) for name, _ in model.all_thermal())
         yield from (
             (f"markers.{name}.{key}", labels) for name, _ in model.all_markers() for key, labels in _MARKER.items()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Directory, Interface, PortType, Quantity, quantity
-from ephs.operad.messages import nearest_name
+from ephs.operad.messages import nearest_of
 from ephs.semantics import formulas
 from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.derive.linear import Linear
@@ -73,8 +73,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    near = nearest_name(name, __all__)
-    raise AttributeError(f"the library has no {name!r}" + (f"; did you mean {near!r}?" if near else ""))
+    raise AttributeError(f"the library has no {name!r}{nearest_of(name, __all__)}")
 
 
 Structure = tuple[Sequence[Sequence[Any]] | None, Sequence[Sequence[Any]] | None]

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path as File
 from typing import Any, final
 
@@ -99,6 +99,9 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
                 raise ValueError(f"{file}: {REST} or a state is of another model: {error.args[0]}") from error
         known = {slot.path: known[slot.path] for slot in problem.descriptor.states if slot.path in known}
         books = with_zeros(books, problem, t.size)
+    elif problem is not None and t.size:  # a mechanism is read as it was solved: by its first instant
+        first = Solution(attributes["name"], t, known, books, {}, problem, labels, inputs).state_at(0)
+        problem = replace(problem, initial=first)
     stats = _stats(json.loads(attributes["stats"]), problem)
     return Solution(attributes["name"], t, known, books, stats, problem, labels, inputs)
 

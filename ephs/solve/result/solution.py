@@ -11,7 +11,6 @@ import numpy as np
 
 from ephs.operad import ROOT, Path
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces import Pair
 from ephs.semantics.system import System
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.events import Crossing
@@ -237,6 +236,23 @@ class Solution:
             return self.scene
         return self.problem.linked(self).outline()
 
+    def temperature(self, path: str | Path) -> Array:
+        """(n,) temperature in K of a storage of heat, by the path of its box or of its entropy; of an environment θ₀.
+
+        Raises
+        ------
+        KeyError
+            No storage with one entropy lies there; the message lists those that there are.
+        """
+        from ephs.solve.result.temperatures import temperature_at
+
+        return temperature_at(self, Path.of(path))
+
+    @property
+    def freedoms(self) -> Mapping[str, Labels]:
+        """Names and units of the coordinates of each joint, by its name, or in a system by the path of its box."""
+        return {} if self._linked is None else self._linked.freedoms
+
     def thermal(self, name: str) -> Any:
         """The temperature of a thermal node."""
         return self._moving("thermal nodes").thermal(name)
@@ -274,11 +290,8 @@ class Solution:
 
     def state_at(self, i: int) -> dict[Path, Array]:
         """The states at the i-th instant, as they are stored: relative poses as elements of their group."""
-        out: dict[Path, Array] = {}
-        for slot in [] if self.problem is None else self.problem.descriptor.states:
-            value, relative = np.atleast_1d(self.states[slot.path][i]), slot.quantity.kind == "relative_pose"
-            out[slot.path] = Pair.from_space(slot.quantity.space).element(value) if relative else value
-        return out
+        slots = () if self.problem is None else self.problem.descriptor.states
+        return {slot.path: slot.element(np.atleast_1d(self.states[slot.path][i])) for slot in slots}
 
     def port(self, path: str | Path) -> "PortMotion":
         """Flow, effort and power at an outer power port, by the continuous relations at each instant.
@@ -294,33 +307,9 @@ class Solution:
 
     def summary(self) -> dict[str, Any]:
         """The values of ``summary.json``."""
-        last = -1 if len(self) else slice(0)
-        out: dict[str, Any] = {
-            "scene": self.name,
-            "method": self.stats["method"],
-            "form": self.stats["form"],
-            "t_end": float(self.t[-1]) if len(self) else None,
-            "steps": self.stats["steps"],
-            "rejected": self.stats["rejected"],
-            "setup_s": self.stats["setup_s"],
-            "integrate_s": self.stats["integrate_s"],
-            "unknowns": {
-                "paper": self.stats.get("paper_unknowns", self.stats["unknowns"]),
-                "used": self.stats["unknowns"],
-            },
-            "max_energy_error": float(self.energy_error.max(initial=0.0)),
-            "max_constraint_error": float(self.constraint_error.max(initial=0.0)),
-            "max_velocity_error": float(self.velocity_error.max(initial=0.0)),
-            "min_entropy_production": float(self.stats["least_production"]),
-            "heat": float(np.sum(self.heat[last])),
-            "work": float(np.sum(self.work[last])),
-            "audit": self.audit.record(),
-        }
-        if self.motion is not None:
-            out |= self.motion.summary()
-        else:
-            out["states"] = {str(path): values[-1].tolist() for path, values in self.states.items() if len(self)}
-        return out
+        from ephs.solve.result.summary import summary_of
+
+        return summary_of(self)
 
     def to_xarray(self, *, wrenches: bool = True) -> "xr.Dataset":
         """States, ledgers, inputs and what is derived from them, over ``t``, with names and units of all components.
@@ -383,7 +372,8 @@ class Solution:
 
     def _moving(self, what: str) -> Motion:
         if self.motion is None:
-            raise TypeError(f"{self.name} is not a scene, it has no {what}; states are read as sol['path']")
+            read = "states are read as sol['path'], temperatures as sol.temperature('path')"
+            raise TypeError(f"{self.name} is not a scene, it has no {what}; {read}")
         return self.motion
 
 

@@ -18,7 +18,7 @@ def solution_table(solution: "Solution") -> str:
         ("time", f"{solution.t[0]:g} … {solution.t[-1]:g} s, {len(solution)} instants"),
         ("method", f"{solution.stats['method']}, {solution.stats['steps']} steps"),
         ("energy error, relative", f"{solution.energy_error.max():.1e}"),
-        *([("joint gap", f"{solution.constraint_error.max():.1e} m, rad")] if solution.scene is not None else []),
+        *([("joint gap", f"{solution.constraint_error.max():.1e} m, rad")] if solution.freedoms else []),
         ("heat", f"{solution.heat[-1]:.4g} J"),
         ("work", f"{solution.work[-1]:.4g} J"),
         ("exergy", f"{solution.exergy[0]:.5g} → {solution.exergy[-1]:.5g} J"),

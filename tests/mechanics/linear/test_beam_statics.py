@@ -1,5 +1,7 @@
 """Beams at rest: large bending, follower loads, buckling, modes of stressed states, against closed forms and tables."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -139,6 +141,20 @@ def test_a_right_angle_frame_buckles_out_of_its_plane(end, tmp_path):
     """Whatever the last load: at 1.0868 N one way and 0.6802 N the other, if it is rigid in its plane."""
     (critical,) = ephs.equilibrium(scene_of(frame(4, end, rigid=100.0), tmp_path)).critical
     assert end * critical == pytest.approx(1.0868 if end > 0.0 else -0.6802, abs=1e-4)
+
+
+@pytest.mark.parametrize(("end", "found"), [(1.5, 1.084), (-1.5, -0.679)])
+def test_loads_of_a_frame_of_rectangular_section_converge(end, found, tmp_path):
+    """By order 4, to the figures of a refined run: torsion by Saint-Venant's series, soft in its plane, too."""
+    section = "section = { rectangle = [30e-3, 0.6e-3], E = 7.124e10, nu = 0.31, rho = 2700.0 }"
+    loads = []
+    for elements in (4, 8, 16):
+        text = re.sub(r"section = .*", section, frame(elements, end))
+        (critical,) = ephs.equilibrium(scene_of(text, tmp_path)).critical
+        loads.append(end * critical)
+    first, second = np.abs(np.diff(loads))
+    assert 12.0 < first / second < 20.0
+    assert loads[-1] + (loads[-1] - loads[-2]) / 15.0 == pytest.approx(found, abs=5e-4)
 
 
 def test_a_path_goes_through_limit_points(tmp_path):
