@@ -14,6 +14,7 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.decompositions import metric_eigen
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, Outcome, SimulationError, SolveError
@@ -106,6 +107,18 @@ def equilibrium(
     SimulationError
         No equilibrium was found; the message names what still moves.
     """
+    try:
+        return _equilibrium(model, initial, inputs, reference)
+    except ArithmeticError as error:  # an eigenvalue or a rate that is no number
+        raise _none("", str(error)) from error
+
+
+def _equilibrium(
+    model: System | Scene,
+    initial: "Mapping[str, ArrayLike] | None",
+    inputs: Mapping[str, Any] | None,
+    reference: Reference | None,
+) -> Equilibrium:
     if isinstance(model, System):
         return _of_system(model, initial, inputs, reference)
     for key, value in (("initial", initial), ("inputs", inputs), ("reference", reference)):
@@ -170,8 +183,6 @@ def _resting(scene: Scene) -> Scene:
 
 def _settled(model: "Dynamics") -> "tuple[State, float, int]":
     """The equilibrium, its unbalanced fraction of the forces, and the number of steps."""
-    from scipy.linalg import eigh
-
     from ephs.mechanics.linear.scene import freedoms_of, unbalanced
 
     lengths = _lengths(model)
@@ -193,7 +204,7 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         force = M @ _still(model, state)[free.which]
         pulled = by.acceleration_s[:, list(lengths)] @ by.entropy_r[list(lengths)]
         K = -M @ ((by.acceleration_q + pulled) @ Z)[free.which]
-        values, ways = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
+        values, ways = metric_eigen(0.5 * (K + K.T), 0.5 * (M + M.T))
         size = np.abs(values)
         flat = size <= ELIMINATION * size.max(initial=0.0)
         push = ways.T @ force
