@@ -13,7 +13,7 @@ from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.resolution import Trials
-from ephs.solve.errors import Interrupted, Outcome, SimulationError, SolveError, solve_error_of
+from ephs.solve.errors import Interrupted, Outcome, SimulationError, SolveError, serves_not, solve_error_of
 from ephs.solve.problem import Problem
 from ephs.solve.result.labels import labels_of
 from ephs.solve.result.ledger import ledgers
@@ -26,6 +26,7 @@ class Run(Protocol):
 
     t: float
     problem: Problem
+    bounds: Bounds | None
 
     def solution(self) -> Solution:
         """The solution so far."""
@@ -52,7 +53,9 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         if error.outcome in _AT_CONSTRAINTS and run.problem.dependences:
             told.append(run.problem.dependences())
         equation = "; ".join(filter(None, told))
-        raise failed(outcome, run.t * run.problem.seconds, error.path, equation, run.solution()) from error.cause
+        serves = run.bounds.serves if run.bounds is not None else serves_not
+        partial = run.solution()
+        raise failed(outcome, run.t * run.problem.seconds, error.path, equation, partial, serves) from error.cause
     except KeyboardInterrupt as error:
         raise Interrupted(Outcome.INTERRUPTED, run.t * run.problem.seconds, "", "", run.solution()) from error
     except MemoryError as error:

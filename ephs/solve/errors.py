@@ -1,6 +1,6 @@
 """Failures of a run: named outcomes with time, component, equation, advice, and the partial solution."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, final
@@ -17,6 +17,7 @@ __all__ = [
     "LARGEST",
     "Interrupted",
     "OptionError",
+    "Other",
     "Outcome",
     "SimulationError",
     "SolveError",
@@ -24,6 +25,8 @@ __all__ = [
     "failing_at",
     "nearest_of",
     "number_of",
+    "or_take",
+    "serves_not",
     "solve_error_of",
 ]
 
@@ -65,14 +68,14 @@ class Outcome(StrEnum):
 
 _ADVICE = {
     Outcome.DIVERGED: "take a smaller step",
-    Outcome.SINGULAR: "take a smaller step, start elsewhere, or use natural, which omits redundant equations",
+    Outcome.SINGULAR: "take a smaller step, or start elsewhere",
     Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
     Outcome.OPEN: "take a smaller step, or check prescribed motions: the mechanism may be at the end of its travel",
     Outcome.SHAKY: "change its geometry or add springs: rigid joints transmit no force across their line",
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.ENTROPY: "correct the component's function; if it is right, take a smaller step",
-    Outcome.LAWLESS: "take a smaller step, or natural; if that is refused too, correct the component",
+    Outcome.LAWLESS: "take a smaller step; if that is refused too, correct the component",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",
@@ -90,9 +93,26 @@ _ADVICE = {
     Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
     Outcome.INTERRUPTED: "the solution up to there is in .partial",
 }
+Other = tuple[str, str]
+"""Another method by its name, and what it does."""
+_OTHERS: Mapping[Outcome, Other] = {
+    Outcome.SINGULAR: ("natural", "omits redundant equations"),
+    Outcome.LAWLESS: ("natural", "makes entropy only"),
+    Outcome.TINY: ("radau", "damps fast modes"),
+}
 LARGEST = 1e150
 """Bound of states: squares of larger ones overflow."""
 _OF_KERNEL = {1: Outcome.TURN, 2: Outcome.TEMPERATURE, 3: Outcome.PYTHON, 4: Outcome.EXTENT, 5: Outcome.DOMAIN}
+
+
+def serves_not(_name: str) -> bool:
+    """No other method is known to accept the problem."""
+    return False
+
+
+def or_take(other: Other | None, serves: Callable[[str], bool]) -> str:
+    """End of an advice that names another method, where that one accepts the problem; else nothing."""
+    return f", or take {other[0]}, which {other[1]}" if other is not None and serves(other[0]) else ""
 
 
 @final
@@ -147,11 +167,24 @@ class SimulationError(RuntimeError):
         Cause, time in s, component, equation, and advice.
     partial
         The Solution up to the failure, or None if it happened before the first step.
+
+    Parameters
+    ----------
+    serves
+        Whether a method by its name is another one than that of the run, and accepts the problem.
     """
 
-    def __init__(self, outcome: Outcome, time: float, path: str, equation: str, partial: "Solution | None") -> None:
+    def __init__(
+        self,
+        outcome: Outcome,
+        time: float,
+        path: str,
+        equation: str,
+        partial: "Solution | None",
+        serves: Callable[[str], bool] = serves_not,
+    ) -> None:
         self.outcome, self.time, self.path, self.equation = outcome, time, path, equation
-        self.advice = outcome.advice
+        self.advice = outcome.advice + or_take(_OTHERS.get(outcome), serves)
         self.partial = partial
         where = f" at {path}" if path else ""
         what = f" ({equation})" if equation else ""

@@ -16,7 +16,7 @@ from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import SLIVER, Control, Grid, Policy, first_step
 from ephs.solve.ending import audited, failures_of, repeatable
-from ephs.solve.errors import OptionError, Outcome, SolveError, solve_error_of
+from ephs.solve.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
 from ephs.solve.events import Event, Watch
 from ephs.solve.journal import Written
 from ephs.solve.problem import Problem, States
@@ -125,7 +125,8 @@ class _Run(Generic[S]):
         self.kept = Rows()
         self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
         self.watch = Watch((), t0, {})
-        self.forecast = Forecast(problem, stepper.name, bounds.order if bounds else 1, until)
+        order, serves = (bounds.order, bounds.serves) if bounds else (1, serves_not)
+        self.forecast = Forecast(stepper.name, order, until, serves)
         self.leg: Leg[S] | None = None
         self.first: Row | None = None
         self.cause: SolveError | None = None  # reason of rejecting the longer step
@@ -325,7 +326,7 @@ class _Run(Generic[S]):
             return self.samples.retaken.missed(self.stepper, self.breakpoints, self.problem.seconds)
         trials = trials_of(
             solution, self.bounds.undamped, self.problem, self.stepper, self.bounds.order, self.samples.states,
-            self.sign * step, self.until, self.breakpoints,
+            self.sign * step, self.t, self.breakpoints,
         )  # fmt: skip
         return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
 

@@ -105,10 +105,9 @@ class Counts:
 
 
 def too_fast(method: str, worst: str, asked: float) -> SolveError:
-    """Refusal of the step length, in s, that a tolerance requires at a state; it recommends methods."""
-    others = {"natural": "use radau or natural4", "natural4": "use radau"}.get(method, "")
+    """Refusal of the step length, in s, that a tolerance requires at a state."""
     told = f"{method} would need steps of about {asked:.1g} s" if np.isfinite(asked) else "its error is not finite"
-    return SolveError(Outcome.TINY, worst, "; ".join(part for part in (told, others) if part))
+    return SolveError(Outcome.TINY, worst, told)
 
 
 class Leg(Protocol[S_co]):

@@ -40,8 +40,8 @@ def test_short_runs_and_methods_of_high_order_are_not():
 
 def test_steps_that_get_shorter_are_forecast_again(monkeypatch):
     monkeypatch.setattr(forecast, "MANY", 1000)
-    problem = type("Problem", (), {"scene": None})()
-    watch, t = Forecast(problem, "natural", 2, 1.0), 0.0
+    method = ("natural", 2, 1.0, lambda _: True)
+    watch, t = Forecast(*method), 0.0
     for steps in range(1, 300):
         t += 0.01 if steps <= 40 else 1e-4
         if 128 == steps:
@@ -50,6 +50,6 @@ def test_steps_that_get_shorter_are_forecast_again(monkeypatch):
         else:
             watch.look(steps, t, lambda n=steps: {"iterations": n})
     assert watch.stats() == {"forecast": {"steps": 6040, "iterations": 6040, "after": 128}}
-    again = Forecast(problem, "natural", 2, 1.0)
+    again = Forecast(*method)
     again.restore(watch.snapshot())
     assert again.stats() == watch.stats()

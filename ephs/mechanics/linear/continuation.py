@@ -14,7 +14,7 @@ import numpy as np
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.scene import freedoms_of
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.decompositions import svd
+from ephs.semantics.spaces.decompositions import eigenvalues, svd
 
 SAME = 1e-12
 """Fraction of a load below which its remainder is rounding."""
@@ -164,7 +164,7 @@ def _eigenvalues(stiffness: Array) -> Array:
     """
     size = np.abs(np.diag(stiffness))
     scale = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
-    values: Array = np.real(np.linalg.eigvals(scale[:, None] * stiffness * scale)).astype(float)
+    values: Array = np.real(eigenvalues(scale[:, None] * stiffness * scale)).astype(float)
     return np.sort(values) + FLAT
 
 

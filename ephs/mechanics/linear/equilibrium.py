@@ -11,6 +11,10 @@ from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.spaces import manifold
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.decompositions import metric_eigen
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, Outcome, SimulationError, SolveError
@@ -20,13 +24,15 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ephs.mechanics.dynamics import Dynamics, State
+    from ephs.mechanics.runs.assembling import FlatJoints
+    from ephs.semantics.descriptor import Descriptor
 
 STALLED = 1e-9
 """Allowed unbalanced fraction of the forces where iterations stagnate."""
 UNFELT = 1e-9
 """Fraction of the forces along directions without stiffness that counts as rounding."""
-SHORTEST, LEAST, SETTLED = 1e-12, 1e-9, 1e-12
-"""Artificial time: the shortest step, the least scale of states, the residual at the end."""
+SHORTEST, LEAST, SETTLED, CLOSES = 1e-12, 1e-9, 1e-12, 1e-10
+"""Artificial time: the shortest step, the least scale of states, the residual and the gaps of joints at the end."""
 ENOUGH = 1e-12
 """Allowed unbalanced fraction of the applied forces."""
 STRIDE = 0.3
@@ -84,7 +90,8 @@ def equilibrium(
     For a scene, the search starts at its initial state with zero rates, and ends at a balance of gravity, springs and
     drives. It takes steps along the eigenvectors of the stiffness in the mass metric, downhill in unstable directions,
     too; unless the initial state is balanced, the result is a minimum of the energy. A system settles by implicit Euler
-    steps of growing length, which preserve its linear invariants (charges, volumes, entropies of isolated parts).
+    steps of growing length, which preserve its linear invariants (charges, volumes, entropies of isolated parts). In a
+    scene's own system, a joint with a prescribed motion is free unless its port has the effort 0.
 
     Parameters
     ----------
@@ -100,6 +107,18 @@ def equilibrium(
     SimulationError
         No equilibrium was found; the message names what still moves.
     """
+    try:
+        return _equilibrium(model, initial, inputs, reference)
+    except ArithmeticError as error:  # an eigenvalue or a rate that is no number
+        raise _none("", str(error)) from error
+
+
+def _equilibrium(
+    model: System | Scene,
+    initial: "Mapping[str, ArrayLike] | None",
+    inputs: Mapping[str, Any] | None,
+    reference: Reference | None,
+) -> Equilibrium:
     if isinstance(model, System):
         return _of_system(model, initial, inputs, reference)
     for key, value in (("initial", initial), ("inputs", inputs), ("reference", reference)):
@@ -164,8 +183,6 @@ def _resting(scene: Scene) -> Scene:
 
 def _settled(model: "Dynamics") -> "tuple[State, float, int]":
     """The equilibrium, its unbalanced fraction of the forces, and the number of steps."""
-    from scipy.linalg import eigh
-
     from ephs.mechanics.linear.scene import freedoms_of, unbalanced
 
     lengths = _lengths(model)
@@ -187,7 +204,7 @@ def _settled(model: "Dynamics") -> "tuple[State, float, int]":
         force = M @ _still(model, state)[free.which]
         pulled = by.acceleration_s[:, list(lengths)] @ by.entropy_r[list(lengths)]
         K = -M @ ((by.acceleration_q + pulled) @ Z)[free.which]
-        values, ways = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
+        values, ways = metric_eigen(0.5 * (K + K.T), 0.5 * (M + M.T))
         size = np.abs(values)
         flat = size <= ELIMINATION * size.max(initial=0.0)
         push = ways.T @ force
@@ -273,16 +290,18 @@ def _of_system(
     reference: Reference | None,
 ) -> Equilibrium:
     from ephs.mechanics.linear.pencil import Pencil, system_problem
+    from ephs.mechanics.runs.assembling import flat_joints
 
     problem = system_problem(system, initial, inputs, reference)
     pencil, d = Pencil(problem), problem.descriptor
+    joints = flat_joints(d)
     x, h = d.pack(problem.initial), 1e-3
     z, size, left, done = np.zeros(pencil.model.unknowns), 0.0, np.inf, 0
     try:
         for step in range(STEPS):
             done = step
             found = pencil.implicit_step(x, z, h)
-            if found is None:
+            if found is None or _beyond_half_a_turn(d, h * found[: pencil.n_w]):
                 h *= 0.25
                 if h < SHORTEST:
                     break
@@ -295,13 +314,45 @@ def _of_system(
             if not np.isfinite(left) or size > 1e12:
                 break
             if h >= 1e6 and left <= SETTLED:
-                return Equilibrium(system, d.unpack(x), left, step)
+                closed = d.pack(_closed(joints, d.unpack(x)))
+                if float(np.abs(closed - x).max(initial=0.0)) <= CLOSES * size:
+                    return Equilibrium(system, d.unpack(closed), left, step)
+                x, z, h = closed, np.zeros_like(z), 1e-3
+                continue
             h = min(h * (4.0 if moved < 0.5 else 1.5), 1e12)
     except SolveError as error:
         raise _none(error.path, error.equation or error.outcome.value) from error.cause
     fastest = max(d.states, key=lambda slot: float(np.abs(z[slot.rates]).max(initial=0.0)))
     rate = float(np.abs(z[fastest.rates]).max(initial=0.0))
     raise _none(str(fastest.path), f"after {done} steps it still changes by {rate:.3g} a second")
+
+
+def _closed(joints: "FlatJoints", states: dict[Path, Array]) -> dict[Path, Array]:
+    """The states with bodies where the joints put them: steps follow the rates of the joints, which open them.
+
+    Raises
+    ------
+    SimulationError
+        A loop is open.
+    """
+    from ephs.mechanics.runs.assembling import assembled, tendon_lengths
+
+    if not joints.links:
+        return states
+    try:
+        states = assembled(joints, states, joints.relative)
+    except AssemblyError as error:
+        raise _none("", f"{error}: the way there is too far for its loops") from error
+    return states | dict(tendon_lengths(joints.frames, states))
+
+
+def _beyond_half_a_turn(d: "Descriptor", change: Array) -> bool:
+    """Whether a change of the states goes around: steps of whole turns solve the equations without coming to rest."""
+    for slot in d.states:
+        group, v = manifold(slot.quantity.space), change[slot.rates]
+        if group.code != VECTOR and float(np.abs(group.log(group.exp(v)) - v).max(initial=0.0)) > 1.0:
+            return True
+    return False
 
 
 def _none(path: str, what: str) -> SimulationError:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import eigen
 
 SHOWN = 1e-6
 """Least displayed component of a mode, relative to the largest."""
@@ -67,7 +68,7 @@ def modes_of(A: Array, shapes: Mapping[str, Array]) -> tuple[Mode, ...]:
     """Modes of ẋ = A x, slowest first; ``shapes`` are maps (d, states) from the states to named outputs."""
     if not A.size:
         return ()
-    found = np.linalg.eig(A)
+    found = eigen(A)
     values, vectors = found[0].astype(np.complex128), found[1].astype(np.complex128)
     top = float(np.abs(values).max(initial=0.0))
     values[np.abs(values) < STILL * top] = 0.0

@@ -16,6 +16,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import Stages
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import eigenvalues
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.collocation import moments
@@ -83,7 +84,7 @@ class Gauss(ReducedMethod):
             for method in (self, self._steps):
                 method.rtol, method.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
         # h·|λ| beyond which sweeps over the stages do not contract
-        self.limit = 1.0 / float(np.abs(np.linalg.eigvals(self.tableau.arrays["a"][1:-1, 1:])).max())
+        self.limit = 1.0 / float(np.abs(eigenvalues(self.tableau.arrays["a"][1:-1, 1:])).max())
         self._stages: Stages | None = None
         self._sweeps = True
         self.counts: dict[str, Any] = {"switches": []}

@@ -13,6 +13,7 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import eigen
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
@@ -75,7 +76,7 @@ class Stages:
         else:  # to rounding, and near changes of rank as far as it converges
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
-        values, vectors = np.linalg.eig(self.inverse)
+        values, vectors = eigen(self.inverse)
         sizes, turns = np.abs(values), np.imag(values)
         kept = np.flatnonzero(turns >= -REAL * sizes)
         kept = kept[np.argsort(np.abs(turns[kept]))]
@@ -217,7 +218,7 @@ class Kept:
         eq, m = stages.equations, stages.jacobian.size
         self._stages, self._counted = stages, [0, 0]
         inverse = np.linalg.inv(coefficients)
-        values, vectors = np.linalg.eig(inverse)
+        values, vectors = eigen(inverse)
         real, imaginary = np.real(values), np.imag(values)
         one, pair = int(np.argmin(np.abs(imaginary))), int(np.argmax(imaginary))
         out = np.column_stack([np.real(vectors[:, one]), np.real(vectors[:, pair]), np.imag(vectors[:, pair])])

@@ -7,12 +7,14 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.methods.registry import METHODS, Method, Setting
+from ephs.mechanics.methods.registry import METHODS, Method, Setting, chosen
 from ephs.semantics.bundle import Array
+from ephs.semantics.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.growth import Again
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import RTOL, Control, Tolerance
+from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.events import Event
 from ephs.solve.journal import Written
 from ephs.solve.loop import integrate
@@ -76,6 +78,17 @@ class Course:
             bounds=bounds,
             breakpoints=breakpoints,
         )
+
+    def serves(self, name: str) -> bool:
+        """Whether another method, by its name, accepts the problem with these steps."""
+        if name == self.method.name:
+            return False
+        try:
+            method, _ = chosen(name, self.problem, step=self.control.step)
+            method.make(Setting(self.problem, self.start, self.control, {}, method=name))
+        except (OptionError, SemanticsError, SolveError, ArithmeticError, np.linalg.LinAlgError):
+            return False
+        return True
 
     def again(self, known: Breakpoints) -> Again | None:
         """Further runs of the problem, over the jumps that a run has known; None where steps are chosen."""

@@ -213,6 +213,7 @@ def simulate(
         order=order,
         again=again,
         repeatable=repeatable,
+        serves=course.serves,
     )
     with journaled(journal, problem, asked) as written:
         solution = course.run(

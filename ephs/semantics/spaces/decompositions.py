@@ -1,10 +1,11 @@
-"""Decompositions that converge: singular values, least squares, pseudoinverses, eigenvalues of symmetric matrices.
+"""Decompositions that converge: singular values, least squares, pseudoinverses, eigenvalues.
 
 LAPACK's fast drivers, which divide and conquer, do not converge on some finite matrices, and which ones depends on the
 processor; the QR iterations behind `gesvd`, `gelss` and `ev` do. Where these fail, too, the error says of which matrix.
 """
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from typing import Any, Final
 
@@ -85,6 +86,40 @@ def symmetric_eigenvalues(matrix: Any) -> Any:
         return (_scipy().eigh(a, driver="ev", eigvals_only=True, check_finite=False),)
 
     (found,) = _robust("eigenvalues", matrix, lambda a: (np.linalg.eigvalsh(a),), slow)
+    return found
+
+
+def metric_eigen(matrix: Any, metric: Any) -> tuple[Any, Any]:
+    """Eigenvalues (n,), the least first, and eigenvectors (n, n) of K v = λ M v, symmetric, M positive definite.
+
+    Errors as of `svd`, and where the metric is not positive definite.
+    """
+
+    def taking(a: Any, driver: str) -> Any:
+        if not np.isfinite(a).all():  # which this driver does not say
+            raise np.linalg.LinAlgError
+        return _scipy().eigh(a, metric, driver=driver, check_finite=False)
+
+    fast, slow = (partial(taking, driver=driver) for driver in ("gvd", "gv"))
+    return _robust("eigenvalues in a positive metric", matrix, fast, slow, metric)
+
+
+def eigen(matrix: Any) -> tuple[Any, Any]:
+    """Eigenvalues (…, n) and eigenvectors (…, n, n) of any square matrices; errors as of `svd`."""
+
+    def taking(a: Any) -> Any:
+        return tuple(np.linalg.eig(a))
+
+    return _robust("eigenvalues", matrix, taking, taking)
+
+
+def eigenvalues(matrix: Any) -> Any:
+    """(…, n) eigenvalues of any square matrices; errors as of `svd`."""
+
+    def taking(a: Any) -> Any:
+        return (np.linalg.eigvals(a),)
+
+    (found,) = _robust("eigenvalues", matrix, taking, taking)
     return found
 
 

@@ -14,12 +14,19 @@ def tidy(expression: Expr) -> Expr:
 
 
 def settled(expression: Expr, known: Mapping[Expr, Expr]) -> Expr:
-    """An expression after repeated substitution of all known values."""
-    while True:
+    """An expression after repeated substitution of all known values.
+
+    Raises
+    ------
+    ArithmeticError
+        A value contains its own symbol, if only by way of others.
+    """
+    for _ in range(len(known) + 1):  # each substitution ends chains of values that are one longer
         new = expression.subs(known)
         if new == expression:
             return sp.expand(new)
         expression = new
+    raise ArithmeticError(f"the values of {', '.join(map(str, known))} contain each other")
 
 
 def eliminate(equations: list[Expr], unknowns: list[Expr]) -> tuple[dict[Expr, Expr], list[Expr]]:

@@ -14,12 +14,13 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CLOSED
 from ephs.solve.auditing.findings import Audit, Finding
-from ephs.solve.auditing.growth import Again, GlobalError, global_error
+from ephs.solve.auditing.growth import Again, GlobalError, energy_error, global_error
 from ephs.solve.auditing.resolution import STILL, StepError, Trials
 from ephs.solve.auditing.retaken import Missed
 from ephs.solve.auditing.rounding import exchanged, rounded, trembling
 from ephs.solve.breakpoints import MOST_FOUND
 from ephs.solve.control import Control
+from ephs.solve.errors import Other, or_take, serves_not
 from ephs.solve.methods.driven import ComponentMethod
 from ephs.solve.model import Model
 
@@ -39,6 +40,7 @@ LEAP = 0.5
 """Fraction of a surface's thickness that a step may cross, so that some instant is inside."""
 PRODUCTION = 1e-12
 """Rounding of a difference of entropy flows, relative to their scale."""
+DAMPING: Other = ("radau", "damps fast modes")
 INSTANTS = 125
 """Number of evenly spaced instants for the residuals of joint positions."""
 
@@ -69,6 +71,8 @@ class Bounds:
         That chosen steps are held to.
     retaken
         Whether some chosen steps are taken again.
+    serves
+        Whether a method by its name is another one than that of the run, and accepts the problem.
     """
 
     energy: float
@@ -80,6 +84,7 @@ class Bounds:
     again: Again | None = None
     tolerance: float = 0.0
     retaken: bool = False
+    serves: Callable[[str], bool] = serves_not
 
     @classmethod
     def of(
@@ -92,6 +97,7 @@ class Bounds:
         order: int = 1,
         again: Again | None = None,
         repeatable: bool = False,
+        serves: Callable[[str], bool] = serves_not,
     ) -> "Bounds":
         """Limits for a run with these tolerances, and constant steps in s if any.
 
@@ -99,7 +105,7 @@ class Bounds:
         ----------
         lawful
             Whether every step of the method keeps the balance.
-        undamped, order, again
+        undamped, order, again, serves
             See `Bounds`.
         repeatable
             Whether inputs may be asked again.
@@ -110,13 +116,13 @@ class Bounds:
         error = chosen if step is None else COARSE
         retaken = step is None and repeatable
         energy = LAWFUL if lawful else error
-        return cls(energy, error, chosen, step, undamped, order, again, tolerance, retaken)
+        return cls(energy, error, chosen, step, undamped, order, again, tolerance, retaken, serves)
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """Largest excess over a law in a run: size, allowance, instant, component, end of the advice.
+    """Largest excess over a law in a run: size, allowance, instant, component, end of the advice, a better method.
 
     What is allowed beyond a law's own limit is asked where a size is beyond that: it may take longer than the audit.
     """
@@ -126,6 +132,7 @@ class Breach:
     instant: int
     path: Path | None = None
     hint: str = ""
+    other: Other | None = None
 
 
 def _nothing() -> float:
@@ -167,21 +174,27 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     if bounds.step is None or not isinstance(trials, Trials):
         return
     steps = int(solution.stats["steps"])
-    grown = _grown(solution, bounds, trials)
-    if grown is not None:
-        slack = MOTION - min(MOTION, bounds.accuracy)
-        yield Breach(grown.size, lambda: slack, grown.instant, grown.path, _shorter(bounds, grown))
-    found = trials.error(bounds.step, steps, solution.ledgers.scale)
+    found, off = trials.error(bounds.step, steps, solution.ledgers.scale), None
     if found is not None and found.size > bounds.accuracy:
         found = trials.error(bounds.step, steps, max(solution.ledgers.scale, trembling(solution) / STILL))
-    if found is not None:
-        hint, at = "", trials.times[found.trial]
-        if found.size > bounds.accuracy:
-            h = trials.sufficient(found.trial, bounds.step, bounds.accuracy)
-            hint = ("" if h is None else f" of {h:.1g} s") + (
-                ", or radau, which damps fast modes" if bounds.undamped else ""
-            )
-        yield Breach(found.size, _nothing, int(np.argmin(np.abs(solution.t - at))), found.path, hint)
+    falls = found is None or found.size <= bounds.accuracy or trials.converges(bounds.step, bounds.accuracy)
+    if found is not None and falls:
+        found = replace(found, size=found.size / (2.0**trials.order - 1.0))
+    coarse = found is not None and found.size > bounds.accuracy
+    if coarse and falls and trials.again is not None:
+        off = energy_error(solution, bounds.order, bounds.step, trials.again)
+    grown = _grown(solution, bounds, trials)
+    if grown is not None and (grown.resolved or not coarse):
+        slack, hint = MOTION - min(MOTION, bounds.accuracy), grown.shorter(bounds.step, bounds.order, MOTION)
+        yield Breach(grown.size, lambda: slack, grown.instant, grown.path, hint)
+    if off is not None:
+        hint = off.shorter(bounds.step, bounds.order, bounds.accuracy)
+        yield Breach(off.size, _nothing, off.instant, off.path, hint)
+    elif found is not None:
+        h = trials.sufficient(found.trial, bounds.step, bounds.accuracy) if coarse else None
+        hint, other = "" if h is None else f" of {h:.1g} s", DAMPING if bounds.undamped else None
+        instant = int(np.argmin(np.abs(solution.t - trials.times[found.trial])))
+        yield Breach(found.size, _nothing, instant, found.path, hint, other)
 
 
 def _grown(solution: "Solution", bounds: Bounds, trials: Trials) -> GlobalError | None:
@@ -202,15 +215,6 @@ def _grown(solution: "Solution", bounds: Bounds, trials: Trials) -> GlobalError 
     return GlobalError(off.size, int(np.argmin(np.abs(solution.t - own.times[off.trial]))), off.path, resolved=True)
 
 
-def _shorter(bounds: Bounds, found: GlobalError) -> str:
-    """End of the advice to take shorter steps."""
-    if found.size <= MOTION or bounds.step is None:
-        return ""
-    if not found.resolved:
-        return f" of {0.25 * bounds.step:.2g} s or less: a step twice as long gives another motion"
-    return f" of {0.9 * bounds.step * (MOTION / found.size) ** (1.0 / bounds.order):.2g} s"
-
-
 def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """No component, and no system without entropy's outer ports, loses entropy in a step."""
     ledgers = solution.ledgers
@@ -224,6 +228,8 @@ def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> It
     yield Breach(least / scale, rounding, instant, path)
     if _isolated(solution, "entropy"):
         fall = -np.diff(ledgers.entropy, prepend=ledgers.entropy[:1])
+        # times inside a step are ends of shorter ones from its start: less may be made until its own end
+        fall += np.minimum(np.diff(ledgers.made, prepend=ledgers.made[:1]), 0.0)
         instant = _worst(fall)
         yield Breach(float(fall[instant]) / scale, rounding, instant)
 
@@ -290,6 +296,8 @@ class Law:
         What the bounds of a run allow.
     advice
         What to do where steps are constant, and where they are chosen.
+    other
+        A method that keeps the law.
     """
 
     holds: str
@@ -298,6 +306,7 @@ class Law:
     breaches: "Callable[[Solution, Bounds, Tests | None], Iterator[Breach]]"
     allowed: Callable[[Bounds], float]
     advice: tuple[str, str]
+    other: Other | None = None
 
 
 LAWS: Mapping[str, Law] = {
@@ -308,13 +317,14 @@ LAWS: Mapping[str, Law] = {
         f"at least {LEAST:g}; {COARSE:g} at constant steps",
         _energy,
         lambda bounds: bounds.energy,
-        ("take a smaller step, or natural, which keeps the balance", "lower rtol, or take natural, which keeps it"),
+        ("take a smaller step", "lower rtol"),
+        ("natural", "keeps the balance"),
     ),
     "accuracy": Law(
-        "steps resolve the motion, and the positions of bodies are accurate. Constant steps: the difference between a "
-        "step and two of half its length, and between the run and one with longer steps. Chosen steps of natural "
-        "methods: the difference between a step and three of a third of its length. Corrected steps: the defect of "
-        "energy before correction",
+        "steps resolve the motion, and the positions of bodies are accurate. Constant steps: the difference between "
+        "two steps and four of half the length, and between the run and one with longer or shorter steps. Chosen steps "
+        "of natural methods: the difference between a step and three of a third of its length. Corrected steps: the "
+        "defect of energy before correction",
         "energy that such steps exchange; length of the mechanism, 1 rad; sizes of states; gross energies",
         f"{COARSE:g}, and {MOTION:g} at the end, at constant steps; {MANY_TIMES:g} rtol at chosen ones",
         _accuracy,
@@ -327,7 +337,8 @@ LAWS: Mapping[str, Law] = {
         f"{PRODUCTION:g}",
         _entropy,
         lambda _: PRODUCTION,
-        ("take a smaller step, or natural, which makes entropy only", "lower rtol, or take natural"),
+        ("take a smaller step", "lower rtol"),
+        ("natural", "makes entropy only"),
     ),
     "constraint": Law(
         "joints are closed",
@@ -382,5 +393,6 @@ def audit(solution: "Solution", bounds: Bounds, trials: Tests | None = None) -> 
                 worst, most = max(broken, key=lambda each: _size(each[0]) / each[1])
                 where = str(worst.path) if worst.path is not None else ""
                 at, advice = float(solution.t[worst.instant]), law.advice[int(bounds.step is None)] + worst.hint
+                advice += or_take(worst.other or law.other, bounds.serves)
                 found.append(Finding(name, _size(worst), most, at, where, advice))
     return Audit(tuple(found))

@@ -11,7 +11,6 @@ from typing import Any, final
 
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.findings import CostWarning
-from ephs.solve.problem import Problem
 from ephs.solve.snapshot import Snapshot
 
 FIRST = 32
@@ -21,6 +20,8 @@ MANY = 20_000
 
 STEADY = 1.2
 """Growth of a quarter of the steps over the one before up to which they count as steady."""
+FASTER = ("rk87", "radau")
+"""Methods of high order, the one that is faster on most problems first."""
 LOW = 4
 """Largest order for which another method is better at small tolerances."""
 
@@ -35,6 +36,8 @@ class Forecast:
         Of the method.
     until
         End of the run in its unit of time.
+    serves
+        Whether a method by its name is another one, and accepts the problem.
 
     Attributes
     ----------
@@ -42,15 +45,11 @@ class Forecast:
         What was forecast of a long run: steps, iterations, and after how many steps; empty of others.
     """
 
-    def __init__(self, problem: Problem, name: str, order: int, until: float) -> None:
+    def __init__(self, name: str, order: int, until: float, serves: Callable[[str], bool]) -> None:
         self.long: dict[str, int] = {}
         self._name, self._until, self._next = name, until, FIRST if order <= LOW else 0
         self._from = self._middle = 0.0
-        self._advice = (
-            "rk87, rk54 and auto reach the same error in a part of that, a constant step keeps the balances as well"
-            if problem.scene is not None
-            else "on vector spaces radau reaches the same error in a part of that, a constant step keeps the balances"
-        )
+        self._serves = serves
 
     def look(self, steps: int, t: float, counts: Callable[[], Mapping[str, Any]]) -> None:
         """After a step: so many were taken up to t in s.
@@ -72,7 +71,10 @@ class Forecast:
         if iterations >= MANY:
             self.long = {"steps": int(steps + rest), "iterations": iterations, "after": steps}
             told = f"about {_round(steps + rest)} steps and {_round(iterations)} iterations at these tolerances"
-            warnings.warn(f"{self._name} will take {told}; {self._advice}", CostWarning, stacklevel=2)
+            better = next(filter(self._serves, FASTER), None)
+            advice = f"{better} reaches the same error in a part of that, " if better is not None else ""
+            advice += "a constant step keeps the balances as well"
+            warnings.warn(f"{self._name} will take {told}; {advice}", CostWarning, stacklevel=2)
 
     def stats(self) -> dict[str, Any]:
         """Statistics of a run with a forecast of a long duration."""

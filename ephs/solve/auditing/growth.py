@@ -21,6 +21,7 @@ from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.rounding import rounded
 from ephs.solve.control import SLIVER
 from ephs.solve.errors import Interrupted
+from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -65,11 +66,11 @@ class GlobalError:
     Parameters
     ----------
     size
-        In lengths of the mechanism or rad, of heat and work in parts of the gross energies.
+        In lengths of the mechanism or rad, of energies, heat and work in parts of the gross energies.
     instant
         Index of the time where it is largest.
     path
-        The body that is off most; None of heat and work.
+        The body or the storage that is off most; None of heat and work.
     resolved
         Whether it is of the method's order, so that shorter steps are known to help.
     """
@@ -78,6 +79,14 @@ class GlobalError:
     instant: int
     path: Path | None
     resolved: bool
+
+    def shorter(self, h: float, order: int, allowed: float) -> str:
+        """End of the advice to take shorter steps than h s by a method of an order; empty of an allowed error."""
+        if self.size <= allowed:
+            return ""
+        if not self.resolved:
+            return f" of {0.25 * h:.2g} s or less: a step twice as long gives another motion"
+        return f" of {0.9 * h * (allowed / self.size) ** (1.0 / order):.2g} s"
 
 
 def global_error(
@@ -117,10 +126,27 @@ def global_error(
     return GlobalError(*found, resolved=False) if found is not None else None
 
 
-def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, int, Path | None] | None:
-    """Distance of a solution from that of a run at their common times: size, time, body.
+def energy_error(solution: "Solution", order: int, h: float, again: Again) -> GlobalError | None:
+    """Largest error of a stored energy, relative to the gross energies, of a run with constant steps of h s.
 
-    None where the run fails.
+    By a run with half the step; None where that fails.
+    """
+    met = _met(solution, lambda: again.coarser(0.5 * h, float(solution.t[-1])))
+    if met is None:
+        return None
+    (other, mine, its), times, found = met, 2.0**order, list[GlobalError]()
+    for path, a in solution.ledgers.storages.items():
+        b = other.ledgers.storages[path]
+        off = np.nan_to_num(np.abs((a[mine] - a[0]) - (b[its] - b[0])), nan=np.inf) / solution.ledgers.scale
+        worst = int(np.argmax(off))
+        found.append(GlobalError(float(off[worst]) * times / (times - 1.0), int(mine[worst]), path, resolved=True))
+    return max(found, key=lambda each: each.size, default=None)
+
+
+def _met(one: "Solution", run: Callable[[], "Solution"]) -> "tuple[Solution, Index, Index] | None":
+    """The solution of a run, and the indices of the common times in a solution and in that one.
+
+    None where the run fails, or there are none.
     """
     try:
         other = run()
@@ -128,13 +154,21 @@ def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, in
         raise
     except Exception:  # no solution with these steps, or an input that fails between the former ones
         return None
-    problem = one.problem
     near = SLIVER * abs(one.t[-1] - one.t[0])
     at = np.clip(np.searchsorted(one.t, other.t - near), 0, len(one) - 1)
     common = np.abs(one.t[at] - other.t) <= near
-    mine, its = at[common], np.flatnonzero(common)
-    if problem is None or not its.size:
+    return (other, at[common], np.flatnonzero(common)) if common.any() else None
+
+
+def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, int, Path | None] | None:
+    """Distance of a solution from that of a run at their common times: size, time, body.
+
+    None where the run fails.
+    """
+    problem, met = one.problem, _met(one, run)
+    if problem is None or met is None:
         return None
+    other, mine, its = met
     found: list[tuple[float, int, Path | None]] = []
     bodies = [slot.path for slot in problem.descriptor.states if slot.quantity.kind == "pose"]
     shifts: list[tuple[Array, Path | None]] = [

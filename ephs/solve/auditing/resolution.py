@@ -1,8 +1,13 @@
-"""Resolution of a motion by constant steps: a step against two of half its length, at some times of a run.
+"""Resolution of a motion by constant steps: two steps against four of half the length, at some times of a run.
 
 Methods of Gauss type and others that damp nothing at infinity keep their balances whatever a step leaves out: a stiff
-brake then stops in a thousand steps instead of one. What shows it is what a step moves from storage to storage. Where
-a step and its halves differ in that by a part d, the error of a method of order p is d / (2ᵖ − 1) of it.
+brake then stops in a thousand steps instead of one. What shows it is what steps move from storage to storage. Where
+steps and their halves differ in that by a part d, and d falls with the step by the method's order p, the error is
+d / (2ᵖ − 1) of it; where d does not fall, steps leave something out, and the error is d or more. Velocities that follow
+from prescribed positions err by turns, one step up and one down: after two such an error is gone.
+
+An even motion moves no energy, and has no such scale. Where d falls, a run with halves of the steps says how far
+energies are off.
 
 Natural methods try steps from the states of the solution; methods whose steps are taken one by one try their own, from
 states that they were in.
@@ -26,6 +31,7 @@ from ephs.semantics.primitives import Irreversible, Storage
 from ephs.solve.auditing.growth import Again, apart
 from ephs.solve.auditing.retaken import Retaken
 from ephs.solve.breakpoints import Breakpoints
+from ephs.solve.control import SLIVER
 from ephs.solve.methods.driven import ComponentMethod, advance_driven
 from ephs.solve.methods.paced import Paced
 from ephs.solve.model import Model, compile_model
@@ -41,7 +47,9 @@ S = TypeVar("S")
 Tried = tuple[Array, Array]
 """States and energies."""
 EACH, LEAST, MOST = 600, 4, 6
-"""One time is looked at in so many steps, at least and at most so many in all: three steps each."""
+"""One time is looked at in so many steps, at least and at most so many in all: nine steps each."""
+PAIR = 2
+"""Number of steps whose energies are held against those of their halves."""
 STILL = 1e-6
 """Fraction of the gross energies below which a run counts as at rest."""
 SHORTER = 16
@@ -58,7 +66,7 @@ class StepError:
     Parameters
     ----------
     size
-        Relative to what steps move between storages.
+        Relative to what steps move between storages, of poses in lengths of the mechanism or rad.
     trial
         The number of the trial where it is largest.
     path
@@ -84,8 +92,8 @@ class Trials:
     times
         In s.
     tried
-        Of the number of a time and a step in s, at the start, after the step, and after its halves: (point_size,)
-        states; (components,) energies of the storages, and entropies that the others made.
+        Of the number of a time, a step in s and a number of steps, at the start, after them, and after their halves:
+        (point_size,) states; (components,) energies of the storages, and entropies that the others made.
     own
         Those by the method's own steps, where these are by another's.
     again
@@ -95,12 +103,12 @@ class Trials:
     problem: Problem
     order: int
     times: tuple[float, ...]
-    tried: Callable[[int, float], tuple[Tried, Tried, Tried]]
+    tried: Callable[[int, float, int], tuple[Tried, Tried, Tried]]
     own: "Trials | None" = None
     again: Again | None = None
 
     def error(self, h: float, steps: int, gross: float) -> StepError | None:
-        """The estimated error of constant steps of h s; None at rest, or without possible trials.
+        """By which part constant steps of h s and their halves differ; None at rest, or without possible trials.
 
         Parameters
         ----------
@@ -110,11 +118,11 @@ class Trials:
         found = [self._trial(k, h) for k in range(len(self.times))]
         missed, moved = sum(float(trial[0].sum()) for trial in found), sum(trial[1] for trial in found)
         stored = sum(trial[2] for trial in found)
-        if not found or moved * steps < STILL * gross * len(found) or missed < ROUNDED * stored:
+        if not found or moved * steps / PAIR < STILL * gross * len(found) or missed < ROUNDED * stored:
             return None
         worst = max(range(len(found)), key=lambda k: float(np.sum(found[k][0])))
         path = self.problem.descriptor.components[int(np.argmax(found[worst][0]))].path
-        return StepError(missed / moved / (2.0**self.order - 1.0), worst, path)
+        return StepError(missed / moved, worst, path)
 
     def motion(self, h: float, steps: int) -> StepError | None:
         """The error of bodies after so many constant steps of h s, in lengths of the mechanism or rad.
@@ -125,7 +133,7 @@ class Trials:
         found: list[tuple[float, int, Path]] = []
         for k in range(len(self.times)) if bodies else ():
             try:
-                _, coarse, fine = (x for x, _ in self.tried(k, h))
+                _, coarse, fine = (x for x, _ in self.tried(k, h, 1))
             except Exception:  # no solution, or an input that fails beyond the end of the run
                 continue
             off = [float(apart(coarse[slot.point], fine[slot.point], self.problem.length)) for slot in bodies]
@@ -138,17 +146,31 @@ class Trials:
         _, k, path = max(found, key=lambda each: each[0])
         return StepError(size, k, path)
 
+    def converges(self, h: float, allowed: float) -> bool:
+        """Whether halves of steps of h s differ less than these by the method's order, wherever these differ much.
+
+        Parameters
+        ----------
+        allowed
+            The error that is allowed, relative to what steps move between storages.
+        """
+        found, shorter = ([self._trial(k, each) for k in range(len(self.times))] for each in (h, 0.5 * h))
+        missed, halves = (np.sum([trial[0] for trial in each], axis=0) for each in (found, shorter))
+        moved, stored = (sum(trial[i] for trial in found) for i in (1, 2))
+        much = missed > max(allowed * moved / len(missed), ROUNDED * stored)
+        return bool(np.all(halves[much] <= missed[much] / 2.0 ** (self.order - 1)))
+
     def sufficient(self, k: int, h: float, allowed: float) -> float | None:
         """A step in s, some h / 4ᵏ, that resolves the motion at a time."""
         for _ in range(SHORTER):
             h *= 0.25
             missed, moved, _ = self._trial(k, h)
-            if float(np.sum(missed)) <= allowed * (2.0**self.order - 1.0) * moved:
+            if float(np.sum(missed)) <= allowed * moved:
                 return h
         return None
 
     def _trial(self, k: int, h: float) -> tuple[Array, float, float]:
-        """(components,) by how many J a step and its halves differ; what they moved, and what is stored, in J.
+        """(components,) by how many J steps and their halves differ; what they moved, and what is stored, in J.
 
         Nothing of steps that have no solution.
         """
@@ -157,7 +179,7 @@ class Trials:
         theta = self.problem.reference.temperature
         joules = stores + np.array([theta * isinstance(kind, Irreversible) for kind in kinds])
         try:
-            start, coarse, fine = (energies for _, energies in self.tried(k, h))
+            start, coarse, fine = (energies for _, energies in self.tried(k, h, PAIR))
         except Exception:  # no solution, or an input that fails beyond the end of the run
             return np.zeros_like(joules), 0.0, 0.0
         moved = float(np.sum(np.abs(joules * (fine - start))))
@@ -193,15 +215,16 @@ def natural_trials(
     t, d = solution.t, problem.descriptor
     count = int(np.clip(int(solution.stats["steps"]) // EACH, LEAST, MOST))
     spread = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
-    instants = [i for i in spread if _clear(float(t[i]), h, np.inf, jumps)]
+    end = np.inf if int(solution.stats["steps"]) < PAIR else float(t.max()) + SLIVER * h
+    instants = [i for i in spread if _clear(float(t[i]), PAIR * h, end, jumps)]
     if own is None or own.model.descriptor is not d:
         own = make(compile_model(d, problem.reference, problem.inputs(float(t[0]), problem.initial)))
     method, makers = own, np.array([isinstance(slot.primitive, Irreversible) for slot in d.components])
 
-    @lru_cache(len(instants))
-    def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
+    @lru_cache(2 * len(instants))
+    def tried(k: int, h: float, count: int) -> tuple[Tried, Tried, Tried]:
         x, when = d.pack(solution.state_at(instants[k])), float(t[instants[k]])
-        coarse, fine = (_after(problem, method, x, when, h, count) for count in (1, 2))
+        coarse, fine = (_after(problem, method, x, when, count * h, steps) for steps in (count, 2 * count))
         return (x, np.where(makers, 0.0, method.energies(x))), coarse, fine
 
     return Trials(problem, method.order, tuple(float(t[i]) for i in instants), tried)
@@ -278,7 +301,8 @@ def trials_of(
     Parameters
     ----------
     problem
-        As it is solved; in its unit of time are the samples, the step h, negative backward, ``until`` and the jumps.
+        As it is solved; in its unit of time are the samples, the step h, negative backward, the present time ``until``,
+        beyond which inputs are not asked unless there was one step, and the jumps.
     """
     jumps = breakpoints.times
     seconds, steps = problem.seconds, int(solution.stats["steps"])
@@ -288,21 +312,24 @@ def trials_of(
         natural = natural_trials(solution, make, abs(h) * seconds, own, [seconds * t for t in jumps])
     if paced is not None:
         return natural
-    clear = [(t, state) for t, state in samples if _clear(t, h, until, jumps)]
+    end = until + (h if steps < PAIR else SLIVER * h)
+    clear = [(t, state) for t, state in samples if _clear(t, PAIR * h, end, jumps)]
     if not clear:
         return natural
     count = int(np.clip(steps // EACH, LEAST, MOST))
     chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
     sign = float(np.sign(h))
 
-    @lru_cache(len(chosen))
-    def tried(k: int, h: float) -> tuple[Tried, Tried, Tried]:
+    @lru_cache(2 * len(chosen))
+    def tried(k: int, h: float, count: int) -> tuple[Tried, Tried, Tried]:
         h = sign * h / seconds
         breakpoints.stand(chosen[k][0])
         start = stepper.anew(chosen[k][1])
-        whole = stepper.step(start, h).end
-        half = stepper.step(stepper.anew(start), 0.5 * h).end
-        states = start, whole, stepper.step(half, 0.5 * h).end
+        states = [start]
+        for length, number in ((h, count), (0.5 * h, 2 * count)):
+            states.append(stepper.anew(start))
+            for _ in range(number):
+                states[-1] = stepper.step(states[-1], length).end
         _, shown = _shown(problem, stepper.record([(start.t, state, 0.0) for state in states]))
         first, second, third = zip(shown.x, shown.energies, strict=True)
         return first, second, third

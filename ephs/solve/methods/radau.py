@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import eigen
 from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.collocation import moments, values
@@ -40,7 +41,7 @@ FARTHEST = 2.0
 
 
 COEFFICIENTS = np.array([moments(NODES, node) for node in NODES])
-_EIGENVALUES, _VECTORS = np.linalg.eig(COEFFICIENTS)
+_EIGENVALUES, _VECTORS = eigen(COEFFICIENTS)
 _ORDER = [
     int(np.argmin(np.abs(np.imag(_EIGENVALUES)))),
     int(np.argmax(np.imag(_EIGENVALUES))),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,6 +76,45 @@ def test_eigenvalues_whichever_driver_gives_them(shape, seed, fails):
     assert np.abs(alone - values).max() <= near
 
 
+@given(st.integers(1, 7), st.integers(0, 2**32 - 1), st.booleans())
+def test_eigenvalues_in_a_metric_whichever_driver_gives_them(n, seed, fails):
+    """K = Aᵀ Λ A and M = Aᵀ A have the eigenvalues Λ, whatever A is."""
+    rng = np.random.default_rng(seed)
+    true, a = np.sort(rng.standard_normal(n)), np.eye(n) + 0.5 * np.tril(rng.standard_normal((n, n)), -1)
+    metric, eigh = a.T @ a, scipy.linalg.eigh
+
+    def failing_at_first(*given, driver, **options):
+        return failing() if driver == "gvd" else eigh(*given, driver=driver, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        if fails:
+            patch.setattr(scipy.linalg, "eigh", failing_at_first)
+        values, ways = of.metric_eigen(a.T @ (true[:, None] * a), metric)
+    near = 100.0 * n * EPS * np.linalg.cond(metric) * max(1.0, np.abs(true).max())
+    assert np.abs(values - true).max() <= near
+    assert np.abs(ways.T @ metric @ ways - np.eye(n)).max() <= near
+
+
+@given(SHAPES, st.integers(0, 2**32 - 1))
+def test_eigenvalues_of_any_matrix(shape, seed):
+    """Λ of V Λ V⁻¹, and of a rotation e^{±iφ}."""
+    a = drawn((shape[0], shape[1], shape[1]), seed, shape[1])
+    values, ways = of.eigen(a)
+    near = 100.0 * a.shape[-1] * EPS * max(1.0, float(np.abs(a).max()) * a.shape[-1])
+    assert np.abs(a @ ways - ways * values[..., None, :]).max() <= near
+    assert np.abs(np.sum(of.eigenvalues(a), axis=-1) - np.trace(a, axis1=-2, axis2=-1)).max() <= near
+    turn = np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])
+    assert np.abs(np.sort_complex(of.eigenvalues(turn)) - np.exp([-1j, 1j])).max() <= 8.0 * EPS
+
+
+def test_what_has_no_eigenvalues_is_named():
+    for take in (of.eigen, of.eigenvalues, lambda m: of.metric_eigen(m, np.eye(2))):
+        with pytest.raises(ArithmeticError, match=r"of a matrix of 2 × 2 .*are not finite"):
+            take(np.full((2, 2), np.nan))
+    with pytest.raises(ArithmeticError, match="in a positive metric"):
+        of.metric_eigen(np.eye(2), np.diag([1.0, -1.0]))
+
+
 def test_a_matrix_that_is_not_finite_is_named():
     a = np.full((3, 2), np.nan)
     for take in (of.svd, of.singular_values, of.pseudoinverse, lambda m: of.least_squares(m, np.ones(3))):
@@ -86,7 +126,10 @@ def test_a_matrix_that_is_not_finite_is_named():
 
 
 def test_no_other_place_takes_the_fast_drivers():
-    bare = re.compile(r"np\.linalg\.(svd|svdvals|eigh|eigvalsh|lstsq|pinv|matrix_rank|cond)\(")
+    bare = re.compile(
+        r"linalg\.(svd|svdvals|eig|eigvals|eigh|eigvalsh|lstsq|pinv|matrix_rank|cond)\("
+        r"|from (?:scipy|numpy)\.linalg import .*\b(svd|svdvals|eig|eigvals|eigh|eigvalsh|lstsq|pinv|null_space|orth)\b"
+    )
     package = Path(ephs.__file__).parent
     files = [path for path in package.rglob("*.py") if path.name != "decompositions.py"]
     found = [f"{path.relative_to(package)}: {line}" for path in files for line in bare.findall(path.read_text("utf-8"))]

@@ -1,0 +1,61 @@
+"""Equilibria of systems: a scene's own system settles where the scene does, with joints closed."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.runs.assembling import flat_joints
+from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.solve.auditing.growth import apart
+from examples.failing import scene
+
+AXES = {
+    "parallel": ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]),
+    "skew": ([0.0, 1.0, 0.0], [0.5, 0.0, -0.8], [0.3, 1.0, 0.2]),
+}
+
+
+def chain(axes: str, held: int | None, free: int = 0) -> ephs.Scene:
+    """Three rods in a row, far from hanging, with springs in the later hinges; one may be held, another one free."""
+    parts = []
+    for number, axis in enumerate(AXES[axes]):
+        more = "motion = { rate = 0.0 }" if number == held else f"stiffness = {3.0 * number * (number != free)}"
+        parts.append(f"""
+    [bodies.rod{number}]
+    mass = {1.0 + number}
+    inertia = [0.02, 0.1, 0.1]
+    position = [{number + 0.5}, 0.0, {0.1 * number}]
+    [joints.hinge{number}]
+    type = "revolute"
+    bodies = ["{f"rod{number - 1}" if number else "ground"}", "rod{number}"]
+    at = [{number}, 0.0, 0.0]
+    axis = {axis}
+    {more}
+    """)
+    return scene("[assembly]\nadjust = true\n" + "".join(parts))
+
+
+@pytest.mark.parametrize("held", [None, 1, 2])
+@pytest.mark.parametrize("axes", list(AXES))
+def test_a_scenes_system_settles_where_the_scene_does(axes, held):
+    """Steps of whole turns solve the equations of long steps, too, and steps along rates open joints."""
+    model = chain(axes, held)
+    system = model.system()
+    inputs = {str(port): {"effort": [0.0]} for port in system.interface}
+    assert len(inputs) == (held is not None)
+    settled, rest = ephs.equilibrium(system, inputs=inputs), ephs.equilibrium(model)
+    poses = [path for path in rest.states if str(path).endswith(".pe.q")]
+    assert len(poses) == 3
+    for path in poses:
+        assert apart(settled.states[path], rest.states[path], 3.0) < 1e-9
+    problem = problem_of_system(system, settled.states, inputs)
+    end = ephs.simulate(system, 0.5, initial=settled.states, inputs=inputs, rtol=1e-9, atol=1e-9)
+    assert flat_joints(problem.descriptor).gaps(end).max() < 1e-8
+    for path in poses:
+        assert np.abs(end.states[path] - settled.states[path]).max() < 1e-7
+
+
+def test_a_joint_whose_motion_is_prescribed_is_free_in_a_system_without_it():
+    loose, rest = ephs.equilibrium(chain("skew", 2).system()), ephs.equilibrium(chain("skew", None, 2))
+    for path in (path for path in rest.states if str(path).endswith(".pe.q")):
+        assert apart(loose.states[path], rest.states[path], 3.0) < 1e-9
