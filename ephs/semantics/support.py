@@ -1,5 +1,6 @@
 """Where a component acts, of the states that it reads."""
 
+import math
 from dataclasses import dataclass
 from typing import final
 
@@ -21,6 +22,8 @@ class Support:
         The largest distance in m of these boxes at which anything happens.
     parallel
         Square of the sine of the angle between the z axes below which nothing happens, of boxes along these.
+    depth
+        Overlap of surfaces in m beyond which the energy is no number.
     """
 
     places: tuple[int, ...]
@@ -28,3 +31,4 @@ class Support:
     halves: tuple[float, ...] = ()
     margin: float = 0.0
     parallel: float = 0.0
+    depth: float = math.inf

@@ -45,6 +45,7 @@ class Outcome(StrEnum):
     LAWLESS = "a step in which a component loses entropy"
     EXTENT = "a length or a volume that is not positive"
     DOMAIN = "an energy or a flow that is not a finite number"
+    DEPTH = "surfaces that overlap so deeply that their contact has no direction"
     RANGE = "a state beyond the range of numbers"
     PYTHON = "a Python function of the model raised an exception"
     INCONSISTENT = "an initial state that contradicts the constraints"
@@ -78,6 +79,7 @@ _ADVICE = {
     Outcome.LAWLESS: "take a smaller step; if that is refused too, correct the component",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
+    Outcome.DEPTH: "give the contact more stiffness, use thicker shapes, or start with the surfaces apart",
     Outcome.RANGE: "check initial values and inputs, or take a smaller step",
     Outcome.PYTHON: "see the exception above this one",
     Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
@@ -213,6 +215,9 @@ class SolveError(Exception):
         if outcome is Outcome.PYTHON and isinstance(cause, KeyboardInterrupt):
             outcome = Outcome.INTERRUPTED
         told = f"{type(cause).__name__}: {cause}" if outcome is Outcome.PYTHON and cause is not None else ""
+        depth = model.depth_of(component)
+        if outcome is Outcome.DOMAIN and depth < np.inf:
+            outcome, told = Outcome.DEPTH, f"by more than {depth:.3g} m"
         return cls(outcome, str(model.path_of(component)), told, cause)
 
     def of_iteration(self) -> "SolveError":

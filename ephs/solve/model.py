@@ -14,7 +14,7 @@ from ephs.semantics.kept import once
 from ephs.semantics.kernel_table import Callback
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.numbering import spans, starts, sums
-from ephs.semantics.primitives import Primitive, Reversible
+from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.solve.layout import entry_of, laid_out
 from ephs.solve.methods.newton import natural_program
@@ -116,6 +116,12 @@ class Model:
     def path_of(self, component: int) -> Path:
         """The path of a component by its number."""
         return self.descriptor.components[component].path
+
+    def depth_of(self, component: int) -> float:
+        """Overlap in m beyond which the energy of a component, by its number, is no number; infinite of most."""
+        primitive = self.descriptor.components[component].primitive
+        support = primitive.support if isinstance(primitive, Storage) else None
+        return np.inf if support is None else support.depth
 
     def unknown_name(self, column: int) -> str:
         """An unknown, in words."""

@@ -15,10 +15,11 @@ import numpy as np
 from ephs.mechanics.elements import notation
 from ephs.mechanics.elements.components import no_potential
 from ephs.mechanics.elements.joints import between_frames
-from ephs.mechanics.shapes.gap import Gap, Vector, cross, dot, ramp
+from ephs.mechanics.shapes.gap import Gap, cross, dot, ramp
 from ephs.mechanics.shapes.impact import Impact, Meeting
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
+from ephs.mechanics.shapes.selecting import Vector
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
 from ephs.semantics import library, structures
 from ephs.semantics.checks import STATEMENTS
@@ -93,11 +94,19 @@ def losses(gap: Gap, law: Law, pose: Any, twist: Any) -> list[tuple[Any, tuple[A
 
 
 def contact_energy(gap: Gap, law: Law) -> Storage:
-    """Energy of the overlap of two surfaces; port q_r of the free pair."""
+    """Energy of the overlap of two surfaces, no number beyond the depth of its support; port q_r of the free pair."""
+
+    def energy(q_r: Any) -> Any:
+        overlap = ramp(-gap.distance(q_r))
+        if gap.support.depth == np.inf:
+            return law.energy(overlap)
+        left = np.sqrt(gap.support.depth - overlap)
+        return law.energy(overlap) + (left - left)
+
     return stored(
         gap.name + "_energy",
         power_ports(q_r=RELATIVE),
-        lambda q_r: law.energy(ramp(-gap.distance(q_r))),
+        energy,
         {},
         (*gap.numbers, ("stiffness", law.stiffness), ("exponent", law.exponent)),
         printed=False,

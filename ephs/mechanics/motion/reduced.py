@@ -154,7 +154,7 @@ class ReducedMotion:
         reduced, t = eq.reduced, eq.reduced.tables
         prescribed = np.zeros((n, eq.n))
         prescribed[:, eq.driven] = [eq.prescribed.rates(time) for time in solution.t]
-        q, momenta = np.zeros((n, reduced.coordinates)), np.zeros((n, reduced.links, 6))
+        q, momenta, own = np.zeros((n, reduced.coordinates)), *np.zeros((2, n, reduced.links, 6))
         for i, edge in enumerate(reduced.edges):
             if edge.state is not None and t.kind[i] != SPRING:
                 given = solution[edge.state].reshape(n, -1)
@@ -163,12 +163,18 @@ class ReducedMotion:
                 q[:, int(t.q_at[i]) : int(t.q_at[i] + t.q_size[i])] = given
         for i, link in enumerate(reduced.places):
             if link.momentum is not None:
-                momenta[:, i] = solution[link.momentum.path] @ self._momenta[i].T
+                own[:, i] = solution[link.momentum.path]
+                momenta[:, i] = own[:, i] @ self._momenta[i].T
         s = [solution[path].reshape(n, -1) for path in reduced.entropies]
         heats = eq.heats.energies(np.hstack([np.zeros((n, 0)), *s]))
         totals = np.zeros(2 + len(reduced.made))
+
+        def rates(k: int) -> Array:
+            found = self._impulses.rates(q[k], prescribed[k], momenta[k])
+            return eq.dense.carrying(q[k], prescribed[k], own[k]) if found is None else found
+
         return [
-            eq.closed(ReducedState(time, q[k], self._impulses.rates(q[k], prescribed[k], momenta[k]), heats[k], totals))
+            eq.closed(ReducedState(time, q[k], rates(k), heats[k], totals))
             for k, time in enumerate(solution.t.tolist())
         ]
 

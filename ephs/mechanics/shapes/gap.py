@@ -12,8 +12,10 @@ from typing import Any, Final, final
 
 import numpy as np
 
+from ephs.mechanics.shapes.selecting import Vector, chosen, most, moved
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.special import choose
 from ephs.semantics.support import Support
 
 UPRIGHT: Final = 1e-3
@@ -32,9 +34,9 @@ PLACE: Final = (4, 5, 6)
 """Places of z, and of x, y, z, in a pose."""
 ROUNDING: Final = 1e-12
 """Relative error of the coordinates that a support is held against."""
-Vector = tuple[Any, Any, Any]
-"""Components of a vector."""
 CENTRE: Final = (0.0, 0.0, 0.0)
+PENETRATED: Final = 0.9
+"""Part of half a thickness to which surfaces may overlap: beyond the middle the normal points to the other side."""
 
 
 @final
@@ -56,7 +58,8 @@ class Gap:
     numbers
         Sizes of both surfaces by name, m.
     support
-        Of the relative pose: outside of it the gap is positive.
+        Of the relative pose: outside of it the gap is positive, and beyond its depth the normal may point to another
+        side than that from which the surfaces met.
     thickness
         Least length of a straight way of C2 through the overlap, from side to side, in m; infinite behind a plane.
     """
@@ -70,10 +73,11 @@ class Gap:
     thickness: float = np.inf
 
 
-def apart(half1: Vector, half2: Vector, margin: float) -> Support:
-    """Support of gaps between boxes of these half lengths that are rounded by a margin in all."""
-    wide = margin * (1.0 + ROUNDING)
-    return Support(PLACE, math.hypot(*half1) + math.hypot(*half2) + wide, (*half1, *half2), wide)
+def apart(half1: Vector, half2: Vector, margin: float, middle: float) -> Support:
+    """Support of gaps between boxes of these half lengths that are rounded by a margin in all; ``middle`` is the
+    overlap in m in their middle."""
+    wide, limit = margin * (1.0 + ROUNDING), math.hypot(*half1) + math.hypot(*half2)
+    return Support(PLACE, limit + wide, (*half1, *half2), wide, depth=PENETRATED * middle)
 
 
 def ramp(x: Any) -> Any:
@@ -213,7 +217,7 @@ def _capsules(name: str, sizes: tuple[float, float, float, float], parallel: flo
         contact,
         radius2,
         (("half1", half1), ("radius1", radius1), ("half2", half2), ("radius2", radius2)),
-        apart((0.0, 0.0, half1), (0.0, 0.0, half2), radii),
+        apart((0.0, 0.0, half1), (0.0, 0.0, half2), radii, radii),
         2.0 * radii,
     )
 
@@ -242,25 +246,22 @@ def edges(half1: float, radius1: float, half2: float, radius2: float) -> Gap:
 def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
     """Gap between a sphere about the origin of C1 and a rounded box about that of C2: `rounded_box_sphere` turned."""
 
-    def beyond(pose: Any) -> tuple[Vector, Vector, Any]:
-        at = times(-1.0, into(pose, (pose[4], pose[5], pose[6])))
-        near = tuple(clamped(x, h) if h else 0.0 for x, h in zip(at, half, strict=True))
-        away = at[0] - near[0], at[1] - near[1], at[2] - near[2]
-        return away, (near[0], near[1], near[2]), np.sqrt(dot(away, away) + TINY)
+    def centre(pose: Any) -> Vector:
+        return times(-1.0, into(pose, (pose[4], pose[5], pose[6])))
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
-        away, near, length = beyond(pose)
-        out = times(rounding / length, away)
-        return times(-1.0 / length, away), (near[0] + out[0], near[1] + out[1], near[2] + out[2])
+        at = centre(pose)
+        normal = _normal_of_box(at, half)
+        return times(-1.0, normal), moved(at, rounding - _beyond_box(at, half), normal)
 
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
     return Gap(
         "sphere_rounded_box",
-        lambda pose: beyond(pose)[2] - (rounding + radius),
+        lambda pose: _beyond_box(centre(pose), half) - (rounding + radius),
         contact,
         rounding,
         (("radius", radius), *sizes, ("rounding", rounding)),
-        apart(CENTRE, half, rounding + radius),
+        apart(CENTRE, half, rounding + radius, min(half) + rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )
 
@@ -268,26 +269,47 @@ def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
 def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
     """Gap between a box of half lengths ``half`` about C1, its edges rounded outwards, and a sphere about C2.
 
-    With one half length it is a capsule along that axis, with none a sphere of radius ``rounding``. The centre of the
-    second sphere has to stay outside of the box itself.
+    With one half length it is a capsule along that axis, with none a sphere of radius ``rounding``.
     """
 
-    def beyond(pose: Any) -> tuple[Vector, Any]:
-        x, y, z = (at - clamped(at, h) if h else at for at, h in zip(pose[4:], half, strict=True))
-        return (x, y, z), np.sqrt(x * x + y * y + z * z + TINY)
-
     def contact(pose: Any) -> tuple[Vector, Vector]:
-        away, length = beyond(pose)
-        x, y, z = times(1.0 / length, into(pose, away))
-        return (x, y, z), (-radius * x, -radius * y, -radius * z)
+        normal = into(pose, _normal_of_box((pose[4], pose[5], pose[6]), half))
+        return normal, times(-radius, normal)
 
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
     return Gap(
         "rounded_box_sphere",
-        lambda pose: beyond(pose)[1] - (rounding + radius),
+        lambda pose: _beyond_box((pose[4], pose[5], pose[6]), half) - (rounding + radius),
         contact,
         radius,
         (*sizes, ("rounding", rounding), ("radius", radius)),
-        apart(half, CENTRE, rounding + radius),
+        apart(half, CENTRE, rounding + radius, min(half) + rounding + radius),
         2.0 * (min(half) + rounding + radius),
     )
+
+
+def _beside_box(at: Vector, half: Vector) -> tuple[Vector, Any]:
+    """Way to a point from the nearest one of a box, zero inside, and its length."""
+    x, y, z = (x - clamped(x, h) if h else x for x, h in zip(at, half, strict=True))
+    return (x, y, z), np.sqrt(x * x + y * y + z * z + TINY)
+
+
+def _beyond_box(at: Vector, half: Vector) -> Any:
+    """Distance of a point from a box, inside that from the nearest face, negative."""
+    length = _beside_box(at, half)[1]
+    return length - ramp(-most([abs(x) - h for x, h in zip(at, half, strict=True)])) if all(half) else length
+
+
+def _normal_of_box(at: Vector, half: Vector) -> Vector:
+    """Unit normal of a box at a point, inside that of the nearest face."""
+    away, length = _beside_box(at, half)
+    outside = times(1.0 / length, away)
+    if not all(half):
+        return outside
+    height, inside = abs(at[0]) - half[0], (at[0] / (abs(at[0]) + TINY), 0.0, 0.0)
+    for other, face in (
+        (abs(at[1]) - half[1], (0.0, at[1] / (abs(at[1]) + TINY), 0.0)),
+        (abs(at[2]) - half[2], (0.0, 0.0, at[2] / (abs(at[2]) + TINY))),
+    ):
+        height, inside = choose(other - height, other, height), chosen(other - height, face, inside)
+    return chosen(height, outside, inside)

@@ -17,7 +17,6 @@ import numpy as np
 from ephs.mechanics.shapes.gap import (
     CENTRE,
     Gap,
-    Vector,
     edges,
     plane_rim,
     plane_sphere,
@@ -26,6 +25,7 @@ from ephs.mechanics.shapes.gap import (
     sphere_rounded_box,
 )
 from ephs.mechanics.shapes.hull import Hull, hull_of, inside_of
+from ephs.mechanics.shapes.selecting import Vector
 from ephs.mechanics.shapes.solids import Body, cylinder, faces, meeting, point, polyhedron, rim, segment, side
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import StructureError

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ephs.mechanics.shapes.gap import Vector
 from ephs.semantics.special import choose
+
+Vector = tuple[Any, Any, Any]
+"""Components of a vector."""
 
 
 def moved(start: Vector, far: Any, way: Vector) -> Vector:

@@ -14,7 +14,6 @@ import numpy as np
 from ephs.mechanics.shapes.gap import (
     UPRIGHT,
     Gap,
-    Vector,
     apart,
     clamped,
     dot,
@@ -24,7 +23,7 @@ from ephs.mechanics.shapes.gap import (
     times,
 )
 from ephs.mechanics.shapes.hull import Hull, around
-from ephs.mechanics.shapes.selecting import chosen, least, most, moved
+from ephs.mechanics.shapes.selecting import Vector, chosen, least, most, moved
 from ephs.semantics.derive.functions import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.special import choose, root
@@ -45,7 +44,8 @@ class Body:
     Parameters
     ----------
     distance, normal
-        Point in its axes -> distance from the core in m, and unit normal away from it.
+        Point in its axes -> distance from the core in m, inside that from the nearest face, negative; and unit normal
+        away from it.
     pull
         Of a round body: point -> half the gradient of the squared distance.
     radius, halves, thickness
@@ -72,6 +72,8 @@ class Feature:
     ----------
     spot
         Centre and axis (unit) in a body's axes, and the body -> the nearest point.
+    searched
+        Whether this point of a round body is searched, which finds none where the feature meets its core.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Feature:
     radius: float
     halves: tuple[float, float, float]
     numbers: tuple[tuple[str, float], ...]
+    searched: bool = True
 
 
 def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
@@ -123,7 +126,7 @@ def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
         contact,
         body.radius if first else feature.radius,
         (*feature.numbers, *body.numbers),
-        apart(*halves, radii),
+        apart(*halves, radii, radii if feature.searched and body.pull is not None else 0.5 * body.thickness + radii),
         body.thickness + 2.0 * radii,
     )
 
@@ -133,7 +136,8 @@ def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
 
 def point(radius: float) -> Feature:
     """A ball about the origin."""
-    return Feature("point", lambda at, _axis, _body: (at, 0.0), radius, (0.0, 0.0, 0.0), (("radius", radius),))
+    numbers = (("radius", radius),)
+    return Feature("point", lambda at, _axis, _body: (at, 0.0), radius, (0.0, 0.0, 0.0), numbers, searched=False)
 
 
 def segment(half: float, radius: float) -> Feature:
@@ -150,7 +154,7 @@ def segment(half: float, radius: float) -> Feature:
         reach = 2.0 * (np.sqrt(dot(centre, centre)) + math.hypot(*body.halves))  # beyond, the centre is nearer
         place = clamped(root(rising, -reach, reach, *centre, *axis), half)
         at = moved(centre, place, axis)
-        far = body.distance(at)
+        far = ramp(body.distance(at))
         return at, np.sqrt(far * far + stay * place * place + TINY) - far
 
     return Feature("segment", spot, radius, (0.0, 0.0, half), (("half", half), ("radius", radius)))
@@ -249,14 +253,20 @@ def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> Bod
         aside, more = ramp(wide - size) / wide, dome * up * up
         return (aside + more) * at[0], (aside + more) * at[1], up + dome * square * up
 
+    def heights(at: Vector) -> tuple[Any, Any]:
+        """Above the side and above the nearer cap."""
+        return np.sqrt(at[0] * at[0] + at[1] * at[1] + middle) - size, abs(at[2]) - half
+
     def distance(at: Vector) -> Any:
-        square = at[0] * at[0] + at[1] * at[1]
-        out, up = ramp(np.sqrt(square + middle) - size), at[2] - clamped(at[2], half)
-        return np.sqrt(out * out + up * up + dome * square * up * up + TINY)
+        square, (around, above) = at[0] * at[0] + at[1] * at[1], heights(at)
+        out, up = ramp(around), at[2] - clamped(at[2], half)
+        return np.sqrt(out * out + up * up + dome * square * up * up + TINY) - ramp(-most([around, above]))
 
     def normal(at: Vector) -> Vector:
-        way = pull(at)
-        return times(1.0 / np.sqrt(dot(way, way) + TINY), way)
+        way, (around, above) = pull(at), heights(at)
+        outwards = times(1.0 / np.sqrt(at[0] * at[0] + at[1] * at[1] + TINY), (at[0], at[1], 0.0))
+        inside = chosen(above - around, (0.0, 0.0, at[2] / (abs(at[2]) + TINY)), outwards)
+        return chosen(most([around, above]), times(1.0 / np.sqrt(dot(way, way) + TINY), way), inside)
 
     sizes = (("size", size), ("half_length", half), ("rounding", radius), *((("domed", domed),) if domed else ()))
     halves, thickness = (size, size, half), 2.0 * min(size, half)

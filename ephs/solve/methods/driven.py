@@ -19,7 +19,7 @@ ROUNDS = 12
 CUTS = 6
 """Largest number of halvings of a step without solution."""
 _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
-_DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN)
+_DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN, Outcome.DEPTH)
 
 
 class ComponentMethod(Protocol):
@@ -97,7 +97,7 @@ def advance_whole(
         if failure.outcome in _DOMAINS:
             if _leaves(method.model, state.x, after.z if parts.failure is None else state.z, h):
                 break
-            if parts.failure is not None and failure.outcome in (Outcome.TURN, Outcome.DOMAIN):
+            if parts.failure is not None and failure.outcome in (Outcome.TURN, Outcome.DOMAIN, Outcome.DEPTH):
                 chunks[-1] = replace(chunk, failure=failure.of_iteration())
         if parts.failure is not None:
             break

@@ -104,14 +104,14 @@ class Mechanism(Motion):
         on.reach(self.tables.own[0].unfold, *self.swept, *self._rows, q, rate, self.work.change)
 
     def _still(self, on: Evaluator, still: Integer) -> Integer:
-        """Status where a sweep says 1 + the link whose joint moves no mass, else 0."""
+        """Status where a sweep says 1 + the link whose joint moves no mass, which loops may determine; else 0."""
 
         def blame() -> None:
             at = (still - 1) * Link.integer_width + Link.r_at.offset
             self.work.fault[0] = self.tables.integers[at]
 
         on.when(still > 0, blame)
-        return on.select(still > 0, int(Status.STILL), 0)
+        return on.select(still > 0, int(Status.DEPENDENT if self.looped else Status.STILL), 0)
 
     def _sound(self, on: Evaluator) -> Integer:
         """`Status.DEPENDENT` where a row, without those it is coupled to, is nearly nothing beside them; else 0."""

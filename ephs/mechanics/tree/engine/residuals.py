@@ -71,7 +71,8 @@ class Residuals:
         Numbers of memory that a link takes; the ground takes as many.
     program
         ``place``: motions. ``assemble``: the mass matrix, its Cholesky factor, rows of loops; 0, or
-        1 + a degree of freedom that moves no mass. ``rigid``: the forces that inertia and gravity need at ṙ = 0.
+        1 + a degree of freedom that moves no mass. ``constrain``: the rows alone, with a factor.
+        ``rigid``: the forces that inertia and gravity need at ṙ = 0.
         ``twists``: (n, 6) of a link by the rates. ``residual`` and ``action``: see above.
     """
 
@@ -112,7 +113,22 @@ class Residuals:
             closing.place(on, tree)
             masses(on, tree, q, unit, mass)
             found = cholesky(on, mass, factor)
+            constraints(on, tree, closing, q, factor, jacobian, terms, driven)
+            return found
 
+        def constrain(
+            on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, factor: Matrix, jacobian: Matrix,
+            terms: Vector, driven: Integer,
+        ) -> None:  # fmt: skip
+            tree, closing = outwards(on, tables, work, q, r)
+            _at_rest(on, tree)
+            closing.place(on, tree)
+            constraints(on, tree, closing, q, factor, jacobian, terms, driven)
+
+        def constraints(
+            on: Evaluator, tree: Tree, closing: Closures, q: Vector, factor: Matrix, jacobian: Matrix, terms: Vector,
+            driven: Integer,
+        ) -> None:  # fmt: skip
             def empty(a: Integer) -> None:
                 clear(on, jacobian.row(driven + a))
                 terms[driven + a] = 0.0
@@ -128,7 +144,6 @@ class Residuals:
 
             on.loop(terms.size - driven, empty)
             closing.each_row(on, one)
-            return found
 
         def rigid(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, out: Vector) -> None:
             tree, _ = outwards(on, tables, work, q, r)
@@ -196,6 +211,9 @@ class Residuals:
             "assemble": entry(
                 assemble, **at, unit=vector(), mass=matrix(), factor=matrix(), jacobian=matrix(), terms=vector(),
                 driven=integer(),
+            ),
+            "constrain": entry(
+                constrain, **at, factor=matrix(), jacobian=matrix(), terms=vector(), driven=integer()
             ),
             "rigid": entry(rigid, **at, out=vector()),
             "twists": entry(twists, **at, unit=vector(), link=integer(), rows=matrix(6)),

@@ -109,6 +109,7 @@ class Dense:
         self._corrected(self._target)
         if self._m:
             self._multipliers(self._m, self._rank)
+            self.multiplier += found.stiffness * rows
         return 0, 0
 
     def solved(self, forces: Array, rows: Array) -> Array:
@@ -191,6 +192,21 @@ class Dense:
         if not left.max(initial=0.0) <= SLIP * rates + STOPPED * np.abs(r).max(initial=0.0):
             raise self._contradicted(left, motions.size)
         return q, r + change
+
+    def carrying(self, q: Array, prescribed: Array, momenta: Array) -> Array:
+        """(n,) rates that meet all constraints, with the rates (n,) of driven joints as prescribed, under momenta
+        (bodies, 6) in the bodies' frames.
+
+        Raises
+        ------
+        SolveError
+            No mass and no constraint determines a rate.
+        """
+        self._reduce(q, prescribed)
+        rows = np.zeros(self._m)
+        rows[: self._driven] = -prescribed[self._led]
+        carried = sum((self.residual.twists(i).T @ p for i, p in enumerate(momenta)), np.zeros(self.residual.n))
+        return self.solved(carried[:, None], rows[:, None])[:, 0]
 
     def opened(self, residual: Array, gap: float) -> SolveError:
         """Loop that stays open, by the rows that `gaps` gives."""

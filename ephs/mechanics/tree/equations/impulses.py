@@ -7,7 +7,6 @@ import numpy as np
 from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.bundle import Array
-from ephs.solve.errors import Outcome, SolveError
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations
@@ -49,18 +48,14 @@ class Impulses:
         self._move()
         return self._places[:-1].copy()
 
-    def rates(self, q: Array, prescribed: Array, momenta: Array) -> Array:
-        """(n,) of momenta (links, 6) in the links' frames, with the rates of driven joints as prescribed (n,).
-
-        Raises
-        ------
-        SolveError
-            A joint moves no mass.
+    def rates(self, q: Array, prescribed: Array, momenta: Array) -> Array | None:
+        """(n,) of momenta (links, 6) in the links' frames, with the rates of driven joints as prescribed (n,); None
+        where a joint moves no mass.
         """
         twists = self.outward(q, prescribed)[:, TWIST]
         self._wrench[:] = momenta - np.einsum("lij,lj->li", self._inertia, twists)
         self.outward(q, np.zeros_like(prescribed))
         if self._fold():
-            raise SolveError(Outcome.UNDETERMINED, "", "the rate of a joint that moves no mass")
+            return None
         self._unfold()
         return prescribed + self._rate

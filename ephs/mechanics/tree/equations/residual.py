@@ -15,6 +15,7 @@ from ephs.mechanics.tree.sweeps.expanding import Expansion
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.pack import STANDARD
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.rank import REGULAR, TINY
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
 
 ALL: Final = kinds_of((joint.code, joint.size, joint.dim) for joint in STANDARD)
@@ -45,6 +46,8 @@ class Residual:
         their first store.
     counts
         Rows of each cut joint, then of each gear.
+    stiffness
+        (rows,) of prescribed joints, then of loops, in the metric that `assemble` made last: zeros, where M is regular.
     """
 
     def __init__(self, reduced: Reduced, gravity: Array, scal: Array, supply: Array) -> None:
@@ -60,6 +63,7 @@ class Residual:
         self.n, self.m, self.ns = reduced.freedoms, sum(self.counts), t.node.size
         c = int(t.dim[t.kind == CUT].sum())
         self.nv, driven = self.n + c, int(t.driven.sum())
+        self.stiffness = np.zeros(self.m + driven)
         self.forces, self.rows = slice(0, self.n), slice(self.n, self.n + self.m)
         self.cut_rates = slice(self.rows.stop, self.rows.stop + c)
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
@@ -131,15 +135,39 @@ class Residual:
         return -self.arrays["value"][:, 0], float(self._worst[0])
 
     def assemble(self, q: Array, r: Array) -> int:
-        """The mass matrix, its factor and the rows into ``arrays``; 0, or 1 + a degree of freedom that moves no
-        mass.
+        """The mass matrix, the factor of a metric and the rows into ``arrays``; 0, or 1 + a degree of freedom that
+        moves no mass and that no row determines.
+
+        The metric is M, and where M is singular M + Jᵀ diag(``stiffness``) J: that of the least change of rates which
+        the rows leave is the same.
         """
         a = self.arrays
         a["q"][:], a["r"][:] = q, r
+        self.stiffness[:] = 0.0
         found = int(self._call("assemble")())
-        for i, j in enumerate(self._driven):
-            a["jacobian"][i, j], a["terms"][i] = 1.0, 1.0 / a["factor"][j, j]
+        driven = np.arange(self._driven.size), self._driven
+        a["jacobian"][driven] = 1.0
+        if found and self.stiffness.size:
+            found = self._stiffened()
+        a["terms"][: self._driven.size] = 1.0 / a["factor"].diagonal()[self._driven]
         return found
+
+    def _stiffened(self) -> int:
+        """Factor of the metric with stiffness on the rows, as large as the inertia that each meets; as `assemble`."""
+        a = self.arrays
+        mass, rows = a["mass"], a["jacobian"]
+        own = mass.diagonal()
+        met = np.where(own > 0.0, rows**2 / np.where(own > 0.0, own, 1.0), 0.0).sum(axis=1)
+        usual = own.max() if own.max() > 0.0 else 1.0
+        self.stiffness[:] = np.where(met > 0.0, 1.0 / np.where(met > 0.0, met, 1.0), usual)
+        metric = mass + rows.T @ (self.stiffness[:, None] * rows)
+        scale = 1.0 / np.sqrt(np.maximum(metric.diagonal(), TINY))
+        sizes, ways = np.linalg.eigh(metric * np.outer(scale, scale))
+        if not sizes[0] > REGULAR * sizes.size:
+            return 1 + int(np.argmax(np.abs(ways[:, 0])))
+        a["factor"][:] = np.linalg.cholesky(metric)
+        self._call("constrain")()
+        return 0
 
     def pose(self, body: int) -> Array:
         """(7,) of a body in the world, where `place` has been."""
