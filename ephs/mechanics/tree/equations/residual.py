@@ -15,6 +15,7 @@ from ephs.mechanics.tree.sweeps.expanding import Expansion
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.pack import STANDARD
 from ephs.semantics.bundle import Array
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rank import REGULAR, TINY
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
 
@@ -162,7 +163,7 @@ class Residual:
         self.stiffness[:] = np.where(met > 0.0, 1.0 / np.where(met > 0.0, met, 1.0), usual)
         metric = mass + rows.T @ (self.stiffness[:, None] * rows)
         scale = 1.0 / np.sqrt(np.maximum(metric.diagonal(), TINY))
-        sizes, ways = np.linalg.eigh(metric * np.outer(scale, scale))
+        sizes, ways = symmetric_eigen(metric * np.outer(scale, scale))
         if not sizes[0] > REGULAR * sizes.size:
             return 1 + int(np.argmax(np.abs(ways[:, 0])))
         a["factor"][:] = np.linalg.cholesky(metric)
