@@ -147,13 +147,13 @@ def test_nestings_fit(nesting):
 def test_impossible_bounds_are_an_error_when_drawn(strategy):
     made = strategy()  # not here
     with pytest.raises(InvalidArgument):
-        find(made, lambda _: True)
+        find(made, lambda _: True, settings=SEARCH)
 
 
 @pytest.mark.parametrize("kind", [Path, Quantity, Pattern, System, Scene])
 def test_registered_types_can_be_drawn(kind):
     register()
-    assert isinstance(find(st.from_type(kind), lambda _: True), kind)
+    assert isinstance(find(st.from_type(kind), lambda _: True, settings=SEARCH), kind)
 
 
 def test_strategies_shrink_to_small_patterns():
