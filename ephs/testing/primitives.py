@@ -88,7 +88,7 @@ def reversibles(
     constraint = constraint[np.linalg.norm(constraint, axis=1) > 0.1]
     used = reads if reads and draw(READING) else ()
     if not used:
-        return structures.constant_structure("random Dirac structure", interface, skew, constraint)
+        return structures.constant_structure("random Dirac structure", interface, skew, constraint, trusted=True)
 
     def structure(x: Point) -> tuple[Array, Array]:
         return _scale(x) * skew, constraint

@@ -9,7 +9,7 @@ import pytest
 
 from ephs.operad import Path, Pattern, junction, quantity
 from ephs.solve.result.entries import Entry
-from ephs.solve.result.labels import labels_of
+from ephs.solve.result.labels import Labels, labels_of
 
 
 @final
@@ -83,6 +83,10 @@ class FakeSolution:
     def labels(self) -> dict[str, Any]:
         quantities = {"pe.q": quantity.displacement, "ke.p": quantity.momentum, "env.s": quantity.entropy}
         return {path: labels_of(quantities.get(path, quantity.body_momentum)) for path in self.states}
+
+    @property
+    def freedoms(self) -> dict[str, Labels]:
+        return {name: Labels("revolute", ("angle",), ("rad",)) for name in self.joint_records}
 
     def __getattr__(self, name: str) -> Any:
         if name in self.__dict__["ledgers"]:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 ROUNDED = 8.0 * float(np.finfo(float).eps)
 """Relative error of a number that was computed in a few operations."""
+BESIDE = 8.0 * ROUNDED
+"""Rounding that products of matrices leave, relative to the largest number of the same units."""
 READINGS: Mapping[str, Callable[[float], Fraction]] = {
     "as given": Fraction,
     "as written in decimals": lambda number: Fraction(repr(number)),
@@ -60,7 +62,7 @@ def _isotropy(reversible: "Reversible", statement: str, skew: Array) -> Conditio
     np.fill_diagonal(own, 0.0)
     if np.all(defect <= own):
         return _proved(statement, "up to the rounding of each number")
-    beside = ROUNDED * _beside(reversible, skew)
+    beside = BESIDE * _beside(reversible, skew)
     return _crumbs(reversible, statement, "isotropy", skew + skew.T, np.maximum(beside, beside.T))
 
 
@@ -77,7 +79,7 @@ def _conservation(reversible: "Reversible", statement: str, skew: Array, constra
         )
         defect, own = rows @ amounts, ROUNDED * (np.abs(rows) @ np.abs(amounts))
         if reading is None and not np.all(np.abs(defect) <= own):
-            off = np.abs(defect) / np.maximum(ROUNDED * (largest @ np.abs(amounts)), TINY)
+            off = np.abs(defect) / np.maximum(BESIDE * (largest @ np.abs(amounts)), TINY)
             if off.max() > 1.0:
                 worst = int(np.argmax(off))
                 raise _refuted(reversible, "conservation", float(defect[worst]), (worst,), quantity=kind)
@@ -98,7 +100,7 @@ def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: A
         if _relation(skew, constraint, read) == _relation(*mirrored, read):
             return _proved(statement, words)
     if pure:
-        return _crumbs(reversible, statement, "parity", alike, ROUNDED * _beside(reversible, skew))
+        return _crumbs(reversible, statement, "parity", alike, BESIDE * _beside(reversible, skew))
     return Condition(statement, False, "equal up to rounding")
 
 
