@@ -85,6 +85,10 @@ class FakeSolution:
         return {path: labels_of(quantities.get(path, quantity.body_momentum)) for path in self.states}
 
     @property
+    def problem(self) -> None:
+        return None
+
+    @property
     def freedoms(self) -> dict[str, Labels]:
         return {name: Labels("revolute", ("angle",), ("rad",)) for name in self.joint_records}
 
