@@ -246,6 +246,7 @@ CASES = (
 )  # fmt: skip
 
 ELSEWHERE = {
+    Outcome.DEPTH: "a ball dropped on a soft, thin plate",
     Outcome.UNLAWFUL: "explicit steps that are too long for a stiff brake",
     Outcome.RESTLESS: "what only falls, asked for its rest by ephs.equilibrium",
     Outcome.UNWRITTEN: "a journal on a disk that is full",
