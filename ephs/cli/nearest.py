@@ -1,4 +1,4 @@
-"""Nearest spelling of a word."""
+"""Suggestions in messages of the command line; the operad's, loaded only where there is something to suggest."""
 
 from collections.abc import Iterable
 
@@ -8,9 +8,9 @@ MODELS = (".toml", ".py", ".urdf", ".xml", ".sdf")
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name nearest to a misspelled one, or None."""
-    from difflib import get_close_matches
+    from ephs.operad.messages import nearest_name
 
-    return next(iter(get_close_matches(name, list(known), n=1, cutoff=0.6)), None)
+    return nearest_name(name, known)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

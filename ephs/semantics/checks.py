@@ -87,11 +87,6 @@ def _odd(bundle: Bundle, port: Path) -> bool:
     return bundle.interface[port].quantity.parity < 0
 
 
-def constant(primitive: "Primitive") -> bool:
-    """Whether the structure is constant, so that one evaluation suffices."""
-    return primitive.kind == "reversible" and not primitive.reads
-
-
 def check_at(primitive: "Primitive", trial: Trial) -> None:
     """Check all conditions on a primitive at a state and effort.
 

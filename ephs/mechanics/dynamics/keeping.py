@@ -18,7 +18,7 @@ NEAR = 1e-9
 def following(equations: Equations, state: ReducedState, placed: Index, turning: Index) -> ReducedState:
     """The state with other freedoms changed least so that loops and gears hold, positions by Newton's method.
 
-    Where these do not close with what is given, the state itself.
+    The given state is returned unchanged where loops and gears do not hold with these freedoms.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def contact_energy(gap: Gap, law: Law) -> Storage:
         overlap = ramp(-gap.distance(q_r))
         if gap.support.depth == np.inf:
             return law.energy(overlap)
-        left = np.sqrt(gap.support.depth - overlap)
+        left = np.sqrt(gap.support.depth - overlap)  # no number beyond the depth; zero is added to all other energies
         return law.energy(overlap) + (left - left)
 
     return stored(

@@ -106,27 +106,19 @@ def metric_eigen(matrix: Any, metric: Any) -> tuple[Any, Any]:
 
 def eigen(matrix: Any) -> tuple[Any, Any]:
     """Eigenvalues (…, n) and eigenvectors (…, n, n) of any square matrices; errors as of `svd`."""
-
-    def taking(a: Any) -> Any:
-        return tuple(np.linalg.eig(a))
-
-    return _robust("eigenvalues", matrix, taking, taking)
+    return _robust("eigenvalues", matrix, np.linalg.eig)
 
 
 def eigenvalues(matrix: Any) -> Any:
     """(…, n) eigenvalues of any square matrices; errors as of `svd`."""
-
-    def taking(a: Any) -> Any:
-        return (np.linalg.eigvals(a),)
-
-    (found,) = _robust("eigenvalues", matrix, taking, taking)
+    (found,) = _robust("eigenvalues", matrix, lambda a: (np.linalg.eigvals(a),))
     return found
 
 
 def _robust(
-    what: str, matrix: Any, fast: Callable[[Any], Any], slow: Callable[[Any], Any], right: Any = None
+    what: str, matrix: Any, fast: Callable[[Any], Any], slow: Callable[[Any], Any] | None = None, right: Any = None
 ) -> tuple[Any, ...]:
-    """Results of the fast driver, else of the slow one, matrix by matrix."""
+    """Results of the fast driver, else of the slow one, if there is one, matrix by matrix."""
     a = np.asarray(matrix)
     try:
         return tuple(fast(a))
@@ -138,6 +130,8 @@ def _robust(
     if not (np.isfinite(a).all() and (right is None or np.isfinite(right).all())):
         raise ArithmeticError(TEXT.format(what=what, shape=shape, largest=np.nan, why="are not finite")) from cause
     try:
+        if slow is None:
+            raise cause
         found = [tuple(slow(one)) for one in a.reshape(-1, *a.shape[-2:])]
     except np.linalg.LinAlgError as error:
         largest = float(np.abs(a).max(initial=0.0))

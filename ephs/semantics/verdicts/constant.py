@@ -3,7 +3,8 @@
 A float is a rational number, so a condition holds of the numbers as given, or it does not. What fails may hold of the
 decimals as they are written (0.1 + 0.2 − 0.3), or up to the rounding of each single number; then it is proved, too. A
 defect within the rounding of other numbers *of the same units*, as products of matrices leave it, is neither proved nor
-refuted. Anything larger is refuted, however large the numbers beside it are.
+refuted: the verdict is "searched". Anything larger is refuted, however large the numbers beside it are. One case is
+left to `checks`, whose tolerance is that of the whole structure: time reversal where rows of C mix parities.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -31,8 +32,8 @@ READINGS: Mapping[str, Callable[[float], Fraction]] = {
     "as given": Fraction,
     "as written in decimals": lambda number: Fraction(repr(number)),
 }
-"""How a float is read as a rational number, the strictest first."""
-CRUMBS = "up to the rounding of numbers of the same units"
+"""Rational number of a float, by the name of the reading; the first one is exact."""
+OF_UNITS = "up to the rounding of numbers of the same units"
 
 
 def decided(reversible: "Reversible") -> tuple[Condition, ...]:
@@ -63,7 +64,7 @@ def _isotropy(reversible: "Reversible", statement: str, skew: Array) -> Conditio
     if np.all(defect <= own):
         return _proved(statement, "up to the rounding of each number")
     beside = BESIDE * _beside(reversible, skew)
-    return _crumbs(reversible, statement, "isotropy", skew + skew.T, np.maximum(beside, beside.T))
+    return _searched(reversible, statement, "isotropy", skew + skew.T, np.maximum(beside, beside.T))
 
 
 def _conservation(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
@@ -83,7 +84,7 @@ def _conservation(reversible: "Reversible", statement: str, skew: Array, constra
             if off.max() > 1.0:
                 worst = int(np.argmax(off))
                 raise _refuted(reversible, "conservation", float(defect[worst]), (worst,), quantity=kind)
-            proved, reading = False, CRUMBS
+            proved, reading = False, OF_UNITS
         how.append(f"{kind} {reading or 'up to the rounding of each number'}")
     return Condition(statement, proved, "decided: " + ", ".join(how) if how else "it has no port with a charge")
 
@@ -100,8 +101,8 @@ def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: A
         if _relation(skew, constraint, read) == _relation(*mirrored, read):
             return _proved(statement, words)
     if pure:
-        return _crumbs(reversible, statement, "parity", alike, BESIDE * _beside(reversible, skew))
-    return Condition(statement, False, "equal up to rounding")
+        return _searched(reversible, statement, "parity", alike, BESIDE * _beside(reversible, skew))
+    return Condition(statement, False, "both sides are equal up to the rounding of the whole structure")
 
 
 def _relation(skew: Array, constraint: Array, read: Callable[[float], Fraction]) -> list[object]:
@@ -134,11 +135,17 @@ def _proved(statement: str, words: str) -> Condition:
     return Condition(statement, True, f"decided: it holds of the numbers {words}")
 
 
-def _crumbs(reversible: "Reversible", statement: str, kind: str, defect: Array, allowed: Array) -> Condition:
-    """What is left of a condition that does not hold of the numbers: rounding, or a counterexample."""
+def _searched(reversible: "Reversible", statement: str, kind: str, defect: Array, allowed: Array) -> Condition:
+    """A condition whose defect is rounding beside numbers of the same units.
+
+    Raises
+    ------
+    StructureError
+        An entry of the defect is larger than is ``allowed`` there.
+    """
     off = np.abs(defect) / np.maximum(allowed, TINY)
     if off.max(initial=0.0) <= 1.0:
-        return Condition(statement, False, f"the numbers are off by {np.abs(defect).max():.1e}, {CRUMBS}")
+        return Condition(statement, False, f"the numbers are off by {np.abs(defect).max():.1e}, {OF_UNITS}")
     entry = tuple(int(i) for i in np.unravel_index(int(np.argmax(off)), off.shape))
     raise _refuted(reversible, kind, float(defect[entry]), entry)
 
