@@ -46,7 +46,7 @@ test: $(VENV)/.installed-dev
 	EPHS_LLVM_LEVEL=0 $(PYTEST) -n $(CORES) -m 'not long and not optimised'
 
 laws: $(VENV)/.installed-dev
-	$(PYTEST) -n $(CORES) -m 'long or optimised'
+	$(PYTEST) -n $(CORES) -m 'long or optimised' --durations=30
 
 real: $(VENV)/.installed-real
 	$(PYTEST) -n $(CORES) tests_real

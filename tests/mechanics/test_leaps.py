@@ -80,6 +80,35 @@ def test_the_step_that_is_advised_meets_the_plate(ball):
     assert not any("passed" in finding.advice for finding in met.audit.findings)
 
 
+@pytest.mark.parametrize("method", ["natural", "alpha", "rk54"])
+@pytest.mark.parametrize("part", [0.03, 0.15, 0.3, 0.45])
+@pytest.mark.parametrize("offset", [0.0, 0.4])
+def test_no_soft_contact_lets_a_ball_through_in_silence(offset, part, method, tmp_path):
+    """Steps of a part of the plate's way: runs end where the contact has no direction, or are found to pass it."""
+    file, start = tmp_path / "soft.toml", START + offset * part * WAY
+    file.write_text(SCENE.replace("SIDE", "0.0").replace("START", repr(start)).replace("1e7", "100.0"))
+    try:
+        run = ephs.simulate(ephs.load(file), 0.06, method=method, step=part * WAY / SPEED, audit="off")
+    except ephs.SimulationError as error:
+        assert error.outcome is ephs.Outcome.DEPTH and error.path == "contacts.ball_plate.point0.pe"
+        return
+    assert part > 0.1, "shorter steps have an end in the layer in which runs end"
+    assert run.body("ball").position[-1, 2] < 0.0, "it went through"
+    (finding,) = run.audit.findings
+    assert finding.path == "contacts.ball_plate" and "passed" in finding.advice
+
+
+def test_an_overlap_that_turns_back_is_not(tmp_path):
+    """A swing to 0.8 of the way to the middle, by steps that are longer than the layer in which runs end."""
+    deep = 0.8 * 0.5 * WAY
+    file = tmp_path / "swing.toml"
+    stiffness = 2.0 * (SPEED / deep) ** 2  # two surfaces in series have half of it
+    file.write_text(SCENE.replace("SIDE", "0.0").replace("START", repr(START)).replace("1e7", repr(stiffness)))
+    run = ephs.simulate(ephs.load(file), 0.06, method="rk87", step=0.2 * WAY / SPEED, audit="off")
+    assert run.contact("ball_plate").gap.min() < -0.9 * deep
+    assert not any("passed" in finding.advice for finding in run.audit.findings)
+
+
 @pytest.mark.parametrize("side", [0.6, 0.52])
 def test_a_ball_that_passes_beside_the_plate_is_not(side, ball):
     assert ephs.simulate(ball(side), 0.06, method="natural", step=0.0097).audit.passed

@@ -1,7 +1,8 @@
-"""Steps that pass through a thin surface: one side before, the other after, without contact.
+"""Steps that pass through a thin surface, or through the middle of an overlap, without an instant inside.
 
 The way of the second surface through the axes of the first is straight within a step that is long for them. Gaps of
-convex shapes are convex along it, so that a search by thirds finds the least.
+convex shapes are convex along it, so that a search by thirds finds the least: contact, where both ends are outside; and
+where they are not, an overlap beyond the depth at which a contact has no direction and a run ends.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,8 +16,10 @@ from ephs.mechanics.motion.batch import gap as change
 from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.shapes.gap import PENETRATED, Gap
 from ephs.semantics.bundle import Array
 from ephs.solve.auditing.audit import LEAP
+from ephs.solve.control import SLIVER
 
 THIRDS = 48
 """Iterations of the search, each reducing the interval by two thirds: (2/3)⁴⁸ is 4e-9."""
@@ -32,7 +35,8 @@ class Leap:
     name, instant
         The contact, and the index of the instant after it.
     size
-        The step's way in thicknesses.
+        The step's way in thicknesses; through the middle of an overlap in parts of the layer beyond the depth, times
+        `LEAP`.
     """
 
     name: str
@@ -55,21 +59,30 @@ def leaps(scene: Scene, read: Moving, t: Array, h: float) -> Iterator[Leap]:
         relative = compose(inverse(one), other)
         turned, moved = change(relative[:-1].T, relative[1:].T)
         arm = max(float(np.linalg.norm(frame[4:])) for _, frame, _ in thin)
-        if np.all(share * (moved + arm * turned) <= LEAP * min(gap.thickness for _, _, gap in thin)):
+        if np.all(share * (moved + arm * turned) <= min(min(LEAP * gap.thickness, _middle(gap)) for _, _, gap in thin)):
             continue
         for frame1, frame2, gap in thin:
             pose = compose(compose(inverse(frame1[None]), relative), frame2[None])
             ways = np.linalg.norm(np.diff(pose[:, 4:], axis=0), axis=1)
             outside = np.asarray(gap.distance(pose.T))
             near = np.minimum(outside[:-1], outside[1:])
-            long = share * ways / gap.thickness
-            at = np.flatnonzero((near >= 0.0) & (near <= ways) & (long > LEAP))
-            passed = at[_least(gap.distance, pose[at], pose[at + 1]) < 0.0]
-            if passed.size:
-                worst = int(passed[np.argmax(long[passed])])
-                longest = max(longest, Leap(name, worst + 1, float(long[worst])), key=lambda leap: leap.size)
+            whole = share > 1.0 - SLIVER  # of a way that several steps went the middle is not known
+            for possible, limit, long in (
+                ((near >= 0.0) & (near <= ways), 0.0, share * ways / gap.thickness),
+                (whole & (near >= -gap.support.depth) & (near < 0.0), -gap.support.depth, LEAP * ways / _middle(gap)),
+            ):
+                at = np.flatnonzero(possible & (long > LEAP))
+                passed = at[_least(gap.distance, pose[at], pose[at + 1]) < limit]
+                if passed.size:
+                    worst = int(passed[np.argmax(long[passed])])
+                    longest = max(longest, Leap(name, worst + 1, float(long[worst])), key=lambda leap: leap.size)
         if longest.size:
             yield longest
+
+
+def _middle(gap: Gap) -> float:
+    """Way in m through what lies beyond the depth, from one side of the middle to the other."""
+    return 2.0 * gap.support.depth * (1.0 / PENETRATED - 1.0)
 
 
 def _least(distance: Callable[[Array], Array], start: Array, end: Array) -> Array:
