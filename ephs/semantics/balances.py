@@ -12,7 +12,7 @@ from ephs.operad import Path, Quantity
 from ephs.operad.charges import ENTROPY
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.bundle import Array
-from ephs.semantics.natural import Solved, solve_flat, solve_nested
+from ephs.semantics.meaning.step import Solved, solved
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.probe import Probe, Verdict
 from ephs.semantics.spaces import manifold
@@ -28,7 +28,7 @@ VACUOUS = Verdict(0.0, 0.0, "vacuous: no step was found, a constraint contradict
 
 @lru_cache(maxsize=1)  # all laws of a step at one probe; probes are distinguished by identity
 def _solved(probe: Probe) -> Solved:
-    return solve_flat(probe.system, probe.state, Natural(probe.reference, probe.h), probe.inputs)
+    return solved(probe.system, probe.state, Natural(probe.reference, probe.h), probe.inputs, probe.ports)
 
 
 def _after(probe: Probe, solved: Solved) -> dict[Path, Array]:
@@ -165,8 +165,10 @@ def _balance(probe: Probe, solved: Solved, terms: list[float], sizes: list[float
 def naturality(probe: Probe) -> Verdict:
     """Discretise, then compose = flatten, then discretise."""
     behaviour = Natural(probe.reference, probe.h)
-    flat = solve_flat(probe.system, probe.state, behaviour, probe.inputs)
-    nested = solve_nested(probe.system, probe.state, behaviour, probe.inputs, probe.ports)
+    flat, nested = (
+        solved(system, probe.state, behaviour, probe.inputs, probe.ports)
+        for system in (probe.system.flatten(), probe.system)
+    )
     if max(flat.residual, nested.residual) > UNSOLVED:
         return VACUOUS
     scale = max([1.0, *(float(np.abs(w).max(initial=0.0)) for w in flat.rates.values())])
@@ -175,5 +177,5 @@ def naturality(probe: Probe) -> Verdict:
         default=0.0,
     )
     worst /= scale
-    # two Newton iterations in different unknowns: condition 10⁴ times the rounding of an evaluation
+    # two Newton iterations with other eliminations: condition 10⁴ times the rounding of an evaluation
     return Verdict(worst, 1e4 * 8.0 * ROUNDING, f"rates of {len(flat.rates)} states agree to {worst:.1e}")

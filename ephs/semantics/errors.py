@@ -71,6 +71,7 @@ _TEXTS = {
     "efforts": "{path}: the efforts are {found!r}, expected finite numbers of shape {expected}",
     "no-time": "{path}: the solution has no state at {found!r} s; it has times from {first!r} to {last!r} s",
     "unknown-port": "{path}: no such outer port; the outer ports are {expected}",
+    "not-constant": "{path}: its structure depends on {found}; only constant structure has an exact relation",
     "references": (
         "{path}: the relation is relative to {found}, the others to {expected}; take relations to one reference"
     ),

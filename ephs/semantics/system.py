@@ -23,7 +23,7 @@ from ephs.semantics.spaces import manifold
 if TYPE_CHECKING:
     from ephs.semantics.descriptor import Descriptor
     from ephs.semantics.ledger import Ledger
-    from ephs.semantics.relations import Relation, Route
+    from ephs.semantics.meaning import Relation, Route
     from ephs.semantics.report import CheckReport
     from ephs.semantics.symbols.equations import Equations
 
@@ -195,18 +195,27 @@ class System:
 
         return Ledger(self)
 
-    def relation(self, reference: Reference | None = None, *, route: "Route" = "flat") -> "Relation":
+    def relation(
+        self,
+        reference: Reference | None = None,
+        *,
+        route: "Route" = "flat",
+        field: Literal["float", "rational"] = "float",
+    ) -> "Relation":
         """The system's meaning: a relation between the rates of its states and its outer flows and efforts.
 
         Parameters
         ----------
         route
-            ``"flat"`` flattens and eliminates all unknowns at once; ``"nested"`` composes the relations of the
-            subsystems level by level. They agree: this is what functoriality says.
+            ``"flat"`` flattens and glues at one level; ``"nested"`` glues the relations of the subsystems level by
+            level. They agree: this is what functoriality says.
+        field
+            ``"float"``: numbers with error bounds; ``"rational"``: exact, where all structure is constant; the efforts
+            of storages stay open then.
         """
-        from ephs.semantics.relations import relation_of
+        from ephs.semantics.meaning import relation_of
 
-        return relation_of(self, reference or Reference(), route)
+        return relation_of(self, reference or Reference(), route, field)
 
     def descriptor(self) -> "Descriptor":
         """The square descriptor form, assembled without choosing causality.

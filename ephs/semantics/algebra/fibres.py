@@ -1,8 +1,8 @@
 """The algebra of relations over their base, the physical semantics of systems, and the map from systems to it."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import TypeAlias, final
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,11 +11,9 @@ from ephs.operad.matching import interfaces_match
 from ephs.semantics.algebra.free import systems
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
-from ephs.semantics.primitives import Irreversible, Primitive
-from ephs.semantics.relations import LinearRelation, Relation, relation_of
-from ephs.semantics.relations.base import BasePoint
-from ephs.semantics.spaces.rank import APART, PROJECTOR
-from ephs.semantics.subspace import Subspace
+from ephs.semantics.meaning import Relation, relation_of
+from ephs.semantics.meaning.relation import Renamed
+from ephs.semantics.primitives import Irreversible
 from ephs.semantics.system import Filling
 
 Meaning: TypeAlias = Relation | Filling
@@ -40,7 +38,7 @@ def _compose(pattern: Pattern, parts: Mapping[Path, Meaning]) -> Meaning:
 
 
 def _equal(left: Meaning, right: Meaning) -> bool:
-    """Same ports and base, and at points of it the same subspace, to the rounding of the eliminations."""
+    """Same ports and base, and at points of it the same subspace, to the error bounds."""
     one, other = relation_for(left), relation_for(right)
     if not interfaces_match(one.interface, other.interface) or one.reference != other.reference:
         return False
@@ -52,8 +50,7 @@ def _equal(left: Meaning, right: Meaning) -> bool:
         # temperatures stay above zero
         efforts = {path: rng.uniform(-1.0, 1.0, size) for path, size in _arguments(one)}
         found, expected = (each.at(state, ports, efforts=efforts) for each in (one, other))
-        condition = max(10.0, found.subspace.condition, expected.subspace.condition)
-        if found.distance(expected) > min(APART, PROJECTOR * condition):
+        if not found.same(expected):
             return False
     return True
 
@@ -82,42 +79,8 @@ def _rename(element: Meaning, names: Mapping[Path, Path]) -> Meaning:
         return tuple(sorted(path.moved(names) for path in paths))
 
     classes = (replace(each, stores=moved(each.stores), readers=moved(each.readers)) for each in relation.classes)
-    fibre = _Renamed(relation, Directory.trusted(dict(names)))
+    fibre = Renamed(relation, Directory.trusted(dict(names)))
     return replace(relation, classes=tuple(sorted(classes, key=lambda each: each.name)), fibre=fibre)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class _Renamed:
-    """The fibres of a relation whose components have new names."""
-
-    relation: Relation
-    names: Directory[Path]
-
-    def leaves(self) -> Iterator[tuple[Path, Primitive]]:
-        for path, primitive in self.relation.fibre.leaves():
-            yield path.moved(self.names), primitive
-
-    def at(self, path: Path, point: BasePoint) -> LinearRelation:
-        states: Values = {}
-        efforts: Values = {}
-        for leaf, primitive in self.relation.fibre.leaves():
-            new, old = path / leaf.moved(self.names), path / leaf
-            for port in primitive.interface:
-                if new / port in point.states:
-                    states[old / port] = point.states[new / port]
-            if new in point.efforts:
-                efforts[old] = point.efforts[new]
-        found = self.relation.fibre.at(path, replace(point, states=states, efforts=efforts))
-        at, places = 0, dict[Path, range]()
-        for name, dim in found.rates:
-            places[name.moved(self.names)] = range(at, at + dim)
-            at += dim
-        rates = sorted((name, len(rows)) for name, rows in places.items())
-        order = [row for name, _ in rates for row in places[name]]
-        order += range(at, found.subspace.ambient)
-        subspace = Subspace(found.subspace.basis[order], found.subspace.condition)
-        return replace(found, rates=tuple(rates), subspace=subspace)
 
 
 relations: Algebra[Meaning] = Algebra("relations", _interface, _compose, _equal, _rename)

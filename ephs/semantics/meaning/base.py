@@ -7,7 +7,7 @@ outer ports identify two states of their surroundings, whether or not they store
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ephs.operad.links import closure
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.initial import read_state
+from ephs.semantics.meaning.fields import Field, Rounded
 from ephs.semantics.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import manifold
 
@@ -67,20 +68,34 @@ class BasePoint:
     ----------
     states
         Value at each port of a component that stores or reads a state, by full path.
+    names
+        Name of the state at each of these ports: storages of one state have one rate.
     efforts
         Arguments e of the Onsager matrices by component; zero where missing.
-    unit
-        Value of the coordinate that is constantly one.
+    field
+        The numbers in which the fibre is computed.
+    storages
+        Whether the efforts of storages are those of the states; else they stay open, as `Variable`s of their ports.
+    processes
+        Whether irreversible components say anything; else their flows and efforts stay open.
     """
 
     states: Mapping[Path, Array]
+    names: Mapping[Path, Path]
     efforts: Mapping[Path, Array] = field(default_factory=dict[Path, Array])
     reference: Reference = field(default_factory=Reference)
-    unit: float = 1.0
+    field: Field[Any] = field(default_factory=Rounded)
+    storages: bool = True
+    processes: bool = True
 
     def read(self, path: Path, primitive: Primitive) -> Point:
         """The states that the component at this path reads, by its ports."""
         return {port: self.states[path / port] for port in primitive.reads}
+
+
+def names_of(classes: Sequence[StateClass]) -> dict[Path, Path]:
+    """Name of the state at each port of a component that stores or reads it."""
+    return {path: each.name for each in classes for path in (*each.stores, *each.readers)}
 
 
 def component_classes(primitive: Primitive) -> tuple[StateClass, ...]:

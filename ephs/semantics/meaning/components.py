@@ -1,0 +1,122 @@
+"""Relations of components: what a primitive says of the variables at its ports, at an instant."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ephs.operad import ROOT, Path, Quantity
+from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.errors import SemanticsError
+from ephs.semantics.meaning.base import BasePoint
+from ephs.semantics.meaning.fields import Field, Row
+from ephs.semantics.meaning.functor import Linear
+from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.variables import ONE, Variable, at_port
+from ephs.semantics.primitives import Primitive, Reversible, Storage
+
+TURNING = {"SO3": 3, "SE3": 3, "SE2": 1}
+"""How many coordinates of a group, the first ones, are angles; the others are lengths."""
+
+
+def at_ports(kind: str, bundle: Bundle) -> list[Variable]:
+    """The variables of the power ports in the order of the fibre."""
+    return [variable for port, _, quantity in bundle.items() for variable in at_port("outer", kind, port, quantity)]
+
+
+def at_instant(primitive: Primitive, path: Path, point: BasePoint) -> Linear:
+    """The relation of the component at this path of the whole system, over a point of the base.
+
+    A storage: rate = f, e = dH(x). Others: f = A e + Cᵀ λ, 0 = C e, with λ inside.
+
+    Raises
+    ------
+    SemanticsError
+        The numbers are to be exact, and the component's are not constant.
+    """
+    field, bundle = point.field, primitive.bundle
+    flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
+    if isinstance(primitive, Storage):
+        return _storage(primitive, path, point)
+    if isinstance(primitive, Reversible):
+        if primitive.reads and field.decides:
+            raise SemanticsError("not-constant", path, found=", ".join(map(str, primitive.reads)))
+        dynamic, constraint = primitive.structure(point.read(path, primitive))
+        return process(field, bundle, dynamic, constraint)
+    if not point.processes:
+        return LinearRelation.of(field, [*flows, *efforts])
+    if field.decides:
+        raise SemanticsError("not-constant", path, found="efforts")
+    e = point.efforts.get(path, np.zeros(bundle.size))
+    primitive.require_temperature(e, point.reference)
+    matrix = primitive.matrix(point.read(path, primitive), e, point.reference) / point.reference.temperature
+    return process(field, bundle, matrix, np.zeros((0, bundle.size)))
+
+
+def _storage(storage: Storage, path: Path, point: BasePoint) -> Linear:
+    field, bundle = point.field, storage.bundle
+    flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
+    rates = own("rate", bundle, lambda port: point.names[path / port])
+    rows = [field.exact({rate: 1.0, flow: -1.0}) for rate, flow in zip(rates, flows, strict=True)]
+    if not point.storages:
+        known = own("effort", bundle, path.__truediv__)
+        rows += [field.exact({effort: 1.0, value: -1.0}) for effort, value in zip(efforts, known, strict=True)]
+        return LinearRelation.of(field, [*rates, *flows, *efforts, *known], rows)
+    values = storage.effort(point.read(path, storage), point.reference)
+    for effort, value, size in zip(efforts, values.tolist(), largest(bundle, values).tolist(), strict=True):
+        rows.append(field.exact({effort: 1.0}) | field.rounded({ONE: -value}, {ONE: size}))
+    return LinearRelation.of(field, [*rates, *flows, *efforts, ONE], rows)
+
+
+def own(kind: str, bundle: Bundle, name: Any) -> list[Variable]:
+    """The variables inside that belong to the ports, by what names a port's path has there."""
+    return [
+        Variable("own", kind, ROOT, name(port), i)
+        for port, _, quantity in bundle.items()
+        for i in range(quantity.space.dim)
+    ]
+
+
+def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> Linear:
+    """f = A e + Cᵀ λ, 0 = C e; numbers are rounded beside the largest of the same units."""
+    flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
+    multipliers = [Variable("inner", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]
+    sizes, beside = largest(bundle, dynamic), largest(bundle, constraint.T).T
+    rows: list[Row[Any]] = []
+    transposed, around = constraint.T.tolist(), beside.T.tolist()
+    for i, (entries, size) in enumerate(zip(dynamic.tolist(), sizes.tolist(), strict=True)):
+        row = field.exact({flows[i]: -1.0}) | _rounded(field, efforts, entries, size)
+        rows.append(row | _rounded(field, multipliers, transposed[i], around[i]))
+    for entries, size in zip(constraint.tolist(), beside.tolist(), strict=True):
+        rows.append(_rounded(field, efforts, entries, size))
+    return LinearRelation.of(field, [*flows, *efforts, *multipliers], rows)
+
+
+def _rounded(field: Field[Any], names: list[Variable], entries: list[float], sizes: list[float]) -> Row[Any]:
+    return field.rounded(dict(zip(names, entries, strict=True)), dict(zip(names, sizes, strict=True)))
+
+
+def largest(bundle: Bundle, numbers: Array) -> Array:
+    """The largest number of the same units beside each, (n,) or (n, k): in a square matrix by rows and columns."""
+    kinds, count = _units(bundle)
+    out = np.zeros((count, *numbers.shape[1:]))
+    np.maximum.at(out, kinds, np.abs(numbers))
+    if numbers.ndim == 2 and numbers.shape[0] == numbers.shape[1]:
+        both = np.zeros((count, count))
+        np.maximum.at(both.T, kinds, out.T)
+        return both[kinds[:, None], kinds]
+    return out[kinds]
+
+
+@lru_cache(maxsize=1024)
+def _units(bundle: Bundle) -> tuple[Any, int]:
+    """Number of its unit for each coordinate of the fibre, and how many there are."""
+    words = [word for _, _, quantity in bundle.items() for word in _words(quantity)]
+    known = {word: number for number, word in enumerate(dict.fromkeys(words))}
+    return np.array([known[word] for word in words], dtype=int), len(known)
+
+
+def _words(quantity: Quantity) -> list[tuple[str, bool]]:
+    """Unit and kind of each coordinate; angles and lengths of one quantity differ in unit."""
+    turning = TURNING.get(quantity.space.name)
+    return [(quantity.unit, turning is not None and i < turning) for i in range(quantity.space.dim)]

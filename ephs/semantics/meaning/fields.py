@@ -1,0 +1,209 @@
+"""Fields of numbers: rational numbers, and floats that know their error.
+
+A field decides one question: is this number zero? Rational numbers decide it. A float that is larger than the bound of
+its error is not; within the bound it counts as zero, and the field records how near such decisions were. No threshold
+depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar, final
+
+import numpy as np
+
+N = TypeVar("N")
+Row: TypeAlias = dict[Any, N]
+"""A linear form that vanishes: variable -> coefficient, without zeros."""
+EPSILON = float(np.finfo(float).eps)
+ROUNDED = 8.0 * EPSILON
+"""Relative error of a number that was computed in a few operations."""
+
+
+class Field(ABC, Generic[N]):
+    """Numbers in which relations are computed."""
+
+    __slots__ = ()
+    one: N
+    decides: ClassVar[bool] = False
+    """Whether zero is decided, of the numbers as they are read."""
+
+    @abstractmethod
+    def number(self, value: float, error: float = 0.0) -> N:
+        """A number that is known to an error; without one it is meant exactly."""
+
+    @abstractmethod
+    def value(self, number: N) -> float:
+        """The nearest float."""
+
+    @abstractmethod
+    def quotient(self, number: N, by: N) -> N:
+        """One number by another, which is not zero."""
+
+    @abstractmethod
+    def subtract(self, row: Row[N], factor: N, other: Mapping[Any, N]) -> None:
+        """Row ← row − factor · other, in place, without zeros."""
+
+    @abstractmethod
+    def opposite(self, one: N, other: N) -> bool:
+        """Whether two numbers are exactly opposite."""
+
+    @abstractmethod
+    def pivot(self, rows: Sequence[Row[N]], variable: Any) -> int:
+        """Which of the rows a variable is best eliminated with."""
+
+    def exact(self, terms: Mapping[Any, float]) -> Row[N]:
+        """A linear form whose coefficients are meant exactly."""
+        return {key: self.number(value) for key, value in terms.items() if value}
+
+    def rounded(self, terms: Mapping[Any, float], sizes: Mapping[Any, float] | None = None) -> Row[N]:
+        """A linear form whose coefficients were computed, with rounding beside themselves or beside larger sizes.
+
+        What is within its rounding is zero.
+        """
+        beside = sizes or {}
+        errors = {key: ROUNDED * max(abs(value), beside.get(key, 0.0)) for key, value in terms.items() if value}
+        return {
+            key: self.number(terms[key], error)
+            for key, error in errors.items()
+            if self.decides or abs(terms[key]) > error
+        }
+
+
+def as_written(value: float) -> Fraction:
+    """The shortest decimal fraction that is read as a float."""
+    return Fraction(repr(float(value)))
+
+
+@final
+class Rational(Field[Fraction]):
+    """ℚ: every decision is right for the numbers as they are read.
+
+    Parameters
+    ----------
+    read
+        The rational number of a float: itself, or for instance `as_written`.
+    """
+
+    __slots__ = ("_read",)
+    one = Fraction(1)
+    decides = True
+
+    def __init__(self, read: Callable[[float], Fraction] = Fraction) -> None:
+        self._read = read
+
+    def number(self, value: float, error: float = 0.0) -> Fraction:
+        """The rational number of a float; ℚ knows no error."""
+        return value if isinstance(value, Fraction) else self._read(value)
+
+    def value(self, number: Fraction) -> float:
+        """The nearest float."""
+        return float(number)
+
+    def quotient(self, number: Fraction, by: Fraction) -> Fraction:
+        """One number by another."""
+        return number / by
+
+    def subtract(self, row: Row[Fraction], factor: Fraction, other: Mapping[Any, Fraction]) -> None:
+        """Row ← row − factor · other."""
+        for variable, value in other.items():
+            left = row.get(variable, 0) - factor * value
+            if left:
+                row[variable] = left
+            else:
+                row.pop(variable, None)
+
+    def opposite(self, one: Fraction, other: Fraction) -> bool:
+        """Whether two numbers are opposite."""
+        return one == -other
+
+    def pivot(self, rows: Sequence[Row[Fraction]], variable: Any) -> int:
+        """The shortest row."""
+        return min(range(len(rows)), key=lambda i: len(rows[i]))
+
+
+Bounded: TypeAlias = tuple[float, float]
+"""A float, and the bound of its error."""
+CLEAR = 1e3
+"""A pivot that is as many times its error bound is clearly not zero."""
+NEAR_ZERO = 0.1
+"""What counts as zero and is smaller than this part of its error bound is clearly rounding."""
+
+
+@final
+class Rounded(Field[Bounded]):
+    """Floats with bounds of their errors (running error analysis).
+
+    Attributes
+    ----------
+    kept
+        Least size of a pivot, as a multiple of its error bound.
+    dropped
+        Largest size of what counted as zero, as a part of its error bound.
+    """
+
+    __slots__ = ("dropped", "kept")
+    one = (1.0, 0.0)
+
+    def __init__(self) -> None:
+        self.kept = np.inf
+        self.dropped = 0.0
+
+    @property
+    def clear(self) -> bool:
+        """Whether no decision was near."""
+        return self.kept >= CLEAR and self.dropped <= NEAR_ZERO
+
+    def number(self, value: float, error: float = 0.0) -> Bounded:
+        """A float and the bound of its error."""
+        return (float(value), error)
+
+    def value(self, number: Bounded) -> float:
+        """The float."""
+        return number[0]
+
+    def quotient(self, number: Bounded, by: Bounded) -> Bounded:
+        """One number by another, which is larger than its error."""
+        (a, da), (b, db) = number, by
+        quotient = a / b
+        size = abs(quotient)
+        return quotient, (da + size * db) / max(abs(b) - db, EPSILON * abs(b)) + EPSILON * size
+
+    def subtract(self, row: Row[Bounded], factor: Bounded, other: Mapping[Any, Bounded]) -> None:
+        """Row ← row − factor · other; what is within its error bound is dropped."""
+        f, df = factor
+        size = abs(f)
+        for variable, (b, db) in other.items():
+            product = f * b
+            a, da = row.get(variable, (0.0, 0.0))
+            left = a - product
+            error = da + size * db + df * (abs(b) + db) + EPSILON * (abs(product) + abs(left))
+            if abs(left) > error:
+                row[variable] = (left, error)
+            elif row.pop(variable, None) is not None and left:
+                self.dropped = max(self.dropped, abs(left) / error)
+
+    def opposite(self, one: Bounded, other: Bounded) -> bool:
+        """Whether two numbers are exactly opposite."""
+        return one[0] == -other[0] and one[1] == other[1] == 0.0
+
+    def pivot(self, rows: Sequence[Row[Bounded]], variable: Any) -> int:
+        """Of the rows in which the variable is large the shortest; sizes are beside those of columns, then of rows."""
+        best = self._best(rows, variable) if len(rows) > 1 else 0
+        value, error = rows[best][variable]
+        if error:
+            self.kept = min(self.kept, abs(value) / error)
+        return best
+
+    def _best(self, rows: Sequence[Row[Bounded]], variable: Any) -> int:
+        columns: dict[Any, float] = {}
+        for row in rows:
+            for key, (value, _) in row.items():
+                columns[key] = max(columns.get(key, 0.0), abs(value))
+        largest = columns[variable]
+        shares = [
+            abs(row[variable][0]) / largest / max(abs(value) / columns[key] for key, (value, _) in row.items())
+            for row in rows
+        ]
+        enough = 0.1 * max(shares)
+        return min((i for i, share in enumerate(shares) if share >= enough), key=lambda i: len(rows[i]))

@@ -1,0 +1,71 @@
+"""The functor F: the relation of a pattern, and gluing by it. This is the definition of composition, and the only one.
+
+F(f) is a relation between variables at the ports of the boxes and at the outer ports of f. To fill boxes is
+
+    (F(f) ∩ ⊕ parts) projected to what is not inside,
+
+whether the parts are relations of components, of systems or of patterns. Hence one formula composes systems,
+substitutes patterns, F(f ∘ g) = F(f) ∘ F(g), and takes a step of time.
+"""
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+from ephs.operad import Path, Pattern, PortType
+from ephs.semantics.meaning.fields import Field, Row
+from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.variables import Variable, at_port, into
+
+Linear: TypeAlias = LinearRelation[Any]
+
+
+def relation_of_pattern(field: Field[Any], pattern: Pattern) -> Linear:
+    """F(f): at each junction flows balance, the outer one counting negative, and efforts are shared."""
+    at: dict[Path, list[tuple[float, Path | None, Path, PortType]]] = {}
+    for box, content in pattern.boxes.items():
+        for port, wire in content.ports.items():
+            if wire.power:
+                at.setdefault(wire.junction, []).append((1.0, box, port, content.interface[port]))
+    for port, described in pattern.interface.items():
+        if described.power:
+            at.setdefault(port, []).append((-1.0, None, port, described))
+    variables: list[Variable] = []
+    rows: list[Row[Any]] = []
+    for ports in at.values():
+        flows, efforts = ([_at(kind, *where) for _, *where in ports] for kind in ("flow", "effort"))
+        signs = [sign for sign, *_ in ports]
+        for i in range(len(flows[0])):
+            rows.append(field.exact({each[i]: sign for sign, each in zip(signs, flows, strict=True)}))
+            rows += [field.exact({efforts[0][i]: 1.0, other[i]: -1.0}) for other in efforts[1:]]
+        for each in (*flows, *efforts):
+            variables += each
+    return LinearRelation.of(field, variables, rows)
+
+
+def _at(kind: str, box: Path | None, port: Path, described: PortType) -> list[Variable]:
+    if box is None:
+        return at_port("outer", kind, port, described.quantity)
+    return at_port("inner", kind, port, described.quantity, box)
+
+
+def filled(whole: Linear, parts: Mapping[Path, Linear]) -> Linear:
+    """Put relations into boxes: (whole ∩ ⊕ parts), without what lies at the filled boxes."""
+    inside = [part.renamed(lambda v, box=box: into(box, v)) for box, part in parts.items()]
+    joined = whole.join(*inside)
+    return joined.without(v for v in joined.variables if v.role == "inner" and v.box in parts)
+
+
+def glued(field: Field[Any], pattern: Pattern, parts: Mapping[Path, Linear]) -> Linear:
+    """(F(f) ∩ ⊕ parts) projected to the outer ports."""
+    return filled(relation_of_pattern(field, pattern), parts)
+
+
+def power(relation: Linear) -> dict[Variable, tuple[Variable, int]]:
+    """The form Σ e f over inner ports less outer ports: each variable's partner and sign."""
+    other = {"flow": "effort", "effort": "flow"}
+    return {v: (v._replace(kind=other[v.kind]), -1 if v.role == "outer" else 1) for v in relation.variables}
+
+
+def is_dirac(relation: Linear) -> bool:
+    """Whether a relation of flows and efforts is its own orthogonal: it makes and loses no power, and is maximal."""
+    return relation.same(relation.orthogonal(power(relation)))

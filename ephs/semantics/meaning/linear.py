@@ -1,0 +1,166 @@
+"""Linear relations between named variables, over a field.
+
+A relation is a conjunction of equations. `join` is ∧: all at once, where variables of one name are one; `without` is ∃:
+some values of the forgotten variables. All that gluing needs is said by these two.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar, final
+
+import numpy as np
+
+from ephs.semantics.bundle import Array
+from ephs.semantics.meaning.elimination import echelon, eliminated, reduced
+from ephs.semantics.meaning.fields import Field, Row
+from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.spaces.decompositions import svd
+from ephs.semantics.spaces.rank import ELIMINATION, rank_of
+
+N = TypeVar("N")
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearRelation(Generic[N]):
+    """A linear subspace of the functions on its variables; affine in the others where `ONE` is one of them.
+
+    Parameters
+    ----------
+    equations
+        Linear forms that vanish, sparse, in no particular order; none is zero.
+    """
+
+    field: Field[N]
+    variables: frozenset[Variable]
+    equations: tuple[Row[N], ...]
+
+    @staticmethod
+    def of(field: Field[N], variables: Iterable[Variable], equations: Iterable[Row[N]] = ()) -> "LinearRelation[N]":
+        """The relation of some equations; without any it is everything."""
+        return LinearRelation(field, frozenset(variables), tuple(row for row in equations if row))
+
+    def join(self, *others: "LinearRelation[N]") -> "LinearRelation[N]":
+        """All at once; variables of one name are one."""
+        variables = self.variables.union(*(each.variables for each in others))
+        return LinearRelation(self.field, variables, sum((each.equations for each in others), self.equations))
+
+    def without(self, forgotten: Iterable[Variable]) -> "LinearRelation[N]":
+        """Some values of the forgotten variables exist."""
+        gone = frozenset(forgotten)
+        rows = eliminated(self.field, self.equations, gone.__contains__)
+        return LinearRelation(self.field, self.variables - gone, tuple(rows))
+
+    def onto(self, kept: Iterable[Variable]) -> "LinearRelation[N]":
+        """The projection on some variables."""
+        return self.without(self.variables.difference(kept))
+
+    def renamed(self, name: Callable[[Variable], Variable]) -> "LinearRelation[N]":
+        """The same with other names, which differ from each other."""
+        new = {variable: name(variable) for variable in self.variables}
+        rows = tuple({new[variable]: number for variable, number in row.items()} for row in self.equations)
+        return LinearRelation(self.field, frozenset(new.values()), rows)
+
+    @property
+    def canonical(self) -> tuple[Row[N], ...]:
+        """The equations in reduced form: over ℚ equal relations have equal ones."""
+        return tuple(reduced(self.field, self.equations, _one_last))
+
+    @property
+    def dimension(self) -> int:
+        """Dimension of the subspace, with that of the constant 1."""
+        return len(self.variables) - len(echelon(self.field, self.equations, lambda _: True))
+
+    @property
+    def empty(self) -> bool:
+        """Whether the constant is 0 in it: nothing satisfies the equations."""
+        return bool(eliminated(self.field, self.equations, ONE.__ne__))
+
+    def within(self, other: "LinearRelation[N]") -> bool:
+        """Whether it implies all equations of the other one."""
+        pivots = echelon(self.field, self.equations, lambda _: True)
+        for given in other.equations:
+            row = dict(given)
+            for variable, pivot in pivots:
+                if variable in row:
+                    factor = self.field.quotient(row[variable], pivot[variable])
+                    self.field.subtract(row, factor, pivot)
+                    row.pop(variable, None)
+            if row:
+                return False
+        return True
+
+    def same(self, other: "LinearRelation[N]") -> bool:
+        """Whether it is the same relation: exact over ℚ, else to the error bounds. Empty ones are the same."""
+        if self.variables != other.variables:
+            return False
+        return (self.within(other) and other.within(self)) or (self.empty and other.empty)
+
+    def solved(self, last: Iterable[Variable] = ()) -> dict[Variable, Row[N]]:
+        """Each variable as a combination of free ones; the ``last`` ones are left free where they can be."""
+        field, late, out = self.field, frozenset(last), dict[Variable, Row[N]]()
+        for variable, row in reversed(echelon(field, self.equations, lambda key: key not in late)):
+            combination: Row[N] = {}
+            for key, number in row.items():
+                if key != variable:
+                    factor = field.quotient(number, row[variable])
+                    field.subtract(combination, factor, out.get(key, {key: field.one}))
+            out[variable] = combination
+        return out | {variable: {variable: field.one} for variable in self.variables - out.keys()}
+
+    def determined(self, given: Iterable[Variable] = ()) -> dict[Variable, Row[N]]:
+        """The variables that the constant and the given ones determine, with how."""
+        known = {ONE, *given}
+        return {variable: row for variable, row in self.solved(last=known).items() if row.keys() <= known}
+
+    def values(self) -> dict[Variable, float]:
+        """The values of the variables that are determined."""
+        found = self.determined().items()
+        return {variable: self.field.value(row[ONE]) if row else 0.0 for variable, row in found}
+
+    def basis(self) -> list[Row[N]]:
+        """Vectors that span it, one for each free variable."""
+        vectors: dict[Variable, Row[N]] = {}
+        for variable, combination in self.solved().items():
+            for free, number in combination.items():
+                vectors.setdefault(free, {})[variable] = number
+        return list(vectors.values())
+
+    def orthogonal(self, partner: Mapping[Variable, tuple[Variable, int]]) -> "LinearRelation[N]":
+        """{y : Σ ± y(partner v) x(v) = 0 for all x}, of the form that pairs variables with their partners."""
+        rows: list[Row[N]] = []
+        for vector in self.basis():
+            row: Row[N] = {}
+            for variable, number in vector.items():
+                other, sign = partner[variable]
+                self.field.subtract(row, self.field.number(float(-sign)), {other: number})
+            rows.append(row)
+        return LinearRelation.of(self.field, self.variables, rows)
+
+    def remainder(self, values: Mapping[Variable, float]) -> float:
+        """The largest remainder of an equation, each of length one, at values of the variables; zero where missing."""
+        order = sorted(self.variables | {ONE})
+        at = np.array([1.0 if variable == ONE else values.get(variable, 0.0) for variable in order])
+        return float(np.abs(self.matrix(order) @ at).max(initial=0.0))
+
+    def matrix(self, order: Sequence[Variable]) -> Array:
+        """The equations (m, n) as rows of length one, in an order of the n variables."""
+        place = {variable: i for i, variable in enumerate(order)}
+        out = np.zeros((len(self.equations), len(place)))
+        for row, terms in zip(out, self.equations, strict=True):
+            for variable, number in terms.items():
+                row[place[variable]] = self.field.value(number)
+        return out / np.linalg.norm(out, axis=1, keepdims=True)
+
+    def projector(self, order: Sequence[Variable]) -> Array:
+        """The orthogonal projector (n, n) on the subspace."""
+        matrix = self.matrix(order)
+        if not matrix.size:
+            return np.eye(len(order))
+        _, sigma, rows = svd(matrix, full_matrices=False)
+        normal = rows[: rank_of(sigma, ELIMINATION)]
+        return np.eye(len(order)) - normal.T @ normal
+
+
+def _one_last(variable: Variable) -> tuple[bool, Variable]:
+    return variable == ONE, variable

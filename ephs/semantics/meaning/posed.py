@@ -1,0 +1,146 @@
+"""Whether a motion exists, and whether there is one: read off the relation of a system.
+
+Flows of irreversible components stay open, since their matrices M(x, e) are not known before the efforts: what
+contradicts without them has no motion whatever they do. The efforts of storages stay open, too, where the *hidden
+equations* are asked for: what the relation says of these efforts alone is a condition on states, which every motion
+keeps, so that its derivative in time holds of the rates.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.bundle import Array
+from ephs.semantics.meaning.base import BasePoint
+from ephs.semantics.meaning.components import own
+from ephs.semantics.meaning.elimination import eliminated
+from ephs.semantics.meaning.fields import Field, Row
+from ephs.semantics.meaning.functor import Linear
+from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.spaces.rank import DIFFERENCE
+
+Labelled: TypeAlias = "tuple[str, Path, Row[Any]]"
+"""What an equation is of: the kind of variables at a junction, or ``component``; where that is; the row."""
+WORDS: Mapping[str, str] = {
+    "flow": "flow balance of junction",
+    "effort": "one effort at junction",
+    "component": "component",
+}
+
+
+class _Fibre(Protocol):
+    def leaves(self) -> Iterator[tuple[Path, Primitive]]: ...
+    def at(self, path: Path, point: BasePoint) -> Linear: ...
+    def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]: ...
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Yes or no, with what says so."""
+
+    holds: bool
+    because: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return self.holds
+
+    def __str__(self) -> str:
+        return ("yes" if self.holds else "no") + "".join(f"; {reason}" for reason in self.because)
+
+
+def possible(fibre: _Fibre, point: BasePoint) -> Answer:
+    """Whether the relation over a point is empty, with the equations whose weighted sum is 1 = 0."""
+    free = replace(point, processes=False)
+    if not fibre.at(Path(), free).empty:
+        return Answer(False)
+    return Answer(True, _certificate(fibre, free))
+
+
+def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
+    """Labels of equations that add up to 1 = 0, each with its weight; each equation has a variable for its label."""
+    field, labels, rows = point.field, dict[Variable, str](), list[Row[Any]]()
+    for number, (kind, path, row) in enumerate(fibre.labelled(Path(), point)):
+        label = Variable("own", "label", path, path, number)
+        labels[label] = f"{WORDS[kind]} {path}"
+        rows.append(row | {label: field.one})
+    left = eliminated(field, rows, lambda variable: variable not in labels and variable != ONE)
+    chosen = min((row for row in left if ONE in row), key=len, default={})
+    weights: dict[str, float] = {}
+    for variable, number in chosen.items():
+        if variable != ONE:
+            share = -field.value(number) / field.value(chosen[ONE])
+            weights[labels[variable]] = weights.get(labels[variable], 0.0) + share
+    return tuple(f"{words} × {weight:.6g}" for words, weight in sorted(weights.items()))
+
+
+def hidden(fibre: _Fibre, point: BasePoint) -> Linear:
+    """What every motion satisfies: equations between the efforts of storages alone."""
+    found = fibre.at(Path(), replace(point, storages=False, processes=False))
+    return found.onto(v for v in found.variables if v.role == "own" and v.kind == "effort")
+
+
+def determined(fibre: _Fibre, point: BasePoint) -> Answer:
+    """Whether outer flows determine all rates: two motions of the same outer flows differ by nothing.
+
+    Differences satisfy the equations without their constants, and H″ of them those of the hidden equations, which last.
+    """
+    field = point.field
+    found = fibre.at(Path(), replace(point, storages=False))
+    zero = {v for v in found.variables if v.kind == "effort" and v.role == "own"} | {
+        v for v in found.variables if v.kind == "flow" and v.role == "outer"
+    }
+    rows = [field_row for row in found.equations if (field_row := {v: n for v, n in row.items() if v not in zero})]
+    whole = LinearRelation.of(field, found.variables - zero, rows).join(_lasting(fibre, point))
+    known = whole.determined()
+    free = sorted({v.path for v in whole.variables if v.kind == "rate" and v not in known})
+    if not free:
+        return Answer(True)
+    loose = sorted({v.path for v in whole.variables if v.kind == "effort" and v not in known})
+    reasons = [f"the rate of {path} is arbitrary" for path in free]
+    reasons += [f"the effort of port {path} is arbitrary" for path in loose]
+    return Answer(False, tuple(reasons))
+
+
+def _lasting(fibre: _Fibre, point: BasePoint) -> Linear:
+    """Hidden equations a·e = 0 last: two rates that both keep them differ by v with a·H″ v = 0."""
+    field, slopes = point.field, dict[Variable, Row[Any]]()
+    equations = hidden(fibre, point).equations
+    for path, storage in fibre.leaves() if equations else ():
+        if isinstance(storage, Storage):
+            x = point.read(path, storage)
+            rates = own("rate", storage.bundle, lambda port, path=path: point.names[path / port])
+            hessian = _slope(lambda v, x=x, of=storage: of.effort(of.retract(x, v), point.reference), len(rates))
+            for effort, row in zip(own("effort", storage.bundle, path.__truediv__), hessian.tolist(), strict=True):
+                slopes[effort] = _differenced(field, rates, row)
+    rows: list[Row[Any]] = []
+    for equation in equations:
+        row: Row[Any] = {}
+        for effort, number in equation.items():
+            field.subtract(row, number, slopes[effort])
+        rows.append(row)
+    return LinearRelation.of(field, {v for row in rows for v in row}, rows)
+
+
+def _differenced(field: Field[Any], names: list[Variable], entries: list[float]) -> Row[Any]:
+    out: Row[Any] = {}
+    for name, entry in zip(names, entries, strict=True):
+        if entry:
+            field.subtract(out, field.number(-1.0), {name: field.number(entry, DIFFERENCE * abs(entry))})
+    return out
+
+
+def _slope(function: Any, size: int) -> Array:
+    """The derivative (n, n) at zero by central differences; what they cannot tell from nothing is zero."""
+    columns: list[Array] = []
+    for i in range(size):
+        shift = DIFFERENCE * np.eye(size)[i]
+        there, back = function(shift), function(-shift)
+        change, noise = there - back, 16.0 * np.finfo(float).eps * (np.abs(there) + np.abs(back))
+        columns.append(np.where(np.abs(change) > noise, change, 0.0) / (2.0 * DIFFERENCE))
+    return np.array(columns).T if columns else np.zeros((0, 0))

@@ -1,0 +1,59 @@
+"""Variables: the numbers that a relation is between, by name.
+
+A relation knows no order of coordinates and no offsets. What two relations call by one name is one number.
+"""
+
+from typing import Literal, NamedTuple, TypeAlias
+
+from ephs.operad import ROOT, Path, Quantity
+
+Role: TypeAlias = Literal["outer", "inner", "own", "one"]
+
+
+class Variable(NamedTuple):
+    """A number of a relation.
+
+    Parameters
+    ----------
+    role
+        ``outer`` at a port of the interface, ``inner`` at a port of an open box, ``own`` inside and named for good by
+        its full path, such as the rate of a state; ``one`` is the constant 1, which makes affine relations linear.
+    kind
+        ``flow``, ``effort``, ``rate`` and others.
+    box
+        Box or component; the root at the interface.
+    port
+        Port of the box, the component or the interface.
+    index
+        Place in the port's vector.
+    """
+
+    role: Role
+    kind: str
+    box: Path
+    port: Path
+    index: int
+
+    @property
+    def path(self) -> Path:
+        """Full path of the port."""
+        return self.box / self.port
+
+    def __str__(self) -> str:
+        return "1" if self.role == "one" else f"{self.kind} {self.path}" + (f"[{self.index}]" if self.index else "")
+
+
+ONE = Variable("one", "one", ROOT, ROOT, 0)
+
+
+def at_port(role: Role, kind: str, port: Path, quantity: Quantity, box: Path = ROOT) -> list[Variable]:
+    """The variables of a vector at a port, in the port's order."""
+    return [Variable(role, kind, box, port, i) for i in range(quantity.space.dim)]
+
+
+def into(box: Path, variable: Variable) -> Variable:
+    """The name that a variable of what fills a box has in the whole: its interface is what the box shows inside."""
+    role, kind, inside, port, index = variable
+    if role == "outer":
+        return Variable("inner", kind, box, port, index)
+    return Variable("inner", kind, box / inside, port, index) if role == "inner" else variable
