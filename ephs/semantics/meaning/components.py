@@ -1,5 +1,6 @@
 """Relations of components: what a primitive says of the variables at its ports, at an instant."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -10,7 +11,6 @@ from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.fields import Field, Row
-from ephs.semantics.meaning.functor import Linear
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable, at_port
 from ephs.semantics.primitives import Primitive, Reversible, Storage
@@ -24,7 +24,7 @@ def at_ports(kind: str, bundle: Bundle) -> list[Variable]:
     return [variable for port, _, quantity in bundle.items() for variable in at_port("outer", kind, port, quantity)]
 
 
-def at_instant(primitive: Primitive, path: Path, point: BasePoint) -> Linear:
+def at_instant(primitive: Primitive, path: Path, point: BasePoint) -> LinearRelation:
     """The relation of the component at this path of the whole system, over a point of the base.
 
     A storage: rate = f, e = dH(x). Others: f = A e + Cᵀ λ, 0 = C e, with λ inside.
@@ -53,10 +53,14 @@ def at_instant(primitive: Primitive, path: Path, point: BasePoint) -> Linear:
     return process(field, bundle, matrix, np.zeros((0, bundle.size)))
 
 
-def _storage(storage: Storage, path: Path, point: BasePoint) -> Linear:
+def _storage(storage: Storage, path: Path, point: BasePoint) -> LinearRelation:
     field, bundle = point.field, storage.bundle
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
-    rates = own("rate", bundle, lambda port: point.names[path / port])
+
+    def state(port: Path) -> Path:
+        return point.names[path / port]
+
+    rates = own("rate", bundle, state)
     rows = [field.exact({rate: 1.0, flow: -1.0}) for rate, flow in zip(rates, flows, strict=True)]
     if not point.storages:
         known = own("effort", bundle, path.__truediv__)
@@ -68,7 +72,7 @@ def _storage(storage: Storage, path: Path, point: BasePoint) -> Linear:
     return LinearRelation.of(field, [*rates, *flows, *efforts, ONE], rows)
 
 
-def own(kind: str, bundle: Bundle, name: Any) -> list[Variable]:
+def own(kind: str, bundle: Bundle, name: Callable[[Path], Path]) -> list[Variable]:
     """The variables inside that belong to the ports, by what names a port's path has there."""
     return [
         Variable("own", kind, ROOT, name(port), i)
@@ -77,7 +81,7 @@ def own(kind: str, bundle: Bundle, name: Any) -> list[Variable]:
     ]
 
 
-def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> Linear:
+def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> LinearRelation:
     """f = A e + Cᵀ λ, 0 = C e; numbers are rounded beside the largest of the same units."""
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
     multipliers = [Variable("inner", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]

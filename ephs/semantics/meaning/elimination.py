@@ -89,7 +89,7 @@ def _substituted(field: Field[N], rows: Sequence[Row[N]], gone: Sequence[bool]) 
 
     rest: list[Row[N]] = []
     for row in rows:
-        if len(row) == 2 and field.opposite(*row.values()):
+        if len(row) == 2 and _opposite(field, row):
             x, y = map(leader, row)
             if x == y:
                 continue
@@ -110,6 +110,11 @@ def _substituted(field: Field[N], rows: Sequence[Row[N]], gone: Sequence[bool]) 
                 new[j] = number
         rest[place] = new
     return rest
+
+
+def _opposite(field: Field[N], row: Row[N]) -> bool:
+    one, other = row.values()
+    return field.opposite(one, other)
 
 
 def _pivoted(

@@ -16,12 +16,13 @@ from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import Variable, at_port, into
 
-Linear: TypeAlias = LinearRelation[Any]
+_Port: TypeAlias = tuple[float, Path | None, Path, PortType]
+"""Sign of its flow in the balance, box or None at the interface, port and what it is."""
 
 
-def relation_of_pattern(field: Field[Any], pattern: Pattern) -> Linear:
+def relation_of_pattern(field: Field[Any], pattern: Pattern) -> LinearRelation:
     """F(f): at each junction flows balance, the outer one counting negative, and efforts are shared."""
-    at: dict[Path, list[tuple[float, Path | None, Path, PortType]]] = {}
+    at: dict[Path, list[_Port]] = {}
     for box, content in pattern.boxes.items():
         for port, wire in content.ports.items():
             if wire.power:
@@ -32,7 +33,7 @@ def relation_of_pattern(field: Field[Any], pattern: Pattern) -> Linear:
     variables: list[Variable] = []
     rows: list[Row[Any]] = []
     for ports in at.values():
-        flows, efforts = ([_at(kind, *where) for _, *where in ports] for kind in ("flow", "effort"))
+        flows, efforts = ([_at(kind, *where) for where in ports] for kind in ("flow", "effort"))
         signs = [sign for sign, *_ in ports]
         for i in range(len(flows[0])):
             rows.append(field.exact({each[i]: sign for sign, each in zip(signs, flows, strict=True)}))
@@ -42,30 +43,31 @@ def relation_of_pattern(field: Field[Any], pattern: Pattern) -> Linear:
     return LinearRelation.of(field, variables, rows)
 
 
-def _at(kind: str, box: Path | None, port: Path, described: PortType) -> list[Variable]:
+def _at(kind: str, where: _Port) -> list[Variable]:
+    _, box, port, described = where
     if box is None:
         return at_port("outer", kind, port, described.quantity)
     return at_port("inner", kind, port, described.quantity, box)
 
 
-def filled(whole: Linear, parts: Mapping[Path, Linear]) -> Linear:
+def filled(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """Put relations into boxes: (whole ∩ ⊕ parts), without what lies at the filled boxes."""
     inside = [part.renamed(lambda v, box=box: into(box, v)) for box, part in parts.items()]
     joined = whole.join(*inside)
     return joined.without(v for v in joined.variables if v.role == "inner" and v.box in parts)
 
 
-def glued(field: Field[Any], pattern: Pattern, parts: Mapping[Path, Linear]) -> Linear:
+def glued(field: Field[Any], pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """(F(f) ∩ ⊕ parts) projected to the outer ports."""
     return filled(relation_of_pattern(field, pattern), parts)
 
 
-def power(relation: Linear) -> dict[Variable, tuple[Variable, int]]:
+def power(relation: LinearRelation) -> dict[Variable, tuple[Variable, int]]:
     """The form Σ e f over inner ports less outer ports: each variable's partner and sign."""
     other = {"flow": "effort", "effort": "flow"}
     return {v: (v._replace(kind=other[v.kind]), -1 if v.role == "outer" else 1) for v in relation.variables}
 
 
-def is_dirac(relation: Linear) -> bool:
+def is_dirac(relation: LinearRelation) -> bool:
     """Whether a relation of flows and efforts is its own orthogonal: it makes and loses no power, and is maximal."""
     return relation.same(relation.orthogonal(power(relation)))

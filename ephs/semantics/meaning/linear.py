@@ -6,7 +6,7 @@ some values of the forgotten variables. All that gluing needs is said by these t
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar, final
+from typing import Any, final
 
 import numpy as np
 
@@ -17,12 +17,10 @@ from ephs.semantics.meaning.variables import ONE, Variable
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, rank_of
 
-N = TypeVar("N")
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class LinearRelation(Generic[N]):
+class LinearRelation:
     """A linear subspace of the functions on its variables; affine in the others where `ONE` is one of them.
 
     Parameters
@@ -31,38 +29,38 @@ class LinearRelation(Generic[N]):
         Linear forms that vanish, sparse, in no particular order; none is zero.
     """
 
-    field: Field[N]
+    field: Field[Any]
     variables: frozenset[Variable]
-    equations: tuple[Row[N], ...]
+    equations: tuple[Row[Any], ...]
 
     @staticmethod
-    def of(field: Field[N], variables: Iterable[Variable], equations: Iterable[Row[N]] = ()) -> "LinearRelation[N]":
+    def of(field: Field[Any], variables: Iterable[Variable], equations: Iterable[Row[Any]] = ()) -> "LinearRelation":
         """The relation of some equations; without any it is everything."""
         return LinearRelation(field, frozenset(variables), tuple(row for row in equations if row))
 
-    def join(self, *others: "LinearRelation[N]") -> "LinearRelation[N]":
+    def join(self, *others: "LinearRelation") -> "LinearRelation":
         """All at once; variables of one name are one."""
         variables = self.variables.union(*(each.variables for each in others))
         return LinearRelation(self.field, variables, sum((each.equations for each in others), self.equations))
 
-    def without(self, forgotten: Iterable[Variable]) -> "LinearRelation[N]":
+    def without(self, forgotten: Iterable[Variable]) -> "LinearRelation":
         """Some values of the forgotten variables exist."""
         gone = frozenset(forgotten)
         rows = eliminated(self.field, self.equations, gone.__contains__)
         return LinearRelation(self.field, self.variables - gone, tuple(rows))
 
-    def onto(self, kept: Iterable[Variable]) -> "LinearRelation[N]":
+    def onto(self, kept: Iterable[Variable]) -> "LinearRelation":
         """The projection on some variables."""
         return self.without(self.variables.difference(kept))
 
-    def renamed(self, name: Callable[[Variable], Variable]) -> "LinearRelation[N]":
+    def renamed(self, name: Callable[[Variable], Variable]) -> "LinearRelation":
         """The same with other names, which differ from each other."""
         new = {variable: name(variable) for variable in self.variables}
         rows = tuple({new[variable]: number for variable, number in row.items()} for row in self.equations)
         return LinearRelation(self.field, frozenset(new.values()), rows)
 
     @property
-    def canonical(self) -> tuple[Row[N], ...]:
+    def canonical(self) -> tuple[Row[Any], ...]:
         """The equations in reduced form: over ℚ equal relations have equal ones."""
         return tuple(reduced(self.field, self.equations, _one_last))
 
@@ -76,7 +74,7 @@ class LinearRelation(Generic[N]):
         """Whether the constant is 0 in it: nothing satisfies the equations."""
         return bool(eliminated(self.field, self.equations, ONE.__ne__))
 
-    def within(self, other: "LinearRelation[N]") -> bool:
+    def within(self, other: "LinearRelation") -> bool:
         """Whether it implies all equations of the other one."""
         pivots = echelon(self.field, self.equations, lambda _: True)
         for given in other.equations:
@@ -90,17 +88,17 @@ class LinearRelation(Generic[N]):
                 return False
         return True
 
-    def same(self, other: "LinearRelation[N]") -> bool:
+    def same(self, other: "LinearRelation") -> bool:
         """Whether it is the same relation: exact over ℚ, else to the error bounds. Empty ones are the same."""
         if self.variables != other.variables:
             return False
         return (self.within(other) and other.within(self)) or (self.empty and other.empty)
 
-    def solved(self, last: Iterable[Variable] = ()) -> dict[Variable, Row[N]]:
+    def solved(self, last: Iterable[Variable] = ()) -> dict[Variable, Row[Any]]:
         """Each variable as a combination of free ones; the ``last`` ones are left free where they can be."""
-        field, late, out = self.field, frozenset(last), dict[Variable, Row[N]]()
+        field, late, out = self.field, frozenset(last), dict[Variable, Row[Any]]()
         for variable, row in reversed(echelon(field, self.equations, lambda key: key not in late)):
-            combination: Row[N] = {}
+            combination: Row[Any] = {}
             for key, number in row.items():
                 if key != variable:
                     factor = field.quotient(number, row[variable])
@@ -108,7 +106,7 @@ class LinearRelation(Generic[N]):
             out[variable] = combination
         return out | {variable: {variable: field.one} for variable in self.variables - out.keys()}
 
-    def determined(self, given: Iterable[Variable] = ()) -> dict[Variable, Row[N]]:
+    def determined(self, given: Iterable[Variable] = ()) -> dict[Variable, Row[Any]]:
         """The variables that the constant and the given ones determine, with how."""
         known = {ONE, *given}
         return {variable: row for variable, row in self.solved(last=known).items() if row.keys() <= known}
@@ -118,19 +116,19 @@ class LinearRelation(Generic[N]):
         found = self.determined().items()
         return {variable: self.field.value(row[ONE]) if row else 0.0 for variable, row in found}
 
-    def basis(self) -> list[Row[N]]:
+    def basis(self) -> list[Row[Any]]:
         """Vectors that span it, one for each free variable."""
-        vectors: dict[Variable, Row[N]] = {}
+        vectors: dict[Variable, Row[Any]] = {}
         for variable, combination in self.solved().items():
             for free, number in combination.items():
                 vectors.setdefault(free, {})[variable] = number
         return list(vectors.values())
 
-    def orthogonal(self, partner: Mapping[Variable, tuple[Variable, int]]) -> "LinearRelation[N]":
+    def orthogonal(self, partner: Mapping[Variable, tuple[Variable, int]]) -> "LinearRelation":
         """{y : Σ ± y(partner v) x(v) = 0 for all x}, of the form that pairs variables with their partners."""
-        rows: list[Row[N]] = []
+        rows: list[Row[Any]] = []
         for vector in self.basis():
-            row: Row[N] = {}
+            row: Row[Any] = {}
             for variable, number in vector.items():
                 other, sign = partner[variable]
                 self.field.subtract(row, self.field.number(float(-sign)), {other: number})

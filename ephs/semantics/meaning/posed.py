@@ -17,8 +17,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.components import own
 from ephs.semantics.meaning.elimination import eliminated
-from ephs.semantics.meaning.fields import Field, Row
-from ephs.semantics.meaning.functor import Linear
+from ephs.semantics.meaning.fields import Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable
 from ephs.semantics.primitives import Primitive, Storage
@@ -35,7 +34,7 @@ WORDS: Mapping[str, str] = {
 
 class _Fibre(Protocol):
     def leaves(self) -> Iterator[tuple[Path, Primitive]]: ...
-    def at(self, path: Path, point: BasePoint) -> Linear: ...
+    def at(self, path: Path, point: BasePoint) -> LinearRelation: ...
     def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]: ...
 
 
@@ -64,7 +63,8 @@ def possible(fibre: _Fibre, point: BasePoint) -> Answer:
 
 def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
     """Labels of equations that add up to 1 = 0, each with its weight; each equation has a variable for its label."""
-    field, labels, rows = point.field, dict[Variable, str](), list[Row[Any]]()
+    field, labels = point.field, dict[Variable, str]()
+    rows: list[Row[Any]] = []
     for number, (kind, path, row) in enumerate(fibre.labelled(Path(), point)):
         label = Variable("own", "label", path, path, number)
         labels[label] = f"{WORDS[kind]} {path}"
@@ -79,7 +79,7 @@ def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
     return tuple(f"{words} × {weight:.6g}" for words, weight in sorted(weights.items()))
 
 
-def hidden(fibre: _Fibre, point: BasePoint) -> Linear:
+def hidden(fibre: _Fibre, point: BasePoint) -> LinearRelation:
     """What every motion satisfies: equations between the efforts of storages alone."""
     found = fibre.at(Path(), replace(point, storages=False, processes=False))
     return found.onto(v for v in found.variables if v.role == "own" and v.kind == "effort")
@@ -90,13 +90,12 @@ def determined(fibre: _Fibre, point: BasePoint) -> Answer:
 
     Differences satisfy the equations without their constants, and H″ of them those of the hidden equations, which last.
     """
-    field = point.field
     found = fibre.at(Path(), replace(point, storages=False))
     zero = {v for v in found.variables if v.kind == "effort" and v.role == "own"} | {
         v for v in found.variables if v.kind == "flow" and v.role == "outer"
     }
-    rows = [field_row for row in found.equations if (field_row := {v: n for v, n in row.items() if v not in zero})]
-    whole = LinearRelation.of(field, found.variables - zero, rows).join(_lasting(fibre, point))
+    rows = [{v: number for v, number in row.items() if v not in zero} for row in found.equations]
+    whole = LinearRelation.of(point.field, found.variables - zero, rows).join(_lasting(fibre, point))
     known = whole.determined()
     free = sorted({v.path for v in whole.variables if v.kind == "rate" and v not in known})
     if not free:
@@ -107,32 +106,42 @@ def determined(fibre: _Fibre, point: BasePoint) -> Answer:
     return Answer(False, tuple(reasons))
 
 
-def _lasting(fibre: _Fibre, point: BasePoint) -> Linear:
+def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
     """Hidden equations a·e = 0 last: two rates that both keep them differ by v with a·H″ v = 0."""
-    field, slopes = point.field, dict[Variable, Row[Any]]()
     equations = hidden(fibre, point).equations
+    slopes: dict[Variable, Row[Any]] = {}
     for path, storage in fibre.leaves() if equations else ():
         if isinstance(storage, Storage):
-            x = point.read(path, storage)
-            rates = own("rate", storage.bundle, lambda port, path=path: point.names[path / port])
-            hessian = _slope(lambda v, x=x, of=storage: of.effort(of.retract(x, v), point.reference), len(rates))
-            for effort, row in zip(own("effort", storage.bundle, path.__truediv__), hessian.tolist(), strict=True):
-                slopes[effort] = _differenced(field, rates, row)
+            slopes |= _slopes(storage, path, point)
     rows: list[Row[Any]] = []
     for equation in equations:
         row: Row[Any] = {}
         for effort, number in equation.items():
-            field.subtract(row, number, slopes[effort])
+            point.field.subtract(row, number, slopes[effort])
         rows.append(row)
-    return LinearRelation.of(field, {v for row in rows for v in row}, rows)
+    return LinearRelation.of(point.field, {v for row in rows for v in row}, rows)
 
 
-def _differenced(field: Field[Any], names: list[Variable], entries: list[float]) -> Row[Any]:
-    out: Row[Any] = {}
-    for name, entry in zip(names, entries, strict=True):
-        if entry:
-            field.subtract(out, field.number(-1.0), {name: field.number(entry, DIFFERENCE * abs(entry))})
-    return out
+def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Row[Any]]:
+    """H″ by rows: of each effort at a storage's ports, minus its change with the rates of the states."""
+
+    def state(port: Path) -> Path:
+        return point.names[path / port]
+
+    def effort(v: Array) -> Array:
+        return storage.effort(storage.retract(point.read(path, storage), v), point.reference)
+
+    rates = own("rate", storage.bundle, state)
+    hessian = _slope(effort, len(rates)).tolist()
+    efforts = own("effort", storage.bundle, path.__truediv__)
+    return {
+        name: {
+            rate: point.field.number(-entry, DIFFERENCE * abs(entry))
+            for rate, entry in zip(rates, row, strict=True)
+            if entry
+        }
+        for name, row in zip(efforts, hessian, strict=True)
+    }
 
 
 def _slope(function: Any, size: int) -> Array:

@@ -21,7 +21,7 @@ from ephs.semantics.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.meaning.base import BasePoint, StateClass, Values, component_classes, glued_classes, names_of, place
 from ephs.semantics.meaning.components import at_instant, at_ports, own
 from ephs.semantics.meaning.fields import Field, Rational, Rounded
-from ephs.semantics.meaning.functor import Linear, glued, relation_of_pattern
+from ephs.semantics.meaning.functor import glued, relation_of_pattern
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
 from ephs.semantics.meaning.variables import ONE, Variable, into
@@ -34,13 +34,13 @@ FIELDS: Mapping[str, Any] = {"float": Rounded, "rational": Rational}
 
 
 class Fibre(Protocol):
-    """Linear relation over a point of the base."""
+    """LinearRelation relation over a point of the base."""
 
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         """The primitives with their full paths."""
         ...
 
-    def at(self, path: Path, point: BasePoint) -> Linear:
+    def at(self, path: Path, point: BasePoint) -> LinearRelation:
         """The relation over a point, for the part at this path of the point's system."""
         ...
 
@@ -173,10 +173,10 @@ class Instant:
     relation: Relation
     point: BasePoint
     contradiction: str = ""
-    _found: list[Linear] = field(default_factory=list[Linear], init=False, repr=False)
+    _found: list[LinearRelation] = field(default_factory=list[LinearRelation], init=False, repr=False)
 
     @property
-    def linear(self) -> Linear:
+    def linear(self) -> LinearRelation:
         """Equations between rates, outer flows, outer efforts and the constant 1; computed once."""
         if not self._found:
             found = self._at(self.point).onto(self.order)
@@ -185,7 +185,7 @@ class Instant:
             self._found.append(LinearRelation.of(found.field, variables, equations))
         return self._found[0]
 
-    def _at(self, point: BasePoint) -> Linear:
+    def _at(self, point: BasePoint) -> LinearRelation:
         return self.relation.fibre.at(ROOT, point)
 
     @property
@@ -267,7 +267,7 @@ class _Component:
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         yield ROOT, self.primitive
 
-    def at(self, path: Path, point: BasePoint) -> Linear:
+    def at(self, path: Path, point: BasePoint) -> LinearRelation:
         return at_instant(self.primitive, path, point)
 
     def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]:
@@ -286,7 +286,7 @@ class _Glued:
             for path, primitive in part.leaves():
                 yield box / path, primitive
 
-    def at(self, path: Path, point: BasePoint) -> Linear:
+    def at(self, path: Path, point: BasePoint) -> LinearRelation:
         return glued(point.field, self.pattern, {box: part.at(path / box, point) for box, part in self.parts.items()})
 
     def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]:
@@ -327,7 +327,7 @@ class Renamed:
                 efforts[old] = point.efforts[new]
         return replace(point, states=states, names=names, efforts=efforts)
 
-    def at(self, path: Path, point: BasePoint) -> Linear:
+    def at(self, path: Path, point: BasePoint) -> LinearRelation:
         """The relation over a point."""
         return self.relation.fibre.at(path, self._before(path, point))
 

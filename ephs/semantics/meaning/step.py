@@ -6,7 +6,7 @@ know that time is discrete, nor at how many levels the system is written.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
@@ -19,7 +19,7 @@ from ephs.semantics.errors import SemanticsError
 from ephs.semantics.meaning.base import Values, names_of, place
 from ephs.semantics.meaning.components import at_ports, own
 from ephs.semantics.meaning.fields import Field, Rounded, Row
-from ephs.semantics.meaning.functor import Linear, glued
+from ephs.semantics.meaning.functor import glued
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.relation import relation_of
 from ephs.semantics.meaning.variables import ONE, Variable, at_port
@@ -53,6 +53,8 @@ class Solved:
         Efforts (n,) at the ports of each irreversible component, by its path.
     residual
         Largest remainder of an equation of length one; infinite where no guess has one.
+    rounding
+        Bound of the rates' errors from rounding, by running error analysis; zero where they are not determined.
     """
 
     rates: Mapping[Path, Array]
@@ -60,6 +62,7 @@ class Solved:
     outer: Mapping[Path, tuple[Array, Array]]
     efforts: Mapping[Path, Array]
     residual: float
+    rounding: float = 0.0
 
 
 def solved(
@@ -86,55 +89,59 @@ def solved(
     names = {path: name for path, name in names_of(classes).items() if any(c.stores for c in classes if c.name == name)}
     given = _prescribed(system.interface, inputs or {})
 
-    def tangents(guess: Guess) -> Linear:
-        def leaf(path: Path, primitive: Primitive) -> Linear:
-            return tangent(primitive, path, states, names, behaviour, guess)
+    slopes: dict[Path, Array] = {}
+
+    def tangents(guess: Guess, fresh: bool) -> LinearRelation:
+        def leaf(path: Path, primitive: Primitive) -> LinearRelation:
+            return tangent(primitive, path, states, names, behaviour, guess, slopes)
 
         field = Rounded()
+        if fresh:
+            slopes.clear()
         return fold(system, leaf, lambda pattern, parts: glued(field, pattern, parts)).join(given)
 
     guess, residual = newton(tangents)
-    return _solution(as_system(system), names, guess, residual)
+    rounding = _rounding(tangents(guess, False)) if np.isfinite(residual) else 0.0
+    return replace(_solution(as_system(system), names, guess, residual), rounding=rounding)
 
 
-def newton(tangents: Callable[[Guess], Linear]) -> tuple[Guess, float]:
+def newton(tangents: Callable[[Guess, bool], LinearRelation]) -> tuple[Guess, float]:
     """Newton's method on the tangents of a relation, from zero, run to stagnation: the best guess and its remainder.
 
     The Jacobians' error slows the last digits by a factor of about 1e-7 a step and limits nothing.
+
+    Parameters
+    ----------
+    tangents
+        (guess, whether slopes are to be of this guess, too, or may be those of the last one that asked so).
     """
     guess: Guess = {}
-    relation, best = _tried(tangents, guess)
+    before, best = np.inf, _error(tangents, guess, fresh=True)
     for _ in range(ITERATIONS):
-        if relation is None:
+        if best in (0.0, np.inf) or (best < SOLVED and best > 0.5 * before):
             break
-        target, share = _nearest(relation, guess), 1.0
-        new, error = _tried(tangents, target)
+        target, share = _nearest(tangents(guess, False), guess), 1.0
+        error, new = _error(tangents, target), target
         # far from the solution a full step may increase the remainder; near it only rounding remains
         while not error < best and best > NEAR and share > 1e-3:
             share *= 0.5
-            between = {v: (1.0 - share) * guess.get(v, 0.0) + share * value for v, value in target.items()}
-            new, error = _tried(tangents, between)
-            if error < best:
-                target = between
+            new = {v: (1.0 - share) * guess.get(v, 0.0) + share * value for v, value in target.items()}
+            error = _error(tangents, new)
         if not error < best:
             break
-        progress, best = error / best, error
-        guess, relation = target, new
-        if error == 0.0 or (progress > 0.5 and error < SOLVED):
-            break
+        guess, before, best = new, best, _error(tangents, new, fresh=True)
     return guess, best
 
 
-def _tried(tangents: Callable[[Guess], Linear], guess: Guess) -> tuple[Linear | None, float]:
-    """The tangent at a guess and the remainder there, infinite outside the domain of a component."""
+def _error(tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, *, fresh: bool = False) -> float:
+    """The remainder at a guess, infinite outside the domain of a component."""
     try:
-        relation = tangents(guess)
+        return tangents(guess, fresh).remainder(guess)
     except SemanticsError:
-        return None, np.inf
-    return relation, relation.remainder(guess)
+        return np.inf
 
 
-def _nearest(relation: Linear, guess: Guess) -> Guess:
+def _nearest(relation: LinearRelation, guess: Guess) -> Guess:
     """The solution of a tangent; where it has none or many, what contradicts least and is nearest to the guess."""
     if not relation.empty:
         found = relation.values()
@@ -154,10 +161,16 @@ def tangent(
     names: Mapping[Path, Path],
     behaviour: Continuous | Natural,
     guess: Guess,
-) -> Linear:
+    slopes: dict[Path, Array],
+) -> LinearRelation:
     """The affine relation that touches a component's own one at a guess.
 
     What it is linearised in keeps a name for good, so that the next guess can be read off the whole.
+
+    Parameters
+    ----------
+    slopes
+        Derivatives by component; those that are missing are found, and added.
     """
     field, bundle = Rounded(), primitive.bundle
     local = behaviour.behaviour(primitive, {port: states[path / port] for port in primitive.reads})
@@ -167,7 +180,7 @@ def tangent(
     rates = [Variable("own", "rate", ROOT, names[path / port], i) for port in moving for i in range(sizes[port])]
     if isinstance(local, Storing):
         rows = [field.exact({rate: 1.0, flow: -1.0}) for rate, flow in zip(rates, flows, strict=True)]
-        rows += _touching(field, local.effort, rates, efforts, guess)
+        rows += _touching(field, local.effort, rates, efforts, guess, slopes, path)
         return LinearRelation.of(field, [*flows, *efforts, *rates, ONE], rows)
     here = own("effort", bundle, path.__truediv__)
     count = primitive.multipliers if isinstance(primitive, Reversible) else 0
@@ -182,7 +195,7 @@ def tangent(
         return _related(local, e, lam, known)
 
     rows = [field.exact({effort: 1.0, name: -1.0}) for effort, name in zip(efforts, here, strict=True)]
-    rows += _touching(field, evaluate, [*here, *multipliers, *rates], [*flows, *conditions], guess)
+    rows += _touching(field, evaluate, [*here, *multipliers, *rates], [*flows, *conditions], guess, slopes, path)
     return LinearRelation.of(field, [*flows, *efforts, *here, *multipliers, *rates, ONE], rows)
 
 
@@ -197,11 +210,26 @@ def _touching(
     arguments: list[Variable],
     results: list[Any],
     guess: Guess,
+    slopes: dict[Path, Array],
+    path: Path,
 ) -> list[Row[Any]]:
-    """y = f(z⁰) + f′(z⁰)(z − z⁰) by central differences; a result that is None is zero."""
+    """y = f(z⁰) + f′(z − z⁰); a result that is None is zero."""
     at = np.array([guess.get(v, 0.0) for v in arguments])
     value = np.asarray(function(at), dtype=float)
-    jacobian = np.zeros((value.size, at.size))
+    if path not in slopes:
+        slopes[path] = _differenced(function, at, value.size)
+    jacobian = slopes[path]
+    constant = value - jacobian @ at
+    rows: list[Row[Any]] = []
+    for name, entries, number in zip(results, jacobian.tolist(), constant.tolist(), strict=True):
+        row = field.rounded(dict(zip(arguments, entries, strict=True))) | field.rounded({ONE: number})
+        rows.append(row if name is None else row | field.exact({name: -1.0}))
+    return rows
+
+
+def _differenced(function: Callable[[Array], Array], at: Array, size: int) -> Array:
+    """The derivative (size, n) at a point (n,) by central differences; rounding of their terms is zero."""
+    jacobian = np.zeros((size, at.size))
     for i in range(at.size):
         delta = DIFFERENCE * max(1.0, abs(float(at[i])))
         up, down = at.copy(), at.copy()
@@ -210,15 +238,18 @@ def _touching(
         there, back = function(up), function(down)
         noise = np.finfo(float).eps * (np.abs(there) + np.abs(back))
         jacobian[:, i] = np.where(np.abs(there - back) > 4.0 * noise, there - back, 0.0) / (2.0 * delta)
-    constant = value - jacobian @ at
-    rows: list[Row[Any]] = []
-    for name, slopes, number in zip(results, jacobian.tolist(), constant.tolist(), strict=True):
-        row = field.rounded(dict(zip(arguments, slopes, strict=True))) | field.rounded({ONE: number})
-        rows.append(row if name is None else row | field.exact({name: -1.0}))
-    return rows
+    return jacobian
 
 
-def _prescribed(interface: Any, inputs: Mapping[Path, Input]) -> Linear:
+def _rounding(relation: LinearRelation) -> float:
+    """The largest error bound of a rate that a tangent determines."""
+    if relation.empty:
+        return 0.0
+    found = relation.determined().items()
+    return max((row[ONE][1] for variable, row in found if variable.kind == "rate" and row), default=0.0)
+
+
+def _prescribed(interface: Any, inputs: Mapping[Path, Input]) -> LinearRelation:
     """The flow or effort that is given at each outer power port."""
     field, rows, variables = Rounded(), list[Row[Any]](), {ONE}
     for port, _, quantity in Bundle.of(interface).items():

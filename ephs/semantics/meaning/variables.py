@@ -24,7 +24,7 @@ class Variable(NamedTuple):
         Box or component; the root at the interface.
     port
         Port of the box, the component or the interface.
-    index
+    place
         Place in the port's vector.
     """
 
@@ -32,7 +32,7 @@ class Variable(NamedTuple):
     kind: str
     box: Path
     port: Path
-    index: int
+    place: int
 
     @property
     def path(self) -> Path:
@@ -40,7 +40,7 @@ class Variable(NamedTuple):
         return self.box / self.port
 
     def __str__(self) -> str:
-        return "1" if self.role == "one" else f"{self.kind} {self.path}" + (f"[{self.index}]" if self.index else "")
+        return "1" if self.role == "one" else f"{self.kind} {self.path}" + (f"[{self.place}]" if self.place else "")
 
 
 ONE = Variable("one", "one", ROOT, ROOT, 0)
@@ -53,7 +53,7 @@ def at_port(role: Role, kind: str, port: Path, quantity: Quantity, box: Path = R
 
 def into(box: Path, variable: Variable) -> Variable:
     """The name that a variable of what fills a box has in the whole: its interface is what the box shows inside."""
-    role, kind, inside, port, index = variable
+    role, kind, inside, port, place = variable
     if role == "outer":
-        return Variable("inner", kind, box, port, index)
-    return Variable("inner", kind, box / inside, port, index) if role == "inner" else variable
+        return Variable("inner", kind, box, port, place)
+    return Variable("inner", kind, box / inside, port, place) if role == "inner" else variable
