@@ -1,0 +1,78 @@
+"""The relation of a system, by either route, is what one stack of all equations says."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ephs.operad import Directory, PortType
+from ephs.semantics import Irreversible, Reference, Storage
+from ephs.semantics.bundle import Bundle
+from ephs.semantics.checks import random_point
+from ephs.semantics.spaces.rank import APART, PROJECTOR
+from ephs.testing import fillings, nestings, systems
+from tests.semantics.stacked import components_of, path_of, stacked, states_of
+
+REFERENCE = Reference(293.15, 300.0)
+patient = settings(suppress_health_check=list(HealthCheck), max_examples=30)
+DRAWN = {
+    "systems": systems(),
+    "systems that are not posed": systems(posed=False),
+    "fillings": nestings(max_depth=4, max_boxes=2).flatmap(fillings),
+}
+
+
+def drawn_point(system, rng):
+    """A value for each state, by all ports that have it, and by one of them: of a component, else an outer one."""
+    parts, values, state, ports = dict(components_of(system)), {}, {}, {}
+    for group in states_of(system):
+        inner = sorted((boxes, port) for boxes, port in group if boxes and port in parts[boxes].reads)
+        nodes = inner or sorted(node for node in group if not node[0])
+        if nodes:
+            boxes, port = nodes[rng.integers(len(nodes))]
+            whole = parts[boxes] if boxes else system
+            layout = Bundle.of(Directory({port: PortType(whole.interface[port].quantity)}))
+            value = random_point(layout, layout.ports, rng)[port]
+            values |= dict.fromkeys(group, value)
+            (state if inner else ports)[path_of(boxes, port)] = value
+    return values, state, ports
+
+
+def drawn_efforts(system, rng):
+    """Arguments of the Onsager matrices, by component's boxes."""
+    found = {}
+    for boxes, part in components_of(system):
+        if isinstance(part, Irreversible):
+            size = part.bundle.size
+            hot = part.bundle.indicator("entropy") == 1.0
+            found[boxes] = np.where(hot, rng.uniform(-30.0, 30.0, size), rng.standard_normal(size))
+    return found
+
+
+def stored_twice(system):
+    parts = dict(components_of(system))
+    return any(sum(isinstance(parts.get(boxes), Storage) for boxes, _ in group) > 1 for group in states_of(system))
+
+
+def check_stacked(system, seed, *routes):
+    rng = np.random.default_rng(seed)
+    values, state, ports = drawn_point(system, rng)
+    efforts = drawn_efforts(system, rng)
+    by_path = {path_of(boxes): e for boxes, e in efforts.items()}
+    for route in routes:
+        found = system.relation(REFERENCE, route=route).at(state, ports, efforts=by_path)
+        basis, condition = stacked(
+            system, lambda *node: values[node], efforts=efforts, reference=REFERENCE, unit=found.unit
+        )
+        assert found.dimension == basis.shape[1], route
+        apart = np.abs(found.projector - basis @ basis.T).max(initial=0.0)
+        assert apart <= min(APART, PROJECTOR * max(10.0, condition)), route
+
+
+@pytest.mark.parametrize("strategy", DRAWN)
+@patient
+@given(st.data(), st.integers(0, 2**16))
+def test_both_routes_give_the_relation_of_the_stack(strategy, data, seed):
+    """States that two storages have are left out: here these have one rate, in the relation each its own."""
+    system = data.draw(DRAWN[strategy].filter(lambda s: not stored_twice(s)))
+    check_stacked(system, seed, "nested", "flat")
