@@ -80,7 +80,7 @@ def _numbered(rows: Iterable[Row[N]]) -> tuple[list[Any], list[Row[N]]]:
 
 def _substituted(field: Field[N], rows: Sequence[Row[N]], gone: Sequence[bool]) -> list[Row[N]]:
     """Carry out the equations x = y: a forgotten variable is written as the other one."""
-    above = list(range(len(gone)))
+    above: list[int] = list(range(len(gone)))
 
     def leader(i: int) -> int:
         while above[i] != i:

@@ -33,7 +33,7 @@ def relation_of_pattern(field: Field[Any], pattern: Pattern) -> LinearRelation:
     variables: list[Variable] = []
     rows: list[Row[Any]] = []
     for ports in at.values():
-        flows, efforts = ([_at(kind, *where) for where in ports] for kind in ("flow", "effort"))
+        flows, efforts = ([_at(kind, where) for where in ports] for kind in ("flow", "effort"))
         signs = [sign for sign, *_ in ports]
         for i in range(len(flows[0])):
             rows.append(field.exact({each[i]: sign for sign, each in zip(signs, flows, strict=True)}))

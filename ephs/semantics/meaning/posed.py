@@ -70,7 +70,7 @@ def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
         labels[label] = f"{WORDS[kind]} {path}"
         rows.append(row | {label: field.one})
     left = eliminated(field, rows, lambda variable: variable not in labels and variable != ONE)
-    chosen = min((row for row in left if ONE in row), key=len, default={})
+    chosen = min((row for row in left if ONE in row), key=len)
     weights: dict[str, float] = {}
     for variable, number in chosen.items():
         if variable != ONE:
