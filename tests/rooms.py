@@ -24,7 +24,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
                 ".semantics",
                 ".semantics.library",
                 ".semantics.algebra",
-                ".semantics.relations",
+                ".semantics.meaning",
                 ".semantics.symbols",
                 ".semantics.verdicts",
             ],

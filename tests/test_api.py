@@ -115,6 +115,7 @@ ATTRIBUTES = {
     "ephs.System": "pattern ledger",
     "ephs.Solution": "t energy exergy entropy stats __getitem__",
     "ephs.SimulationError": "partial",
+    "ephs.semantics.meaning.Instant": "projector empty determined",
     "ephs.semantics.subspace.Subspace": "projector",
     "ephs.mechanics.dynamics.Dynamics": "state0",
     "ephs.mechanics.dynamics.State": "array",

@@ -21,9 +21,8 @@ from ephs.semantics.system import System
 __all__ = ["SYSTEM_LAWS", "Probe", "SystemLaw", "Verdict", "random_probe", "system_law"]
 
 
-def _at(system: System, probe: Probe, route: str = "flat") -> Instant:
-    relation = system.relation(probe.reference, route=route)  # pyright: ignore[reportArgumentType] - one of two
-    return relation.at(probe.state, probe.ports, efforts=probe.efforts)
+def _at(system: System, probe: Probe) -> Instant:
+    return system.relation(probe.reference).at(probe.state, probe.ports, efforts=probe.efforts)
 
 
 def _decided(holds: bool, detail: str) -> Verdict:
@@ -32,10 +31,10 @@ def _decided(holds: bool, detail: str) -> Verdict:
 
 
 def _functoriality(probe: Probe) -> Verdict:
-    flat, nested = (_at(probe.system, probe, route) for route in ("flat", "nested"))
-    one, other = flat.relation, nested.relation
+    one, other = (probe.system.relation(probe.reference, route=route) for route in ("flat", "nested"))
     if one.classes != other.classes:
         return _decided(False, f"the states of the base are {_base(one)} and {_base(other)}")
+    flat, nested = (each.at(probe.state, probe.ports, efforts=probe.efforts) for each in (one, other))
     same = flat.same(nested)
     words = "agree" if same else "differ"
     return _decided(same, f"{len(one.classes)} states; relations of dimension {flat.dimension} {words}")

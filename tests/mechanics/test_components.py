@@ -19,9 +19,9 @@ from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
-from ephs.semantics.laws import isotropy
 from ephs.semantics.search import search
 from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
+from ephs.semantics.subspace import isotropy
 from ephs.testing import check_primitive, mechanisms
 
 REFERENCE = Reference()

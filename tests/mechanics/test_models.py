@@ -68,8 +68,8 @@ def test_a_body_means_newton_and_euler(seed):
         force = -two.masses[0] * np.array([0.3, -0.2, -9.81])
         turned = quaternion_to_matrix(two.q1[:4]).T @ force if group == "SE3" else force
         rates = {"ke.p": space.ad(u).T @ (metric @ u) - np.concatenate([np.zeros(3), turned]) + f, "pe.q": u}
-        point = np.concatenate([*(rates[str(path)] for path, _ in relation.rates), f, u, [relation.unit]])
-        assert relation.subspace.contains(point / relation.unit * 1.0) <= 1e-13
+        point = np.concatenate([*(rates[str(path)] for path, _ in relation.rates), f, u, [1.0]])
+        assert relation.subspace.contains(point) <= 1e-13
         assert relation.dimension == 7
 
 
@@ -86,7 +86,7 @@ def test_in_the_direct_product_a_twist_has_the_velocity_of_the_world():
             p / [1, 2, 2.5, 2, 2, 2],
             np.zeros(6),
             p / [1, 2, 2.5, 2, 2, 2],
-            [closed.unit],
+            [1.0],
         ]
     )
     assert rates.contains(free) <= 1e-14
@@ -162,7 +162,7 @@ def _scaled(relation, d):
     move = np.zeros((size, size))
     for i, j in enumerate(order):
         move[i, j] = 1.0
-    move[-1, -1] = 1.0 / relation.unit
+    move[-1, -1] = 1.0
     return relation.subspace.image(move)
 
 
@@ -209,7 +209,7 @@ def test_the_flat_system_means_its_equations(kind, seed):
         "body2.ke.p": two.gyroscopic[1] - two.weight(1) + two.to_c2.T @ lam,
         "joint.env.s": [two.u_r @ two.mu @ two.u_r / THETA],
     }  # fmt: skip
-    point = np.concatenate([*(np.atleast_1d(rates[str(path)]) for path, _ in relation.rates), [relation.unit]])
+    point = np.concatenate([*(np.atleast_1d(rates[str(path)]) for path, _ in relation.rates), [1.0]])
     assert relation.subspace.contains(point) <= 1e-12
     nested = two.system.relation(route="nested").at(two.state, efforts=two.efforts)
     assert relation.distance(nested) <= 1e-12
@@ -231,7 +231,7 @@ def test_a_spring_pulls_along_the_line_of_its_points():
     names = [str(path) for path, _ in relation.ports]
     flows = relation.subspace.basis[7 : 7 + 12]
     constant = flows @ relation.subspace.basis[-1] / (relation.subspace.basis[-1] @ relation.subspace.basis[-1])
-    pulls = dict(zip(names, np.split(constant * relation.unit, 2), strict=True))
+    pulls = dict(zip(names, np.split(constant, 2), strict=True))
     # drawn from body 1 a wrench that pulls it to body 2 (z up), and the other way round; the frames are 2 m apart
     assert np.allclose(pulls["p1"], [0, 0, 0, 0, 0, -15.0], atol=1e-10)
     assert np.allclose(pulls["p2"], [0, 0, 0, 0, 0, 15.0], atol=1e-10)
@@ -276,9 +276,7 @@ def test_functions_of_the_user_mean_what_the_built_in_parts_mean(seed):
         },
     )  # fmt: skip
     ours, theirs = (s.relation().at(two.state, efforts=two.efforts) for s in (own, two.system))
-    assert ours.unit == pytest.approx(theirs.unit, rel=1e-9)
-    scale = np.diag([*np.ones(ours.subspace.ambient - 1), ours.unit / theirs.unit])
-    assert ours.subspace.distance(theirs.subspace.image(scale)) <= 1e-9
+    assert ours.distance(theirs) <= 1e-9
 
 
 def test_friction_may_depend_on_the_temperature():

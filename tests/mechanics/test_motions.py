@@ -17,7 +17,7 @@ from ephs.mechanics.scene.model import frozen
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference
 from ephs.semantics.laws import Probe, system_law
-from ephs.semantics.natural import step
+from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import mechanisms

@@ -19,7 +19,7 @@ from ephs.operad import Directory, Path
 from ephs.semantics import Reference, System
 from ephs.semantics.behaviour import GRADIENTS, Natural
 from ephs.semantics.laws import random_probe
-from ephs.semantics.natural import newton, solve_flat, solve_nested
+from ephs.semantics.meaning.step import solved as solve
 from ephs.semantics.spaces import SE3, manifold
 from ephs.testing import systems
 
@@ -49,13 +49,14 @@ START = np.array([1.0, 0.5])
 def test_flatten_then_discretise_is_discretise_then_compose(gradient, system, seed):
     probe = random_probe(system, seed)
     behaviour = Natural(probe.reference, probe.h, GRADIENTS[gradient])
-    flat, nested = (solve(system, probe.state, behaviour, probe.inputs) for solve in (solve_flat, solve_nested))
+    flat, nested = (solve(each, probe.state, behaviour, probe.inputs) for each in (system.flatten(), system))
     if max(flat.residual, nested.residual) > 1e-6:
         return  # a random state may contradict a constraint: then there is no step
     scale = max([1.0, *(float(np.abs(w).max(initial=0.0)) for w in flat.rates.values())])
     for path, rate in flat.rates.items():
         # two Newton iterations in different unknowns: condition 10⁴ times the rounding of an evaluation
-        assert np.abs(rate - nested.rates[path]).max(initial=0.0) <= 1e4 * 8.0 * ROUNDING * scale
+        allowed = 1e4 * 8.0 * ROUNDING * scale + flat.rounding + nested.rounding
+        assert np.abs(rate - nested.rates[path]).max(initial=0.0) <= allowed
 
 
 def duffing(x):
@@ -65,13 +66,16 @@ def duffing(x):
 
 def midpoint(f, x0, h):
     """One step of the midpoint rule on the whole."""
-    return newton(lambda z: z - x0 - h * f(0.5 * (x0 + z)), x0.copy())[0]
+    x = x0
+    for _ in range(100):  # a contraction by h
+        x = x0 + h * f(0.5 * (x0 + x))
+    return x
 
 
 def composed(h, gradient):
     """One step of the parts, each discretised on its own."""
     state = {Path.of("pe.q"): START[:1], Path.of("ke.p"): START[1:], Path.of("env.s"): np.zeros(1)}
-    solved = solve_flat(DUFFING, state, Natural(REFERENCE, h, GRADIENTS[gradient]), {})
+    solved = solve(DUFFING, state, Natural(REFERENCE, h, GRADIENTS[gradient]), {})
     return START + h * np.concatenate([solved.rates[Path.of("pe.q")], solved.rates[Path.of("ke.p")]])
 
 
@@ -143,7 +147,7 @@ def gap(h, *, exact):
     scene = ephs.load(SCENES / "mbs.toml")
     problem = problem_of_scene(scene)
     system = problem.system if exact else velocity_level(problem.system)
-    solved = solve_flat(system, problem.initial, Natural(REFERENCE, h), problem.inputs(0.0, problem.initial))
+    solved = solve(system, problem.initial, Natural(REFERENCE, h), problem.inputs(0.0, problem.initial))
     (link,) = scene.joints.values()
 
     def end(path):

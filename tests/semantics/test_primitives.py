@@ -11,7 +11,7 @@ from ephs.operad import quantity as Q
 from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.bundle import Bundle
 from ephs.semantics.checks import dirac, random_efforts, random_point
-from ephs.semantics.laws import isotropy
+from ephs.semantics.subspace import isotropy
 from ephs.testing import interfaces, irreversibles, reversibles, storages
 
 GASES = (

@@ -9,7 +9,7 @@ import ephs
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.semantics import Reference
-from ephs.semantics.natural import step as oracle_step
+from ephs.semantics.meaning.step import step as oracle_step
 from ephs.solve.control import Grid
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import compile_model

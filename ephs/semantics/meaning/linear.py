@@ -14,8 +14,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.meaning.elimination import echelon, eliminated, reduced
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.variables import ONE, Variable
-from ephs.semantics.spaces.decompositions import svd
-from ephs.semantics.spaces.rank import ELIMINATION, rank_of
+from ephs.semantics.subspace import Subspace
 
 
 @final
@@ -150,14 +149,9 @@ class LinearRelation:
                 row[place[variable]] = self.field.value(number)
         return out / np.linalg.norm(out, axis=1, keepdims=True)
 
-    def projector(self, order: Sequence[Variable]) -> Array:
-        """The orthogonal projector (n, n) on the subspace."""
-        matrix = self.matrix(order)
-        if not matrix.size:
-            return np.eye(len(order))
-        _, sigma, rows = svd(matrix, full_matrices=False)
-        normal = rows[: rank_of(sigma, ELIMINATION)]
-        return np.eye(len(order)) - normal.T @ normal
+    def subspace(self, order: Sequence[Variable]) -> Subspace:
+        """The relation as a subspace of ℝⁿ, in an order of the n variables."""
+        return Subspace.from_kernel(self.matrix(order))
 
 
 def _one_last(variable: Variable) -> tuple[bool, Variable]:

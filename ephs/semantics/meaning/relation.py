@@ -26,10 +26,12 @@ from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
 from ephs.semantics.meaning.variables import ONE, Variable, into
 from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import Filling, as_system, fold, require_fillings
 
 Route: TypeAlias = Literal["flat", "nested"]
 Numbers: TypeAlias = Literal["float", "rational"]
+Sizes: TypeAlias = "tuple[tuple[Path, int], ...]"
 FIELDS: Mapping[str, Any] = {"float": Rounded, "rational": Rational}
 
 
@@ -189,10 +191,19 @@ class Instant:
         return self.relation.fibre.at(ROOT, point)
 
     @property
+    def rates(self) -> Sizes:
+        """Names and dimensions of the states that are stored, sorted: each has one rate."""
+        return tuple((each.name, each.quantity.space.dim) for each in self.relation.classes if each.stores)
+
+    @property
+    def ports(self) -> Sizes:
+        """Names and dimensions of the outer power ports, sorted."""
+        return tuple(sorted((port, q.space.dim) for port, _, q in Bundle.of(self.relation.interface).items()))
+
+    @property
     def order(self) -> list[Variable]:
         """All variables: rates by the names of states, flows, then efforts by port, the constant last."""
-        named = sorted((each for each in self.relation.classes if each.stores), key=lambda each: each.name)
-        out = [Variable("own", "rate", ROOT, c.name, i) for c in named for i in range(c.quantity.space.dim)]
+        out = [Variable("own", "rate", ROOT, name, i) for name, dim in self.rates for i in range(dim)]
         bundle = Bundle.of(self.relation.interface)
         if not self.point.storages:
             for path, primitive in self.relation.fibre.leaves():
@@ -231,9 +242,14 @@ class Instant:
         return out
 
     @property
+    def subspace(self) -> Subspace:
+        """The relation as a subspace of the vectors in the `order` of variables."""
+        return self.linear.subspace(self.order)
+
+    @property
     def projector(self) -> Array:
-        """The orthogonal projector on the subspace of vectors in the `order` of variables."""
-        return self.linear.projector(self.order)
+        """The orthogonal projector on the `subspace`."""
+        return self.subspace.projector
 
     @property
     def dimension(self) -> int:
@@ -250,7 +266,7 @@ class Instant:
             raise ValueError("relations between variables of other names cannot be compared")
         if self.linear.empty or other.linear.empty:
             return float(self.linear.empty != other.linear.empty)
-        return float(np.abs(self.projector - other.projector).max(initial=0.0))
+        return self.subspace.distance(other.subspace)
 
 
 def _glued(pattern: Pattern, parts: Mapping[Path, Relation], reference: Reference) -> Relation:

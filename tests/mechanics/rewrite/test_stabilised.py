@@ -14,7 +14,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference
-from ephs.semantics.natural import step as plain_step
+from ephs.semantics.meaning.step import step as plain_step
 from ephs.semantics.spaces import SE3, manifold
 from ephs.solve.errors import OptionError
 from ephs.solve.methods.natural import Natural

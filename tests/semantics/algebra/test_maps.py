@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ephs.operad import AlgebraMap, Directory, Path, Pattern, PortType, law, quantity
+from ephs.operad import ROOT, AlgebraMap, Directory, Path, Pattern, PortType, law, quantity
 from ephs.semantics.algebra import (
     ExactRelation,
     Sharer,
@@ -29,9 +29,11 @@ from ephs.semantics.algebra import (
     systems,
     tangent,
 )
-from ephs.semantics.relations import LinearRelation, compose_linear
-from ephs.semantics.relations.linear import power_ports
-from ephs.semantics.subspace import Subspace
+from ephs.semantics.bundle import Bundle
+from ephs.semantics.meaning import LinearRelation, glued
+from ephs.semantics.meaning.components import at_ports
+from ephs.semantics.meaning.fields import Rounded
+from ephs.semantics.meaning.variables import ONE, Variable
 from ephs.testing import check_algebra_map, patterns
 from ephs.testing import systems as drawn_systems
 from ephs.testing.controls import refuted
@@ -109,28 +111,28 @@ def test_linearising_commutes_at_the_state_of_the_whole_and_not_at_each_parts_ow
 @settings(max_examples=25)
 @given(patterns(of=FEW), st.data())
 def test_relations_over_the_rationals_are_those_over_the_reals(pattern, data):
-    """The exact relation of a composite is what elimination by orthonormal bases gives."""
+    """The exact relation of a composite is what floats with error bounds give."""
     parts = {box: data.draw(ELEMENTS[exact_relations](of.interface)) for box, of in pattern.boxes.items()}
     exact = pattern.apply(exact_relations, parts)
-    real = compose_linear(pattern, {box: over_the_reals(part) for box, part in parts.items()})
-    found = over_the_reals(exact)
-    assert found.empty == real.empty
-    condition = max(10.0, found.subspace.condition, real.subspace.condition)
-    assert found.distance(real) <= 1e-13 * condition
+    field = Rounded()
+    real = glued(field, pattern, {box: over_the_reals(field, part, box) for box, part in parts.items()})
+    assert over_the_reals(field, exact, ROOT).same(real.join(LinearRelation.of(field, [ONE])))
 
 
-def over_the_reals(relation):
-    """An exact relation as a subspace; of a state, its value and its rate count as two."""
-    ports = power_ports(relation.interface)
-    known = [(kind, path, i) for path, dim in relation.inner for kind in ("state", "rate") for i in range(dim)]
-    known += [(kind, path, i) for kind in ("flow", "effort") for path, dim in ports for i in range(dim)]
-    at = {key: k for k, key in enumerate([*known, ("one", Path(), 0)])}
-    matrix = np.zeros((len(relation.equations), len(at)))
-    for k, row in enumerate(relation.equations):
-        for key, value in row:
-            matrix[k, at[key]] = float(value)
-    inner = tuple((path, 2 * dim) for path, dim in relation.inner)
-    return LinearRelation(inner, ports, Subspace.from_kernel(matrix), 1.0)
+def over_the_reals(field, relation, box):
+    """An exact relation as one of floats; states have a name for good, below a box."""
+
+    def named(kind, path, i):
+        if kind == "one":
+            return ONE
+        outer = kind in ("flow", "effort")
+        return Variable("outer" if outer else "own", kind, ROOT, path if outer else box / path, i)
+
+    bundle = Bundle.of(relation.interface)
+    known = {named(kind, path, i) for path, dim in relation.inner for kind in ("state", "rate") for i in range(dim)}
+    known |= {ONE, *at_ports("flow", bundle), *at_ports("effort", bundle)}
+    rows = [field.exact({named(*key): float(value) for key, value in row}) for row in relation.equations]
+    return LinearRelation.of(field, known, rows)
 
 
 @settings(max_examples=15, suppress_health_check=list(HealthCheck))

@@ -14,7 +14,7 @@ from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference
 from ephs.semantics.behaviour import Continuous
 from ephs.semantics.descriptor import Input
-from ephs.semantics.natural import solve_flat
+from ephs.semantics.meaning.step import solved
 from ephs.semantics.symbols.algebra import text_of
 from ephs.semantics.symbols.words import Words, operator, pairing
 from examples import oscillator, physics
@@ -210,12 +210,12 @@ def test_numbers_in_the_reduced_form_give_what_the_solver_computes(name, seed):
     state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
     stored = set(_junctions(system))
     inputs = {slot.path: Input(rng.standard_normal(1), slot.path not in stored) for slot in d.outer}
-    solved = solve_flat(system, state, Continuous(reference), inputs)
+    found = solved(system, state, Continuous(reference), inputs)
     values = named_numbers(system, state, reference)
     for path, where in zip(system.states, _junctions(system), strict=True):
-        values[f"d{where}/dt"] = float(solved.rates[path][0])
-    values |= {f"lambda[{path}]": float(lam[0]) for path, lam in solved.multipliers.items()}
-    for path, (flow, effort) in solved.outer.items():
+        values[f"d{where}/dt"] = float(found.rates[path][0])
+    values |= {f"lambda[{path}]": float(lam[0]) for path, lam in found.multipliers.items()}
+    for path, (flow, effort) in found.outer.items():
         values |= {f"{path}.f": float(flow[0]), f"{path}.e": float(effort[0])}
     for row in system.equations():
         unknown = {s.name for s in (row.left - row.right).free_symbols} - set(values)
