@@ -298,7 +298,7 @@ def name_pair(kind: str, dim: int, size: int, parameters: tuple[str, ...] = ()) 
 
 def _pair(kind: str, parameters: dict[str, float]) -> tuple[int, int, tuple[tuple[str, float], ...]]:
     if kind not in _PAIRS:
-        raise PatternError("pair", found=kind, expected=", ".join(sorted(_PAIRS)))
+        raise PatternError("pair", found=kind, expected=", ".join(sorted(_PAIRS)) + nearest_of(kind, _PAIRS))
     dim, size, names = _PAIRS[kind]
     if set(parameters) != set(names):
         found, expected = ", ".join(sorted(parameters)) or "none", ", ".join(names) or "none"

@@ -12,8 +12,10 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.audit import Bounds, Tests, audit
+from ephs.solve.auditing.passing import TURNED
 from ephs.solve.auditing.resolution import Trials
 from ephs.solve.errors import Interrupted, Outcome, SimulationError, SolveError, serves_not, solve_error_of
+from ephs.solve.oscillations import fastest_of
 from ephs.solve.problem import Problem
 from ephs.solve.result.labels import labels_of
 from ephs.solve.result.ledger import ledgers
@@ -25,6 +27,9 @@ class Run(Protocol):
     """A run in progress: its state and its results so far."""
 
     t: float
+    t0: float
+    until: float
+    h: float
     problem: Problem
     bounds: Bounds | None
 
@@ -34,6 +39,10 @@ class Run(Protocol):
 
 
 _AT_CONSTRAINTS = (Outcome.SINGULAR, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.UNDETERMINED)
+_AT_SPEED = (Outcome.TINY, Outcome.MANY)
+_AT_LENGTH = (Outcome.DIVERGED, Outcome.TURN, Outcome.DOMAIN, Outcome.RANGE, Outcome.SINGULAR)
+MANY_RADIANS = 1e3
+"""Angle of the fastest oscillation in a run above which it is why steps are many."""
 _AT_LOOPS = (Outcome.OPEN, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.SINGULAR, Outcome.TINY)
 
 
@@ -55,11 +64,29 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         equation = "; ".join(filter(None, told))
         serves = run.bounds.serves if run.bounds is not None else serves_not
         partial = run.solution()
-        raise failed(outcome, run.t * run.problem.seconds, error.path, equation, partial, serves) from error.cause
+        fact, hint = _fast(run, outcome, partial)
+        told = "; ".join(filter(None, (equation, fact)))
+        raise failed(outcome, run.t * run.problem.seconds, error.path, told, partial, serves, hint) from error.cause
     except KeyboardInterrupt as error:
         raise Interrupted(Outcome.INTERRUPTED, run.t * run.problem.seconds, "", "", run.solution()) from error
     except MemoryError as error:
         raise SimulationError(Outcome.MEMORY, run.t * run.problem.seconds, "", str(error), run.solution()) from error
+
+
+def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:
+    """The fastest oscillation where steps that follow it are many, or were much too long for it; what to do then."""
+    if not (len(partial) and partial.problem is not None and outcome in (*_AT_SPEED, *_AT_LENGTH)):
+        return "", ""
+    problem, unit = partial.problem, run.problem.seconds
+    found = fastest_of(problem, problem.descriptor.pack(partial.state_at(len(partial) - 1)))
+    if found is None:
+        return "", ""
+    rate, path = found
+    radians = rate * abs(run.until - run.t0) * unit
+    if not (radians > MANY_RADIANS if outcome in _AT_SPEED else rate * run.h * unit > TURNED):
+        return "", ""
+    told = f"the fastest oscillation, of {path}, has {rate:.3g} rad/s ({rate / (2.0 * np.pi):.3g} Hz)"
+    return f"{told}, {radians:.1g} rad in the run", f", or make {path} softer, or rigid: a joint in its place"
 
 
 def audited(

@@ -174,6 +174,8 @@ class SimulationError(RuntimeError):
     ----------
     serves
         Whether a method by its name is another one than that of the run, and accepts the problem.
+    hint
+        What else the advice is to say.
     """
 
     def __init__(
@@ -184,9 +186,10 @@ class SimulationError(RuntimeError):
         equation: str,
         partial: "Solution | None",
         serves: Callable[[str], bool] = serves_not,
+        hint: str = "",
     ) -> None:
         self.outcome, self.time, self.path, self.equation = outcome, time, path, equation
-        self.advice = outcome.advice + or_take(_OTHERS.get(outcome), serves)
+        self.advice = outcome.advice + hint + or_take(_OTHERS.get(outcome), serves)
         self.partial = partial
         where = f" at {path}" if path else ""
         what = f" ({equation})" if equation else ""

@@ -72,7 +72,7 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
 
     Motions are velocities (`is_velocity`) that satisfy all constraints and vanish at ports whose effort is prescribed.
     """
-    rows = [_constraints(descriptor, x)]
+    rows = [constraints_of(descriptor, x)]
     for slot in descriptor.outer:
         if slot.path in prescribed:
             rows.append(np.eye(descriptor.effort_size)[slot.efforts])
@@ -101,8 +101,8 @@ def instant(
     """
     d = descriptor
     given = d.complete_inputs(inputs)
-    stored = _stored_efforts(d, reference, x)
-    constraint = _constraints(d, x)
+    stored = stored_efforts(d, reference, x)
+    constraint = constraints_of(d, x)
     efforts = _all_efforts(d, constraint, stored, given)
     flows = _flows(d, reference, x, efforts)
     n_w, n_e, n_l = d.rate_size, d.effort_size, d.multiplier_size
@@ -117,7 +117,7 @@ def instant(
         if isinstance(slot.primitive, Storage):
             rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
             balance[list(slot.efforts), rates] += 1.0
-            growth[np.ix_(rates, rates)] -= _compliance(slot, d, x, reference)
+            growth[np.ix_(rates, rates)] -= compliance_of(slot, d, x, reference)
             growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
     for slot in d.outer:
         if not given[slot.path].effort:
@@ -159,7 +159,7 @@ def _least_norm(matrix: Array, right: Array) -> tuple[Array, Array]:
     return vt[:rank].T @ ((u[:, :rank].T @ right) / sigma[:rank]), vt[rank:].T
 
 
-def _constraints(d: Descriptor, x: Array) -> Array:
+def constraints_of(d: Descriptor, x: Array) -> Array:
     """All constraints as one matrix on the efforts, (multiplier_size, effort_size)."""
     out = np.zeros((d.multiplier_size, d.effort_size))
     for slot in d.components:
@@ -174,7 +174,8 @@ def _place(out: Array, slot: ComponentSlot, constraint: Array) -> None:
     np.add.at(out, (rows[:, None], np.array(slot.efforts, dtype=int)[None, :]), constraint)
 
 
-def _stored_efforts(d: Descriptor, reference: Reference, x: Array) -> dict[int, float]:
+def stored_efforts(d: Descriptor, reference: Reference, x: Array) -> dict[int, float]:
+    """Efforts that storages give, by place."""
     out: dict[int, float] = {}
     for slot in d.components:
         if isinstance(slot.primitive, Storage):
@@ -211,7 +212,7 @@ def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Arr
     return out
 
 
-def _compliance(slot: ComponentSlot, d: Descriptor, x: Array, reference: Reference) -> Array:
+def compliance_of(slot: ComponentSlot, d: Descriptor, x: Array, reference: Reference) -> Array:
     """∂(effort)/∂(state) of a storage, left-trivialised, by differences of fourth order within the states' domain."""
     storage = slot.primitive
     assert isinstance(storage, Storage)

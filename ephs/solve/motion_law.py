@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
     from ephs.solve.problem import State
 
-SAMPLES = 257
-"""Number of samples for the largest rate of a motion law."""
-
 
 class MotionLaw(ABC):
     """A motion law, one coordinate as a function of time: smooth, with a continuous acceleration.
@@ -53,10 +50,6 @@ class MotionLaw(ABC):
     def constant(self) -> bool:
         """Whether the rate never changes."""
         return False
-
-    def fastest(self, start: float, end: float) -> float:
-        """Return the largest absolute rate, in rad/s or m/s, at many instants between two times in s."""
-        return max(abs(self.rate(float(t))) for t in np.linspace(start, end, SAMPLES))
 
     def __call__(self, t: float, state: "State | None" = None) -> Array:
         """Return the rate (1,) at t s: the value of a signal."""

@@ -8,10 +8,13 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model
+from ephs.solve.oscillations import fastest_of
 from ephs.solve.problem import Problem
 
 INSTANT = 1e-7
 """Step without motion, as a fraction of a step."""
+TURNED = 0.01
+"""Angle in rad by which an oscillation goes on in an instant at most."""
 JUMP = 1e-6
 """Jumps below this fraction of the states of their kind count as rounding of the given values."""
 SEVERAL = 4.0
@@ -52,12 +55,24 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     """
     if problem.scene is not None or not model.constraint_rows.size:
         return
+    x = problem.descriptor.pack(problem.initial)
+    jumping = _jumping(problem, model, x, h)
+    if not jumping:
+        return
+    fastest = fastest_of(problem, x)
+    if fastest is not None and fastest[0] * INSTANT * abs(h) > TURNED:  # such an instant is none to an oscillation
+        jumping = _jumping(problem, model, x, np.copysign(TURNED / (INSTANT * fastest[0]), h))
+    if jumping:
+        raise SolveError(Outcome.INCONSISTENT, jumping, "the constraints do not hold at the start")
+
+
+def _jumping(problem: Problem, model: Model, x: Array, h: float) -> str:
+    """Path of the state that jumps farthest in an instant of a step h, whatever its length; empty where none does."""
     d = problem.descriptor
-    x = d.pack(problem.initial)
     method = Natural(model)
     jumps = [_jump(method, problem, x, instant) for instant in (INSTANT * h, 0.5 * INSTANT * h)]
     if jumps[0] is None or jumps[1] is None:
-        return
+        return ""
     sizes: dict[str, float] = {}
     for slot in d.states:
         flat = manifold(slot.quantity.space).code == VECTOR
@@ -66,5 +81,5 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     limits = np.array([JUMP * max(sizes[slot.quantity.kind], SMALL) for slot in d.states])
     share = np.where(jumps[1][0] > 0.75 * jumps[0][0], jumps[1][0] / limits, 0.0)
     if share.max(initial=0.0) > 1.0 and np.any(share > _left(method, problem, jumps[1][1], h) / limits):
-        path = str(d.states[int(np.argmax(share))].path)
-        raise SolveError(Outcome.INCONSISTENT, path, "the constraints do not hold at the start")
+        return str(d.states[int(np.argmax(share))].path)
+    return ""

@@ -1,6 +1,7 @@
 """Steps that are chosen follow what is prescribed, where no error tells how long they may be."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 import ephs
 from benchmarks.hard import CASES
 from ephs.mechanics.runs.pace import TIMES, TURN, longest_step
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from examples.failing import four_bar
+from tests.mechanics.methods.test_by_hand import four_bar as four_bar_by_hand
 
 ROOT = Path(__file__).resolve().parents[2]
 SLIDE = """
@@ -37,9 +40,9 @@ def test_a_joint_moves_by_a_tenth_of_a_turn_or_of_the_extent_at_most(tmp_path):
     for rate, expected in (("-2.0", TURN * 5.0 / 2.0), ("0.0", np.inf)):
         file = tmp_path / "slide.toml"
         file.write_text(SLIDE.replace("RATE", rate))
-        assert longest_step(ephs.load(file), 8, 1e-6, (0.0, 1.0)) == expected
-    assert longest_step(four_bar(2.5), 2, 0.0, (0.0, 1.0)) == TURN
-    assert longest_step(four_bar(2.5), 2, 1e-6, (0.0, 1.0)) == pytest.approx(0.01)
+        assert longest_step(problem_of_scene(ephs.load(file)), 8, 1e-6, (0.0, 1.0)) == expected
+    assert longest_step(problem_of_scene(four_bar(2.5)), 2, 0.0, (0.0, 1.0)) == TURN
+    assert longest_step(problem_of_scene(four_bar(2.5)), 2, 1e-6, (0.0, 1.0)) == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6])
@@ -89,3 +92,30 @@ def test_what_drives_a_joint_outweighs_friction_and_springs_in_it(joint, turned,
     explicit = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-10, atol=1e-12)
     assert explicit.energy_error.max() < 1e-8
     assert explicit.work[-1] == pytest.approx(natural.work[-1], rel=1e-4)
+
+
+@pytest.mark.parametrize("told", ["law", "function"])
+@pytest.mark.parametrize("seconds", [0.4, 5.12], ids=["any", "a-cycle-a-sample"])
+def test_a_crank_made_by_hand_has_the_limit_of_that_in_a_scene(told, seconds):
+    """A sine of 50 Hz, 0.01 rad: its largest rate is π rad/s, whatever the samples are in step with."""
+    law = ephs.HarmonicMotion(0.01, 50.0, 0.5 * np.pi)
+    scene, system, poses, _ = four_bar_by_hand()
+    joints = {**scene.joints, "main": replace(scene.joints["main"], motion=law, drive=np.zeros(1))}
+    value = law if told == "law" else lambda t: law.rate(t)
+    problem = problem_of_system(system, poses, {"motor": {"effort": value}})
+    for order, rtol in ((8, 1e-6), (2, 1e-9)):
+        expected = min(TURN, (TIMES * rtol) ** (1.0 / order)) / np.pi
+        of_scene = longest_step(problem_of_scene(replace(scene, joints=joints)), order, rtol, (0.0, seconds))
+        assert of_scene == longest_step(problem, order, rtol, (0.0, seconds)) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("method", ["rk87", "rk54", "auto"])
+def test_a_driven_crank_made_by_hand_takes_the_steps_of_the_scene(method):
+    law = ephs.HarmonicMotion(0.1, 50.0, 0.5 * np.pi)
+    scene, system, poses, _ = four_bar_by_hand()
+    joints = {**scene.joints, "main": replace(scene.joints["main"], motion=law, drive=np.zeros(1))}
+    how = {"method": method, "rtol": 1e-3, "atol": 1e-3}
+    file = ephs.simulate(replace(scene, joints=joints), 0.04, **how)
+    hand = ephs.simulate(system, 0.04, initial=poses, inputs={"motor": {"effort": law}}, **how)
+    assert file.stats["steps"] == hand.stats["steps"] and np.array_equal(file.t, hand.t)
+    assert file.stats["longest_step"] <= TURN / (0.1 * 2.0 * np.pi * 50.0) * 1.001

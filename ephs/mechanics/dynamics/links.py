@@ -8,6 +8,7 @@ from ephs.mechanics.motion.views import BodyState
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundle import Array
+from ephs.semantics.errors import listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import OptionError
 from ephs.solve.problem import State as States
@@ -38,7 +39,7 @@ class Links:
     def jacobian(self, body: str, point: Array | None) -> Array:
         """(6, n) to a body's twist, or (3, n) to the velocity of a point in the world."""
         if body not in self._number:
-            raise OptionError("body", body, f"one of {', '.join(self._number)}")
+            raise OptionError("body", body, f"one of {listed(body, self._number)}")
         i = self._number[body]
         out = self._residual.twists(i)
         if point is None:

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.elements import components
 from ephs.operad import Pattern, junction
 from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
+from ephs.semantics.errors import StructureError, nearest_of
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import INERTIA
 from ephs.semantics.system import System
@@ -72,7 +72,11 @@ def rigid_body(
     weight = -float(mass) * np.asarray(gravity, dtype=float)
     if group not in components.POSES:
         raise StructureError(
-            "parameter", "rigid_body", key="group", found=group, expected=" or ".join(components.POSES)
+            "parameter",
+            "rigid_body",
+            key="group",
+            found=group,
+            expected=" or ".join(components.POSES) + nearest_of(group, components.POSES),
         )
     if weight.shape != (3,) or not np.all(np.isfinite(weight)):
         raise StructureError("parameter", "rigid_body", key="gravity", found=gravity, expected="3 finite numbers")

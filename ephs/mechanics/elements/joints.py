@@ -15,7 +15,7 @@ from ephs.mechanics.shapes.law import Law
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
+from ephs.semantics.errors import StructureError, listed
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair, translation
 from ephs.semantics.system import System
@@ -135,7 +135,7 @@ def joint(
         A parameter of a wrong shape or value, or a structure that its checks refuse.
     """
     if kind not in PAIRS:
-        raise StructureError("parameter", "joint", key="kind", found=kind, expected=", ".join(PAIRS))
+        raise StructureError("parameter", "joint", key="kind", found=kind, expected=listed(kind, PAIRS))
     of = pair(kind, pitch=pitch) if "pitch" in PAIRS[kind].parameters else pair(kind)
     k, zero = _vector(of, "stiffness", stiffness), _vector(of, "rest", rest)
     spring = components.pair_spring(of, k, zero) if np.any(k) else None

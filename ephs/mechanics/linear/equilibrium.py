@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.runs.assembling import FlatJoints
     from ephs.semantics.descriptor import Descriptor
 
+SAMPLES = 257
+"""Number of instants of the first second at which a prescribed motion is asked for its rate."""
 STALLED = 1e-9
 """Allowed unbalanced fraction of the forces where iterations stagnate."""
 UNFELT = 1e-9
@@ -145,7 +147,8 @@ def _of_scene(scene: Scene) -> Equilibrium:
     if sprung and any(True for _ in scene.all_loads()):
         found = f"a scene with {sprung[0]} and loads"
         raise OptionError("model", found, "a scene with only one of both, or its system")
-    moving = [name for name, joint in scene.all_joints() if joint.motion is not None and joint.motion.fastest(0.0, 1.0)]
+    laws = {name: joint.motion for name, joint in scene.all_joints() if joint.motion is not None}
+    moving = [name for name, law in laws.items() if any(map(law.rate, np.linspace(0.0, 1.0, SAMPLES).tolist()))]
     if moving:
         raise _none(f"joints.{moving[0]}", "its motion is prescribed")
     model = dynamics(_resting(scene))

@@ -36,6 +36,10 @@ BALANCED = 1e-7
 """Largest unbalanced fraction of the applied forces at an equilibrium."""
 ROUNDED = 1e-9
 """Relative asymmetry allowed in a stiffness: rounding of chains of differentiated poses."""
+MASSLESS = 1e-14
+"""Inertia, as a part of the largest, below which it is rounding: rows determine what has none."""
+LEAST = 1e-2
+"""What counts as the inertia of such freedoms, as a part of the least one, so that they are dependent first."""
 
 
 @final
@@ -62,7 +66,9 @@ def freedoms_of(model: Dynamics, state: State) -> Freedoms:
     found, n = model.constraints(state), model.layout.n
     if not found.rank:
         return Freedoms(np.arange(n), np.eye(n))
-    light = 1.0 / np.sqrt(np.diag(model.mass_matrix(state)))
+    inertia = np.diag(model.mass_matrix(state))
+    heavy = inertia > MASSLESS * inertia.max()
+    light = 1.0 / np.sqrt(np.where(heavy, inertia, LEAST * inertia[heavy].min()))
     factors: Any = qr(found.rows * light, mode="economic", pivoting=True)
     upper, order, rank = np.asarray(factors[1]), np.asarray(factors[2], dtype=np.int64), found.rank
     dependent, which = order[:rank], np.sort(order[rank:])

@@ -24,6 +24,7 @@ from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.errors import listed
 from ephs.semantics.markup import table
 from ephs.semantics.spaces import SE3
 from ephs.solve.result.dataset import Variable
@@ -371,5 +372,5 @@ class SceneMotion:
 
 def _of_name(kind: str, name: str, known: Mapping[str, Item]) -> Item:
     if name not in known:
-        raise KeyError(f"{name}: no such {kind}; the {kind}s are {', '.join(known) or 'none'}")
+        raise KeyError(f"{name}: no such {kind}; the {kind}s are {listed(name, known)}")
     return known[name]

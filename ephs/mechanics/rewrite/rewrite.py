@@ -15,8 +15,11 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.system import System
+from ephs.solve.errors import OptionError
 
 State = Mapping[Path, Array]
+MOST = 20
+"""Number of rewrites for each box and junction: rules take away, and each of them meets a part a few times at most."""
 
 
 class Strength(StrEnum):
@@ -230,9 +233,16 @@ def sites_of(system: System, rule: Rule) -> tuple[Site, ...]:
 
 
 def rewrite(system: System, rules: Iterable[Rule]) -> Rewritten:
-    """Rewrite a system by rules until none applies; the order makes no difference but for names."""
+    """Rewrite a system by rules until none applies; the order makes no difference but for names.
+
+    Raises
+    ------
+    OptionError
+        Rules do not come to an end: they were used `MOST` times for each box and junction.
+    """
     draft = Draft(system)
     states, done, known = StateMap(), list[Site](), tuple(rules)
+    size = len(draft.fillings) + len(draft.junctions)
     again = True
     while again:
         again = False
@@ -240,6 +250,9 @@ def rewrite(system: System, rules: Iterable[Rule]) -> Rewritten:
             for place in tuple(rule.places(draft)):
                 site = rule.at(draft, place)
                 if site is not None and not site.refusal:
+                    if len(done) >= MOST * size:
+                        used = f"{rule.name}, used at {site.where} after {len(done)} rewrites of {size} parts"
+                        raise OptionError("rules", used, "rules that end: with each use less of the system is left")
                     states = states.then(site.make(draft))
                     done.append(site)
                     again = True

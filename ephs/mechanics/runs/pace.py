@@ -1,29 +1,39 @@
 """Step limits for prescribed motions and thin surfaces."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ephs.mechanics.scene.build import contact_points
-from ephs.mechanics.scene.geometry import coupling
+from ephs.semantics.spaces.pairs import PAIRS, pair
 from ephs.solve.auditing.audit import LEAP
+from ephs.solve.errors import SolveError
+from ephs.solve.problem import NO_STATE
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
+    from ephs.operad import Quantity
     from ephs.semantics.bundle import Array
+    from ephs.solve.problem import Problem, Signal
 
 TURN = 0.1
 """Step limit for prescribed motions: largest displacement in rad, or as a fraction of the scene's extent."""
+SAMPLES = 256
+"""Number of instants for the largest rate that is prescribed by a function."""
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 TIMES = 100.0
 """Largest error of a step of a method of order p, which is the p-th power of that angle, in tolerances."""
 
 
-def longest_step(scene: "Scene", order: int, rtol: float, span: tuple[float, float]) -> float:
-    """The longest step in s that is chosen for a scene; infinite without prescribed motion and thin surfaces.
+def longest_step(problem: "Problem", order: int, rtol: float, span: tuple[float, float]) -> float:
+    """The longest step that is chosen for a problem; infinite without prescribed motion and thin surfaces.
 
-    ``span`` is the run's, in s; see `_driven_step`.
+    ``span`` is the run's; all times are in the problem's unit. See `_driven_step`.
     """
-    return min(_driven_step(scene, order, rtol, span), _contact_step(scene))
+    contact = np.inf if problem.scene is None else _contact_step(problem.scene)
+    return min(_driven_step(problem, order, rtol, span), contact)
 
 
 def _contact_step(scene: "Scene") -> float:
@@ -41,7 +51,9 @@ def _contact_step(scene: "Scene") -> float:
     reach = max((float(np.linalg.norm(s.frame[4:])) for s in surfaces.values()), default=0.0)
     twists = [body.twist for body in bodies.values()]
     start = sum(sorted((_speed(twist, reach) for twist in twists), reverse=True)[:2])
-    fall = np.sqrt(2.0 * float(np.linalg.norm(scene.world.gravity)) * _extent(scene))
+    fall = np.sqrt(
+        2.0 * float(np.linalg.norm(scene.world.gravity)) * _spread([body.pose[4:] for _, body in scene.all_bodies()])
+    )
     return float(LEAP * thick / (start + fall)) if start + fall > 0.0 else np.inf
 
 
@@ -49,13 +61,13 @@ def _speed(twist: "Array", reach: float) -> float:
     return float(np.linalg.norm(twist[3:]) + reach * np.linalg.norm(twist[:3]))
 
 
-def _extent(scene: "Scene") -> float:
-    places = np.array([np.zeros(3), *(body.pose[4:] for _, body in scene.all_bodies())])
-    return float(np.linalg.norm(np.ptp(places, axis=0)))
+def _spread(places: "Sequence[Array]") -> float:
+    """Diagonal of the box around the origin and some places."""
+    return float(np.linalg.norm(np.ptp(np.array([np.zeros(3), *places]), axis=0)))
 
 
-def _driven_step(scene: "Scene", order: int, rtol: float, span: tuple[float, float]) -> float:
-    """The longest step in s where motions are prescribed.
+def _driven_step(problem: "Problem", order: int, rtol: float, span: tuple[float, float]) -> float:
+    """The longest step where motions of joints or bodies are prescribed.
 
     What is prescribed makes no error, and what follows from it alone makes none that is seen: without a limit, steps
     would leap over positions that the mechanism cannot reach, and heat and work would be sums over a few instants.
@@ -65,15 +77,41 @@ def _driven_step(scene: "Scene", order: int, rtol: float, span: tuple[float, flo
     order, rtol
         Of the method; the least of the tolerances that steer it.
     """
-    moved = [(joint, joint.motion) for _, joint in scene.all_joints() if joint.motion is not None]
+    moved = [
+        (signal, twists)
+        for slot in problem.descriptor.outer
+        if (signal := problem.signals.get(slot.path)) is not None
+        and signal.effort
+        and (twists := twists_of(slot.quantity)) is not None
+    ]
     if not moved:
         return np.inf
-    extent = _extent(scene)
+    places = [problem.initial[slot.path][4:] for slot in problem.descriptor.states if slot.quantity.kind == "pose"]
+    extent = _spread(places)
     turn = min(TURN, (TIMES * rtol) ** (1.0 / order)) if rtol else TURN
-    limits: list[float] = []
-    for joint, motion in moved:
-        turning = bool(np.any(coupling(joint.kind, joint.pitch).pair.basis[:3]))
-        allowed = turn if turning or not extent else turn * extent
-        fastest = motion.fastest(*span)
-        limits.append(allowed / fastest if fastest else np.inf)
-    return min(limits)
+    fastest = 0.0
+    for signal, twists in moved:
+        turning = bool(np.any(twists[:3]))
+        for rate in _rates(signal, span):
+            size = float(np.linalg.norm((twists[:3] if turning else twists[3:]) @ rate))
+            fastest = max(fastest, size if turning or not extent else size / extent)
+    return turn / fastest if fastest else np.inf
+
+
+def _rates(signal: "Signal", span: tuple[float, float]) -> "Iterator[Array]":
+    """Prescribed rates at many instants of a run; none where they depend on the state, or fail."""
+    if not (signal.constant or signal.timed):
+        return
+    start, end = span
+    within = np.arange(1, SAMPLES) * GOLDEN % 1.0  # no lattice, which a periodic motion may be in step with
+    for share in (0.0,) if signal.constant else (0.0, 1.0, *within.tolist()):
+        with suppress(SolveError):  # of which the run tells
+            yield signal.at(start + share * (end - start), NO_STATE)
+
+
+def twists_of(momentum: "Quantity") -> "Array | None":
+    """(6, d) twists (angular, linear) that the efforts of a momentum are coordinates of; None of what is no motion."""
+    if momentum.kind != "momentum" or not momentum.space.name.endswith("*"):
+        return None
+    name = momentum.space.name.removesuffix("*")
+    return pair(name, **dict(momentum.space.parameters)).basis if name in PAIRS else np.eye(6)

@@ -259,9 +259,9 @@ def control_of(
     unit = problem.seconds
     least = 0.0 if min_step is None else number_of("min_step", min_step) / unit
     most = np.inf if max_step is None else number_of("max_step", max_step) / unit
-    if problem.scene is not None and step is None:
+    if step is None:
         tightest = min(relative.value, *relative.special.values(), np.inf)
-        most = min(most, max(longest_step(problem.scene, order, tightest, span), least))
+        most = min(most, max(longest_step(problem, order, tightest, span), least))
     return Control(
         relative,
         absolute,

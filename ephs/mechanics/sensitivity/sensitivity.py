@@ -13,7 +13,7 @@ from ephs.mechanics.sensitivity.family import CENTRAL, Family, Parameter, differ
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
-from ephs.solve.errors import OptionError, failing_at
+from ephs.solve.errors import OptionError, failing_at, nearest_of
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread
@@ -156,7 +156,9 @@ def _method(method: str, step: float | None) -> str:
     if method == "auto":
         found = "natural" if step is not None else "rk87"
     if found not in METHODS:
-        raise OptionError("method", method, f"one of auto, {', '.join(METHODS)}, which have tangents")
+        raise OptionError(
+            "method", method, f"one of auto, {', '.join(METHODS)}, which have tangents{nearest_of(method, METHODS)}"
+        )
     if found == "natural" and step is None:
         raise OptionError("step", step, "a number of seconds: the tangent of natural is that of constant steps")
     return found

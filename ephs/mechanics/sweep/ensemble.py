@@ -133,7 +133,7 @@ class Ensemble:
         """
         given = self._options
         method, _ = chosen(given.get("method", "auto"), equations.problem, step=given.get("step"))
-        if given.get("step") is None and longest_step(equations.problem.scene, 1, 0.0, (self.t0, self.until)) < np.inf:
+        if given.get("step") is None and longest_step(equations.problem, 1, 0.0, (self.t0, self.until)) < np.inf:
             raise Unlike("each member has its own limit")
         if equations.led.holds:
             raise Unlike("its work is no sum of rows")

@@ -15,6 +15,7 @@ from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.job import DONE, Batch, Job
 from ephs.mechanics.sweep.outputs import outputs_of
+from ephs.semantics.errors import listed
 from ephs.solve.errors import OptionError, number_of
 from ephs.solve.sparse import Index
 
@@ -115,7 +116,7 @@ def sweep(
     axes = Axes.of(vary, paired=paired)
     unknown = [key for key in options if key not in _OPTIONS]
     if unknown:
-        raise OptionError(unknown[0], options[unknown[0]], f"no such option; there are {', '.join(_OPTIONS)}")
+        raise OptionError(unknown[0], options[unknown[0]], f"no such option; there are {listed(unknown[0], _OPTIONS)}")
     for path in axes.paths:
         read(model, path)
     start, end = number_of("t0", t0), number_of("until", until)

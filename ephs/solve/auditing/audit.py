@@ -15,9 +15,10 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.rank import CLOSED
 from ephs.solve.auditing.findings import Audit, Finding
 from ephs.solve.auditing.growth import Again, GlobalError, energy_error, global_error
+from ephs.solve.auditing.passing import passed_over
 from ephs.solve.auditing.resolution import STILL, StepError, Trials
 from ephs.solve.auditing.retaken import Missed
-from ephs.solve.auditing.rounding import exchanged, rounded, trembling
+from ephs.solve.auditing.rounding import exchanged, isolated, rounded, trembling
 from ephs.solve.breakpoints import MOST_FOUND
 from ephs.solve.control import Control
 from ephs.solve.errors import Other, or_take, serves_not
@@ -171,6 +172,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
         yield Breach(size, _nothing, instant, path, ": segments of tendons must not pass the length zero")
     if isinstance(trials, Missed):
         yield Breach(trials.size * bounds.tolerance, _nothing, int(np.argmin(np.abs(solution.t - trials.at))))
+        yield from _passed(solution, longest, bounds)
     if bounds.step is None or not isinstance(trials, Trials):
         return
     steps = int(solution.stats["steps"])
@@ -181,6 +183,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     if found is not None and falls:
         found = replace(found, size=found.size / (2.0**trials.order - 1.0))
     coarse = found is not None and found.size > bounds.accuracy
+    yield from _passed(solution, bounds.step, bounds) if found is None else ()
     if coarse and falls and trials.again is not None:
         off = energy_error(solution, bounds.order, bounds.step, trials.again)
     grown = _grown(solution, bounds, trials)
@@ -195,6 +198,11 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
         hint, other = "" if h is None else f" of {h:.1g} s", DAMPING if bounds.undamped else None
         instant = int(np.argmin(np.abs(solution.t - trials.times[found.trial])))
         yield Breach(found.size, _nothing, instant, found.path, hint, other)
+
+
+def _passed(solution: "Solution", h: float, bounds: Bounds) -> Iterator[Breach]:
+    if (found := passed_over(solution, h)) is not None:
+        yield Breach(found.size, _nothing, found.instant, found.path, found.hint(bounds.step))
 
 
 def _grown(solution: "Solution", bounds: Bounds, trials: Trials) -> GlobalError | None:
@@ -226,7 +234,7 @@ def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> It
     path = max(falls, key=lambda each: float(falls[each].max()), default=None)
     instant = _worst(falls[path]) if path is not None else 0
     yield Breach(least / scale, rounding, instant, path)
-    if _isolated(solution, "entropy"):
+    if isolated(solution, "entropy"):
         fall = -np.diff(ledgers.entropy, prepend=ledgers.entropy[:1])
         # times inside a step are ends of shorter ones from its start: less may be made until its own end
         fall += np.minimum(np.diff(ledgers.made, prepend=ledgers.made[:1]), 0.0)
@@ -252,7 +260,7 @@ def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iter
         yield Breach(size, lambda: slack + rounded(solution) / ledgers.scale, instant, hint=hint)
     for kind, held, made in (("entropy", ledgers.entropies, ledgers.made), ("volume", ledgers.volumes, None)):
         scale, rounding = exchanged(solution, kind)
-        if not scale or not _isolated(solution, kind):
+        if not scale or not isolated(solution, kind):
             continue
         rest = sum((values - values[0] for values in held.values()), start=np.zeros(len(solution)))
         if made is not None:
@@ -268,12 +276,6 @@ def _input(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iter
     if found:
         last = int(np.argmin(np.abs(solution.t - found[-1]["t"])))
         yield Breach(float(len(found)), _nothing, last, Path.of(found[-1]["input"]))
-
-
-def _isolated(solution: "Solution", kind: str) -> bool:
-    """Whether no outer power port carries a kind."""
-    problem = solution.problem
-    return problem is not None and all(slot.quantity.kind != kind for slot in problem.descriptor.outer)
 
 
 def _worst(values: Array) -> int:

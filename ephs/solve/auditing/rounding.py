@@ -48,6 +48,12 @@ def exchanged(solution: "Solution", kind: str) -> tuple[float, Callable[[], floa
     return scale, rounding
 
 
+def isolated(solution: "Solution", kind: str) -> bool:
+    """Whether no outer power port carries a kind."""
+    problem = solution.problem
+    return problem is not None and all(slot.quantity.kind != kind for slot in problem.descriptor.outer)
+
+
 def trembling(solution: "Solution") -> float:
     """Energy of bodies that move by the rounding of their positions in the longest step, and of the forces of storages
     (springs, weight, warm rods) along it: an upper bound for bodies at rest."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.errors import listed
 from ephs.solve.instant import instant
 from ephs.solve.problem import Signal
 
@@ -53,7 +54,7 @@ def port_motion(solution: "Solution", path: Path) -> PortMotion:
     d = problem.descriptor
     slots = {slot.path: slot for slot in d.outer}
     if path not in slots:
-        raise KeyError(f"{path}: no such outer power port; the ports are {', '.join(map(str, slots)) or 'none'}")
+        raise KeyError(f"{path}: no such outer power port; the ports are {listed(path, slots)}")
     slot, n = slots[path], len(solution)
     flow, effort = np.zeros((n, slot.quantity.space.dim)), np.zeros((n, slot.quantity.space.dim))
     step = DELTA * float(solution.t[-1] - solution.t[0]) if n > 1 else DELTA

@@ -12,6 +12,7 @@ import ephs
 from ephs.mechanics.elements.contact import contact_energy, contact_loss
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs import pace
+from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.shapes.gap import (
     edges,
@@ -357,5 +358,5 @@ def test_no_step_leaps_over_a_thin_plate(name, tmp_path, monkeypatch):
 def test_the_limit_is_half_the_way_through(tmp_path):
     file = tmp_path / "plate.toml"
     file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
-    longest = pace.longest_step(ephs.load(file), 5, 1e-3, (0.0, 1.0))
+    longest = pace.longest_step(problem_of_scene(ephs.load(file)), 5, 1e-3, (0.0, 1.0))
     assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)

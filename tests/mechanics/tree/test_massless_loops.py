@@ -141,3 +141,81 @@ def test_forces_are_the_limit_of_those_of_light_bodies(tmp_path):
 def test_a_massless_body_that_no_row_determines_is_refused(tmp_path):
     with pytest.raises((ephs.SimulationError, ephs.SceneError), match=r"no mass"):
         ephs.simulate(scene_of(tmp_path, AXLE + LOOSE), 0.1)
+
+
+LEG = """
+[bodies.lo{i}]
+{mass}
+position = {low}
+[bodies.hi{i}]
+{mass}
+position = {high}
+[joints.u{i}]
+type = "universal"
+bodies = ["ground", "lo{i}"]
+at = {foot}
+axis = {axis}
+axis2 = {axis2}
+[joints.p{i}]
+type = "prismatic"
+bodies = ["lo{i}", "hi{i}"]
+at = {middle}
+axis = {along}
+drive = {drive}
+[joints.s{i}]
+type = "spherical"
+bodies = ["hi{i}", "plat"]
+at = {head}
+"""
+
+
+def stewart(tmp_path, mass):
+    """A platform of 20 kg on six legs, each of two halves of this mass in kg."""
+    given = f"mass = {mass!r}\ninertia = [{mass / 100!r}, {mass / 100!r}, {mass / 100!r}]" if mass else MASSLESS
+    text = "format = 1\n[bodies.plat]\nmass = 20.0\ninertia = [0.6, 0.7, 1.1]\nposition = [0.0, 0.0, 0.7]\n"
+    for i in range(6):
+        turn = np.radians(60.0 * (i // 2 * 2) + np.array([-1.0, 1.0])[i % 2] * np.array([15.0, 45.0]))
+        foot = np.array([0.6 * np.cos(turn[0]), 0.6 * np.sin(turn[0]), 0.0])
+        head = np.array([0.35 * np.cos(turn[1]), 0.35 * np.sin(turn[1]), 0.7])
+        along = (head - foot) / np.linalg.norm(head - foot)
+        axis = np.cross([0.0, 0.0, 1.0], along)
+        axis /= np.linalg.norm(axis)
+        points = {"foot": foot, "head": head, "low": 0.75 * foot + 0.25 * head, "high": 0.25 * foot + 0.75 * head}
+        points |= {"middle": 0.5 * (foot + head), "along": along, "axis": axis, "axis2": np.cross(axis, along)}
+        text += LEG.format(i=i, mass=given, drive=40.0 + 2.0 * i, **{k: v.tolist() for k, v in points.items()})
+    file = tmp_path / "stewart.toml"
+    file.write_text(text)
+    return ephs.load(file)
+
+
+def test_a_platform_on_massless_legs_is_the_limit_of_light_ones(tmp_path):
+    """What mass m of the legs changes is proportional to it, up to (12 m / 20)² and the tolerance of 1e-9."""
+    at = {
+        m: ephs.simulate(stewart(tmp_path, m), 0.2, method="rk87", rtol=1e-9, save_at=[0.2]) for m in (0.0, 1e-3, 1e-2)
+    }
+    places = {m: sol.body("plat").position[-1] for m, sol in at.items()}
+    light, heavy = ((places[m] - places[0.0]) / m for m in (1e-3, 1e-2))
+    assert np.abs(light).max() > 0.01
+    assert np.abs(light - heavy).max() < 12.0 * 1e-2 / 20.0 * np.abs(light).max()
+
+
+def test_linearised_massless_legs_are_the_limit_of_light_ones(tmp_path):
+    found = {m: ephs.linearize(stewart(tmp_path, m)).A for m in (0.0, 1e-6, 1e-4)}
+    rates = {m: np.sort(np.abs(np.linalg.eigvals(A))) for m, A in found.items()}
+    assert [A.shape for A in found.values()] == 3 * [(12, 12)]
+    heavy = np.abs(rates[1e-4] - rates[0.0]).max() / 1e-4
+    assert heavy > 0.01
+    assert np.abs(rates[1e-6] - rates[0.0]).max() < 2.0 * 1e-6 * heavy + 1e-9
+
+
+def test_tangents_of_massless_legs_are_the_limit_of_light_ones(tmp_path):
+    """By natural; an explicit method refuses them."""
+    found = {
+        m: ephs.sensitivity(stewart(tmp_path, m), ["bodies.plat.mass"], 0.05, method="natural", step=0.01)
+        for m in (0.0, 1e-6)
+    }
+    one, other = (of["bodies.plat.pe.q"][-1].ravel() for of in found.values())
+    assert np.abs(one).max() > 1e-4
+    assert np.abs(one - other).max() < 1e-5 * np.abs(one).max()
+    with pytest.raises(ephs.OptionError, match="method is 'rk87'"):
+        ephs.sensitivity(stewart(tmp_path, 0.0), ["bodies.plat.mass"], 0.05, method="rk87")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.solve.errors import OptionError
+from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.march import Status
 from ephs.solve.march.account import WORTH
 from ephs.solve.march.noted import Noted
@@ -51,8 +51,8 @@ class Accounts:
         OptionError
             It is none of these.
         """
-        if what not in (*also, *KEEP):
-            raise OptionError("options['keep']", what, " or ".join(map(repr, (*also, *KEEP))))
+        if what not in (known := (*also, *KEEP)):
+            raise OptionError("options['keep']", what, " or ".join(map(repr, known)) + nearest_of(what, known))
         if what == KEEP[1]:
             self._equations.keep_momenta()
 

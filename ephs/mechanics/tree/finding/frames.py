@@ -244,11 +244,12 @@ class _Finder:
         """Make a junction a frame without mass where it belongs to no link yet."""
         if junction in self.frames:
             return
-        above = junction
+        above, passed = junction, {junction}
         while ways := [there for _, there, outwards in self._beside.get(above, []) if not outwards]:
             above = ways[0]
-            if above == junction:
+            if above in passed:  # offsets in a circle
                 break
+            passed.add(above)
         self._carry(above, len(self.links), number)
         self.links.append(Link(None, np.zeros((6, 6)), -1, None, None))
 

@@ -13,6 +13,7 @@ from ephs.mechanics.tree.finding.mechanism import Edge, Reduced
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.errors import listed
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN
 from ephs.solve.sparse import Index
@@ -113,7 +114,7 @@ class Layout:
             return out
         for name, value in values.items():
             if name not in self.freedoms:
-                raise OptionError(f"{what}[{name!r}]", value, f"a joint: {', '.join(self.joints)}")
+                raise OptionError(f"{what}[{name!r}]", value, f"a joint: {listed(name, self.joints)}")
             where = self.freedoms[name]
             if type(value) is float and where.size == 1 and isfinite(value):  # in the loops of controllers
                 out[where[0]] = value

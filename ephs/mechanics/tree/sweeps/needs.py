@@ -357,7 +357,7 @@ def layout_of(width: int, run: Callable[[Survey], None]) -> Layout:
     run(survey) evaluates all its entry functions, with ``survey.memory()`` as the record's numbers.
     """
     survey = Survey(width)
-    while True:
+    while True:  # what is known of an entry changes twice at most: nothing, one constant, any number
         survey.begin()
         survey.entries.follows, survey.entries.live = {}, 0
         run(survey)

@@ -1,0 +1,89 @@
+"""Oscillations so fast that steps pass over them: kept with their energy, at instants that say nothing of the motion.
+
+An undamped method maps a rate to its opposite, or itself, where a step is many times longer than the oscillation, and
+so do its halves and thirds: their differences show nothing, and energy is kept. Its energy in the result does show.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from ephs.operad import Path
+from ephs.semantics.primitives import Storage
+from ephs.solve.auditing.resolution import STILL
+from ephs.solve.auditing.rounding import trembling
+from ephs.solve.instant import compliance_of
+from ephs.solve.oscillations import oscillations
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
+
+TURNED = 10.0
+"""Angle in rad by which an oscillation may go on in a step at most: no method resolves one and a half turns."""
+PLACES = 3
+"""Number of pairs of instants that are looked at."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Passed:
+    """Oscillations that steps pass over.
+
+    Parameters
+    ----------
+    size
+        Their energy as a part of the gross energies.
+    instant
+        Where it is largest.
+    path, rate
+        Storage of the one with the most energy, its angular frequency in rad/s.
+    """
+
+    size: float
+    instant: int
+    path: Path
+    rate: float
+
+    def hint(self, step: float | None) -> str:
+        """End of an advice on constant steps, or on chosen ones (None)."""
+        told = f"{1.0 / self.rate:.1g} s: steps pass over an oscillation of {self.rate:.3g} rad/s"
+        return f" of {told}" if step else f", or max_step = {told}"
+
+
+def passed_over(solution: "Solution", h: float) -> Passed | None:
+    """Oscillations that steps of h s pass over, with energy before and after them; None where there are none."""
+    problem = solution.problem
+    if problem is None or len(solution) < 2 or not _may_be(solution, h):
+        return None
+    worst: Passed | None = None
+    scale = max(solution.ledgers.scale, trembling(solution) / STILL)  # what is less counts as at rest
+    for i in np.unique(np.linspace(0, len(solution) - 2, PLACES).astype(int)).tolist():
+        both = [oscillations(problem, problem.descriptor.pack(solution.state_at(k))) for k in (i, i + 1)]
+        held = [(of, np.where(of.rates * h > TURNED, of.energies, 0.0)) for of in both if of is not None]
+        if len(held) < len(both):
+            return None
+        of, energies = min(held, key=lambda each: float(each[1].sum()))
+        size, most = float(energies.sum()) / scale, int(np.argmax(energies))
+        if size > (worst.size if worst is not None else 0.0):
+            worst = Passed(size, i + 1, of.springs[most], float(of.rates[most]))
+    return worst
+
+
+def _may_be(solution: "Solution", h: float) -> bool:
+    """Whether the stiffest storage of the start would turn the lightest by so much in h s."""
+    problem = solution.problem
+    if problem is None:
+        return False
+    d = problem.descriptor
+    x = d.pack(solution.state_at(0))
+    parity = {i: slot.quantity.parity for slot in d.junctions for i in range(slot.efforts.start, slot.efforts.stop)}
+    stiff = light = 0.0
+    for slot in d.components:
+        if isinstance(slot.primitive, Storage) and not slot.primitive.environment and slot.efforts:
+            size = float(np.abs(compliance_of(slot, d, x, problem.reference)).sum(axis=1).max())
+            if all(parity[i] < 0 for i in slot.efforts):
+                light = max(light, size)
+            else:
+                stiff = max(stiff, size)
+    return stiff * light * h**2 > TURNED**2

@@ -1,0 +1,133 @@
+"""Springs far too stiff to follow: oscillations that steps pass over are found, and failed runs name them."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs import Pattern, junction
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.solve.oscillations import oscillations
+from tests.solve.conftest import oscillator
+
+INERTIA = 0.1 + 1.0 * 0.5**2
+"""About the pin, in kg m²."""
+MANY = st.floats(-20.0, 20.0).map(lambda power: 10.0**power)
+
+
+def pendulum(tmp_path, stiffness, **more):
+    """A body of 1 kg, 0.5 m beside its pin, held level by a spring in the pin."""
+    file = tmp_path / "pendulum.toml"
+    given = "\n".join(f"{key} = {value!r}" for key, value in {"stiffness": stiffness, **more}.items())
+    file.write_text(f"""
+format = 1
+[bodies.arm]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.5, 0.0, 0.0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "arm"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+{given}
+""")
+    return ephs.load(file)
+
+
+def found_in(problem):
+    return oscillations(problem, problem.descriptor.pack(problem.initial))
+
+
+@given(k=MANY, m=MANY)
+def test_the_rate_of_a_spring_and_a_mass_is_the_root_of_their_ratio(k, m):
+    """At any numbers: no tolerance compares a stiffness with a mass."""
+    problem = problem_of_system(oscillator(k, m), {"pe.q": 1.0, "ke.p": m}, {"p": {"flow": 0.0}})
+    found = found_in(problem)
+    assert found.rates == pytest.approx([np.sqrt(k / m)], rel=1e-12)
+    assert found.energies == pytest.approx([0.5 * k + 0.5 * m], rel=1e-12)
+
+
+@given(k=MANY, m=st.tuples(MANY, MANY).filter(lambda m: 1e-6 < m[0] / m[1] < 1e6))
+def test_two_masses_on_one_spring_swing_against_each_other(k, m):
+    pattern = Pattern(
+        junctions={"q": junction(Q.displacement), **{name: junction(Q.momentum) for name in ("p", "p1", "p2")}},
+        boxes={"pe": {"q": "q"}, "pkc": {"q": "q", "p": "p"}, "first": {"p": "p1"}, "second": {"p": "p2"},
+               "apart": {"a": "p", "b": "p1", "c": "p2"}},
+    )  # fmt: skip
+    apart = ephs.constraint({"a": Q.momentum, "b": Q.momentum, "c": Q.momentum}, [[1.0, 1.0, -1.0]])
+    system = pattern(
+        pe=lib.spring(k=k), pkc=lib.pkc(), first=lib.point_mass(m=m[0]), second=lib.point_mass(m=m[1]), apart=apart
+    )
+    found = found_in(problem_of_system(system))
+    assert found.rates[-1] == pytest.approx(np.sqrt(k / m[0] + k / m[1]), rel=1e-9)
+    assert str(found.springs[-1]) == "pe"
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e10, 1e20, 1e30])
+def test_a_spring_in_a_pin_acts_on_all_that_turns_about_it(tmp_path, stiffness):
+    found = found_in(problem_of_scene(pendulum(tmp_path, stiffness, rate=1.0)))
+    assert found.rates[-1] == pytest.approx(np.sqrt(stiffness / INERTIA), rel=1e-12)
+    static = 0.5 * (9.81 * 0.5) ** 2 / stiffness
+    assert found.energies[-1] == pytest.approx(0.5 * INERTIA + static, rel=1e-9)
+    assert str(found.springs[-1]) == "joints.pin.pe"
+
+
+@pytest.mark.parametrize("by_hand", [False, True], ids=["scene", "system"])
+@pytest.mark.parametrize("stiffness", [1e17, 1e20, 1e30])
+@pytest.mark.parametrize(("method", "step"), [("natural", 0.01), ("natural4", 0.01), ("natural", None)])
+def test_steps_do_not_pass_over_an_oscillation_without_a_finding(tmp_path, by_hand, stiffness, method, step):
+    """The rate is cos ω t with ω up to 1.7e15 rad/s; results have 1 or −1 at every instant, and keep the energy."""
+    scene = pendulum(tmp_path, stiffness, rate=1.0)
+    model = scene.system() if by_hand else scene
+    with pytest.raises(ephs.SimulationError) as failed, warnings.catch_warnings():
+        warnings.simplefilter("ignore", ephs.CostWarning)
+        ephs.simulate(model, 1.0, method=method, step=step)
+    if isinstance(failed.value, ephs.AuditError):
+        (finding,) = failed.value.partial.audit.findings
+        assert finding.law == "accuracy" and finding.path.startswith("joints.pin")
+    else:
+        assert "of joints.pin.pe, has" in str(failed.value)
+
+
+@pytest.mark.parametrize("stiffness", [1e13, 1e17, 1e30])
+@pytest.mark.parametrize(("method", "step"), [("natural", 0.01), ("natural4", 0.01)])
+def test_what_hardly_swings_is_at_rest(tmp_path, stiffness, method, step):
+    """The weight turns the pin by 4.9/k rad: the result is right to 1e-12 rad."""
+    sol = ephs.simulate(pendulum(tmp_path, stiffness), 1.0, method=method, step=step)
+    assert not sol.audit.findings
+    assert np.abs(sol.joint("pin").coordinate).max() <= 2.0 * 9.81 * 0.5 / stiffness * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("by_hand", [False, True], ids=["scene", "system"])
+@pytest.mark.parametrize(
+    ("stiffness", "options"),
+    [
+        (1e30, {"method": "rk87"}),
+        (1e30, {"method": "rk54"}),
+        (1e30, {"method": "semi"}),
+        (1e30, {"method": "radau"}),
+        (1e30, {"method": "gauss8", "step": 0.01}),
+        (1e10, {"method": "rk87", "max_steps": 50}),
+        (1e10, {"max_steps": 50}),
+    ],
+    ids=lambda given: "-".join(map(str, given.values())) if isinstance(given, dict) else f"{given:g}",
+)
+def test_runs_that_fail_at_an_oscillation_name_its_spring_and_frequency(tmp_path, by_hand, stiffness, options):
+    scene = pendulum(tmp_path, stiffness, rate=1.0)
+    with pytest.raises(ephs.SimulationError) as failed:
+        ephs.simulate(scene.system() if by_hand else scene, 1.0, **options)
+    rate = np.sqrt(stiffness / INERTIA)
+    assert f"of joints.pin.pe, has {rate:.3g} rad/s ({rate / (2.0 * np.pi):.3g} Hz)" in str(failed.value)
+    assert "make joints.pin.pe softer, or rigid" in failed.value.advice
+
+
+def test_runs_that_fail_without_a_fast_oscillation_name_none(tmp_path):
+    with pytest.raises(ephs.SimulationError) as failed:
+        ephs.simulate(pendulum(tmp_path, 1e3, rate=1.0), 1.0, method="rk54", max_steps=3)
+    assert "oscillation" not in str(failed.value)
