@@ -11,6 +11,7 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.given import defined
 from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage, midpoint
 
 
@@ -43,7 +44,7 @@ class Continuous:
     def behaviour(self, primitive: Primitive, x: Point) -> Behaviour:
         """The relation at the base point x (states of the primitive's read ports)."""
         if isinstance(primitive, Storage):
-            effort = primitive.effort(x, self.reference)
+            effort = defined(primitive.name, "the effort", primitive.effort(x, self.reference), x)
             return Storing(lambda _rate: effort)
         if isinstance(primitive, Reversible):
             skew, constraint = primitive.structure(x)

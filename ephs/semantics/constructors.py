@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.operad import Directory, Interface, Path, PortType, Quantity
-from ephs.semantics import structures
+from ephs.semantics import forms, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.checks import random_point
+from ephs.semantics.derive.recording import Untraceable
 from ephs.semantics.domains import Bounds, bounded, domain_of, within_domain
 from ephs.semantics.errors import StructureError
-from ephs.semantics.given import finite_matrix, flat_vector, real_number, require_arguments, value_of
+from ephs.semantics.given import defined, finite_matrix, flat_vector, real_number, require_arguments, value_of
 from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 
 Ports = Mapping[str, Quantity]
@@ -77,15 +78,12 @@ def storage(
 
     bounds = domain_of(name, interface, domain)
 
-    def value(x: Point) -> float:
+    def called(x: Point) -> float:
         with np.errstate(all="ignore"):  # NaN and infinities are detected in the value
-            return real_number(name, value_of(name, "the energy", energy, x)) if within_domain(bounds, x) else math.nan
-
-    from ephs.semantics.derive.recording import Untraceable
-    from ephs.semantics.forms import storage_form
+            return real_number(name, value_of(name, "the energy", energy, x))
 
     try:
-        form = storage_form(interface, energy, bounds)
+        form = forms.storage_form(interface, energy, bounds)
     except Untraceable:
         form = None
 
@@ -98,7 +96,7 @@ def storage(
     made = Storage(
         name,
         interface,
-        energy=value,
+        energy=bounded(called if form is None else form.energy, bounds, math.nan),
         gradient=bounded(derived, bounds, np.full(n, np.nan)) if derived is not None and bounds else derived,
         discrete_gradient=None if form is None else form.discrete_gradient,
         parameters=(("energy", _name(energy)),),
@@ -109,7 +107,14 @@ def storage(
     return made.with_initial(initial) if initial else made
 
 
-def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name: str = "gyrator") -> Reversible:
+def gyrator(
+    ports: Ports,
+    matrix: Matrix,
+    *,
+    domain: Bounds | None = None,
+    reversed_field: bool = False,
+    name: str = "gyrator",
+) -> Reversible:
     """Reversible f = L(x) e with L skew.
 
     Parameters
@@ -120,6 +125,9 @@ def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name:
         L (n, n) over the power ports in their order; or a function of the read states, by name, that gives it.
     domain
         Of the read states, as of a `storage`.
+    reversed_field
+        An external field turns around with time, as a magnet's or the rotation of a frame: L may join quantities of
+        equal parity, as in a permanent-magnet motor, a circulator, or for the Lorentz force.
 
     Raises
     ------
@@ -129,16 +137,24 @@ def gyrator(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name:
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
     if not callable(matrix) and not domain:
-        return structures.constant_structure(name, interface, finite_matrix(name, matrix, n, n), np.zeros((0, n)))
-    given, read = _reader(name, interface, matrix)
+        skew = finite_matrix(name, matrix, n, n)
+        return structures.constant_structure(name, interface, skew, np.zeros((0, n)), reversed_field=reversed_field)
+    given, read = _reader(name, interface, matrix, n, n)
 
-    def structure(x: Point) -> tuple[Array, Array]:
+    def called(x: Point) -> tuple[Array, Array]:
         return finite_matrix(name, read(x), n, n), np.zeros((0, n))
 
-    return reversible(name, interface, structure, Formula(_both(given, None)), 0, domain)
+    return reversible(name, interface, called, Formula(_both(given, None)), 0, domain, reversed_field)
 
 
-def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, name: str = "transformer") -> Reversible:
+def transformer(
+    ports: Ports,
+    matrix: Matrix,
+    *,
+    domain: Bounds | None = None,
+    reversed_field: bool = False,
+    name: str = "transformer",
+) -> Reversible:
     """Reversible e₂ = g(x) e₁, f₁ = −g(x)* f₂ from the first power port to the others.
 
     Parameters
@@ -147,8 +163,8 @@ def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, n
         Port name -> quantity; ``"~name"`` for a state port, which the matrix may read.
     matrix
         g (n₂, n₁); or a function of the read states, by name, that gives it.
-    domain
-        Of the read states, as of a `storage`.
+    domain, reversed_field
+        As of a `gyrator`.
     """
     interface = _interface(name, ports)
     bundle = Bundle.of(interface)
@@ -163,17 +179,18 @@ def transformer(ports: Ports, matrix: Matrix, *, domain: Bounds | None = None, n
 
     if not callable(matrix) and not domain:
         zero = np.zeros((bundle.size, bundle.size))
-        return structures.constant_structure(name, interface, zero, whole(finite_matrix(name, matrix, k, first)))
-    given, read = _reader(name, interface, matrix)
+        rows = whole(finite_matrix(name, matrix, k, first))
+        return structures.constant_structure(name, interface, zero, rows, reversed_field=reversed_field)
+    given, read = _reader(name, interface, matrix, k, first)
     right = np.eye(k).astype(object)
 
     def beside(**x: Any) -> Any:
-        return np.hstack([-np.asarray(given(**x), dtype=object).reshape(k, first), right])
+        return np.hstack([-np.asarray(given(**x), dtype=object), right])
 
-    def structure(x: Point) -> tuple[Array, Array]:
+    def called(x: Point) -> tuple[Array, Array]:
         return np.zeros((bundle.size, bundle.size)), whole(finite_matrix(name, read(x), k, first))
 
-    return reversible(name, interface, structure, Formula(_both(None, beside)), k, domain)
+    return reversible(name, interface, called, Formula(_both(None, beside)), k, domain, reversed_field)
 
 
 def constraint(
@@ -182,6 +199,7 @@ def constraint(
     *,
     multipliers: int | None = None,
     domain: Bounds | None = None,
+    reversed_field: bool = False,
     name: str = "constraint",
 ) -> Reversible:
     """Reversible f = C(x)* λ, 0 = C(x) e.
@@ -194,23 +212,24 @@ def constraint(
         C (k, n) over the power ports in their order; or a function of the read states, by name, that gives it.
     multipliers
         k; where None and the matrix is a function, its rows are counted at a random state.
-    domain
-        Of the read states, as of a `storage`.
+    domain, reversed_field
+        As of a `gyrator`.
     """
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
     zero = np.zeros((n, n))
     if not callable(matrix) and not domain:
-        rows: Any = matrix
-        k = len(rows) if np.ndim(rows) == 2 else 1
-        return structures.constant_structure(name, interface, zero, finite_matrix(name, np.atleast_2d(rows), k, n))
-    given, read = _reader(name, interface, matrix)
+        given: Any = matrix
+        k = len(given) if np.ndim(given) == 2 else 1
+        rows = finite_matrix(name, np.atleast_2d(given), k, n)
+        return structures.constant_structure(name, interface, zero, rows, reversed_field=reversed_field)
+    given, read = _reader(name, interface, matrix, multipliers, n)
     k = _rows(interface, read) if multipliers is None else multipliers
 
-    def structure(x: Point) -> tuple[Array, Array]:
+    def called(x: Point) -> tuple[Array, Array]:
         return zero, finite_matrix(name, read(x), k, n)
 
-    return reversible(name, interface, structure, Formula(_both(None, given)), k, domain)
+    return reversible(name, interface, called, Formula(_both(None, given)), k, domain, reversed_field)
 
 
 def irreversible(
@@ -251,21 +270,23 @@ def irreversible(
     require_arguments(name, "matrix", matrix, tuple(interface))
     bounds, n = domain_of(name, interface, domain), bundle.size
 
+    formula, reads = Formula(matrix), _reads(interface)
+    kernel = _kernel(interface, formula, None, bounds)
+    recorded = None if kernel is None else forms.recorded_matrix(kernel, bundle, reads)
+
     def evaluate(x: Point, e: Array, reference: Reference) -> Array:
         given = {**bundle.split(e + bundle.intensive(reference)), **x}
-        return (
-            finite_matrix(name, value_of(name, "the matrix", matrix, given), n, n)
-            if within_domain(bounds, given)
-            else np.full((n, n), np.nan)
-        )
+        if not within_domain(bounds, given):
+            return np.full((n, n), np.nan)
+        if recorded is None:
+            return finite_matrix(name, value_of(name, "the matrix", matrix, given), n, n)
+        return defined(name, "the matrix M", recorded(x, e, reference), given)
 
-    formula = Formula(matrix)
-    kernel = _kernel(interface, formula, None, bounds)
     return Irreversible(
         name,
         interface,
         evaluate,
-        _reads(interface),
+        reads,
         kernel=kernel,
         formula=formula,
         domain=bounds,
@@ -276,14 +297,26 @@ def irreversible(
 def reversible(
     name: str,
     interface: Interface,
-    structure: Callable[[Point], tuple[Array, Array]],
+    called: Callable[[Point], tuple[Array, Array]],
     formula: Formula,
     multipliers: int,
     domain: Bounds | None,
+    reversed_field: bool = False,
 ) -> Reversible:
-    """A structure that reads states, compiled where its formula can be traced; those states may have a domain."""
+    """A structure that reads states: that of its formula's record, else that of a function, ``called`` back.
+
+    Its states may have a domain.
+    """
     bounds = domain_of(name, Interface({port: interface[port] for port in _reads(interface)}), domain)
-    n = Bundle.of(interface).size
+    n, kernel = Bundle.of(interface).size, _kernel(interface, formula, multipliers, bounds)
+    recorded = None if kernel is None else forms.recorded_structure(kernel, n, _reads(interface))
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        if recorded is None:
+            return called(x)
+        skew, constraint = recorded(x)
+        return defined(name, "the matrix L", skew, x), defined(name, "the matrix C", constraint, x)
+
     nothing = np.full((n, n), np.nan), np.full((multipliers, n), np.nan)
     return Reversible(
         name,
@@ -291,9 +324,10 @@ def reversible(
         bounded(structure, bounds, nothing) if bounds else structure,
         reads=_reads(interface),
         multipliers=multipliers,
-        kernel=_kernel(interface, formula, multipliers, bounds),
+        kernel=kernel,
         formula=formula,
         domain=bounds,
+        reversed_field=reversed_field,
     )
 
 
@@ -308,14 +342,11 @@ def _both(skew: Callable[..., Any] | None, constraint: Callable[..., Any] | None
 
 def _kernel(interface: Interface, formula: Formula, multipliers: int | None, bounds: Domain) -> Kernel | None:
     """The kernel of a reversible structure with so many multipliers, or of an irreversible one; None if untraced."""
-    from ephs.semantics.derive.recording import Untraceable
-    from ephs.semantics.forms import irreversible_kernel, reversible_kernel
-
     reads = _reads(interface)
     try:
         if multipliers is None:
-            return irreversible_kernel(interface, reads, formula, bounds)
-        return reversible_kernel(interface, reads, formula, multipliers, bounds)
+            return forms.irreversible_kernel(interface, reads, formula, bounds)
+        return forms.reversible_kernel(interface, reads, formula, multipliers, bounds)
     except Untraceable:
         return None
 
@@ -338,15 +369,25 @@ def _reads(interface: Interface) -> tuple[Path, ...]:
     return tuple(port for port, port_type in interface.items() if not port_type.power)
 
 
-def _reader(name: str, interface: Interface, matrix: Matrix) -> tuple[Callable[..., Any], Callable[[Point], ArrayLike]]:
-    """The matrix as a function of the states that are read, by name and as a point."""
+def _reader(
+    name: str, interface: Interface, matrix: Matrix, rows: int | None, columns: int
+) -> tuple[Callable[..., Any], Callable[[Point], ArrayLike]]:
+    """The matrix as a function of the states that are read: by name, of its shape, and as a point."""
 
     def constant(**_: Any) -> Any:
         return matrix
 
     given = matrix if callable(matrix) else constant
     require_arguments(name, "matrix", given, _reads(interface))
-    return given, lambda x: value_of(name, "the matrix", given, x)
+
+    def shaped(**x: Any) -> Any:
+        found = np.asarray(given(**x), dtype=object)
+        expected = found.shape[0] if rows is None and found.ndim else rows, columns
+        if found.shape != expected:
+            raise ValueError(f"the matrix is {found.shape}, expected {expected}")
+        return found
+
+    return shaped, lambda x: value_of(name, "the matrix", given, x)
 
 
 def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:

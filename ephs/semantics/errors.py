@@ -12,12 +12,26 @@ _TEXTS = {
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
     "interface": ("{path}: the filling's interface is {found}, expected {expected}; rename the filling's ports"),
     "finite": "{path}: {what} is {found}, expected finite numbers (witness: {witness})",
+    "unlike": (
+        "{path}: the function says {found}, expected {expected} as its record of operations says, in entry {entry} "
+        "(witness: {witness}); runs use the record: the function must not ask what kind of numbers it is given"
+    ),
+    "changing": (
+        "{path}: the function says {found}, expected {expected} as in the call before, in entry {entry} (witness: "
+        "{witness}); it must depend on its arguments alone"
+    ),
+    "no-value": (
+        "{path}: {what} has no value at {witness}; declare a domain that excludes it, of the component or of the "
+        "port's quantity"
+    ),
     "undefined": "{path}: {key} is {found}, expected {expected}",
     "isotropy": ("{path}: not reversible: entry {entry} of L + Lᵀ is {found}, expected 0 (witness: {witness})"),
     "gyrator-shape": "{path}: the matrix L is {found}, expected {expected} for its ports",
     "constraint-shape": "{path}: the matrix C is {found}, expected {expected} for its ports",
     "conservation": ("{path}: {quantity} is not conserved: entry {entry} is {found}, expected 0 (witness: {witness})"),
-    "parity": ("{path}: not invariant under time reversal: defect {found}, expected 0 (witness: {witness})"),
+    "parity": (
+        "{path}: not invariant under time reversal: defect {found}, expected 0 (witness: {witness}); declare {flag}"
+    ),
     "onsager-shape": "{path}: the matrix M is {found}, expected {expected} for its ports",
     "symmetry": ("{path}: not Onsager symmetric: entry {entry} of M − Mᵀ is {found}, expected 0 (witness: {witness})"),
     "definite": ("{path}: M has the negative eigenvalue {found}; the second law expects none (witness: {witness})"),
@@ -29,7 +43,7 @@ _TEXTS = {
     ),
     "gradient-shape": "{path}: the gradient is {found}, expected {expected} for its ports",
     "gradient": (
-        "{path}: the gradient's entry {entry} is {found}, expected {expected} by differences (witness: {witness})"
+        "{path}: the gradient's entry {entry} is {found}, expected the energy's slope {expected} (witness: {witness})"
     ),
     "temperature": (
         "{path}: the absolute temperature is {found} K, expected > 0; check the state or the energy function"

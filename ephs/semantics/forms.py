@@ -12,6 +12,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relating import Port
+from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN
@@ -26,8 +27,9 @@ Carried = dict[int, tuple[tuple[str, float], ...]]
 @final
 @dataclass(frozen=True, slots=True)
 class StorageForm:
-    """A recorded energy: its gradient and discrete gradient for Python, its relation."""
+    """A recorded energy: its value, gradient and discrete gradient for Python, its relation."""
 
+    energy: Callable[[Point], float]
     gradient: Callable[[Point], Array]
     discrete_gradient: Callable[[Point, Array], Array]
     kernel: Kernel
@@ -57,7 +59,7 @@ def stored(
     def whole(**states: Any) -> Any:
         return energy(**states, **numbers)
 
-    def value(x: Point) -> float:
+    def called(x: Point) -> float:
         with np.errstate(all="ignore"):  # NaN and infinities are detected in the value
             return float(whole(**_named(x)))
 
@@ -69,7 +71,7 @@ def stored(
     return Storage(
         name,
         interface,
-        energy=value,
+        energy=called if form is None else form.energy,
         gradient=None if form is None else form.gradient,
         discrete_gradient=None if form is None else form.discrete_gradient,
         parameters=tuple(numbers.items()) if parameters is None else parameters,
@@ -95,7 +97,7 @@ def dissipated(
     def whole(**values: Any) -> Any:
         return matrix(**values, **numbers)
 
-    def evaluate(x: Point, e: Array, reference: Reference) -> Array:
+    def called(x: Point, e: Array, reference: Reference) -> Array:
         given = bundle.split(e + bundle.intensive(reference)) | {port: x[port] for port in reads}
         with np.errstate(all="ignore"):
             return np.array(whole(**_named(given)), dtype=float)
@@ -104,6 +106,7 @@ def dissipated(
         kernel = irreversible_kernel(interface, reads, Formula(whole), label=label)
     except Untraceable:  # called back; the library's own are recorded, as tests ask
         kernel = None
+    evaluate = called if kernel is None else recorded_matrix(kernel, bundle, reads)
     entries = tuple(numbers.items()) if parameters is None else parameters
     kept: dict[str, Any] = {"formula": Formula(matrix, tuple(numbers)) if printed else None}
     return Irreversible(name, interface, evaluate, reads, entries, kernel, **(kept | said))
@@ -126,15 +129,60 @@ def coupled(
         Where not the state ports are read.
     """
     reads = reads or tuple(port for port, port_type in interface.items() if not port_type.power)
-    n, formula = Bundle.of(interface).size, Formula(structure)
-    both = stacked(formula, n, multipliers)
-
-    def evaluate(x: Point) -> tuple[Array, Array]:
-        found = np.array(both(**_named({port: x[port] for port in reads})), dtype=float)
-        return found[:n], found[n:]
-
+    formula = Formula(structure)
     kernel = reversible_kernel(interface, reads, formula, multipliers, label=label or name)
+    evaluate = recorded_structure(kernel, Bundle.of(interface).size, reads)
     return Reversible(name, interface, evaluate, reads, multipliers=multipliers, kernel=kernel, formula=formula, **said)
+
+
+def recorded_matrix(
+    kernel: Kernel, bundle: Bundle, reads: tuple[Path, ...]
+) -> Callable[[Point, Array, Reference], Array]:
+    """M (n, n) of a recorded process, from states, exergetic efforts (n,) and the reference; NaN where it has none."""
+    value = recorded_values(kernel)
+    return lambda x, e, reference: value([*(e + bundle.intensive(reference)), *_numbers_of(x, reads)])
+
+
+def recorded_structure(kernel: Kernel, n: int, reads: tuple[Path, ...]) -> Callable[[Point], tuple[Array, Array]]:
+    """(L (n, n), C (k, n)) of a recorded structure from states; NaN where it has none."""
+    value = recorded_values(kernel)
+
+    def structure(x: Point) -> tuple[Array, Array]:
+        rows = value(_numbers_of(x, reads))
+        return rows[:n], rows[n:]
+
+    return structure
+
+
+def recorded_values(kernel: Kernel) -> Callable[[Sequence[float]], Array]:
+    """What the tape of a kernel says of its numbers, in the shape of what was recorded; NaN where it has no value."""
+    relation = kernel.relation
+    match relation:
+        case relations.Storage():
+            tape = relation.energy
+        case relations.Reversible():
+            tape = relation.structure
+        case relations.Irreversible():
+            tape = relation.matrix
+        case _:
+            raise TypeError(f"{type(relation).__name__} has no tape")
+    first = len(kernel.potentials)
+    parameters = kernel.parameters[first : first + tape.parameters]
+    return lambda numbers: run_tape(tape, numbers, parameters)
+
+
+def run_tape(tape: Tape, numbers: Sequence[float], parameters: Sequence[float]) -> Array:
+    """The values of a tape at numbers, in its shape; NaN where one has no value."""
+    with np.errstate(all="ignore"):
+        try:
+            found = evaluate(PLAIN, tape, [np.float64(x) for x in numbers], [np.float64(p) for p in parameters])
+        except ArithmeticError:  # of two numbers of the formula, as 1/0
+            return np.full(tape.shape, np.nan)
+    return np.array(found, dtype=float).reshape(tape.shape)
+
+
+def _numbers_of(x: Point, ports: Sequence[Path]) -> list[float]:
+    return [float(entry) for port in ports for entry in x[port]]
 
 
 def _named(values: Point) -> dict[str, Any]:
@@ -165,7 +213,7 @@ def storage_form(
     relation = relations.Storage(found.tape, _ports(interface, ports), _reference(bundle), hot, tuple(carried), bounds)
 
     def discrete(x: Point, v: Array) -> Array:
-        numbers = [entry for port in ports for entry in x[port]]
+        numbers = _numbers_of(x, ports)
         parameters = [np.float64(value) for value in found.parameters]
         with np.errstate(all="ignore"):
             try:
@@ -173,8 +221,10 @@ def storage_form(
             except ArithmeticError:  # of two numbers of the formula, as 1/0
                 return np.full(bundle.size, np.nan)
 
+    kernel = _kernel(label, relation, carried, found.parameters)
+    value = recorded_values(kernel)
     return StorageForm(
-        lambda x: discrete(x, np.zeros(bundle.size)), discrete, _kernel(label, relation, carried, found.parameters)
+        lambda x: value(_numbers_of(x, ports)).item(), lambda x: discrete(x, np.zeros(bundle.size)), discrete, kernel
     )
 
 

@@ -77,3 +77,17 @@ def finite_matrix(name: str, value: ArrayLike, rows: int, columns: int) -> Array
         kind = "parameter" if out.shape != (rows, columns) else "undefined"
         raise StructureError(kind, name, key="matrix", found=value, expected=expected)
     return out
+
+
+def defined(name: str, what: str, found: Array, values: Mapping[Path, Array]) -> Array:
+    """Return what a record says at these values, if it is a number.
+
+    Raises
+    ------
+    StructureError
+        It is none: a root of a negative number, 0/0.
+    """
+    if not np.all(np.isfinite(found)):
+        witness = ", ".join(f"{port} = {value}" for port, value in named_numbers(values).items()) or "any state"
+        raise StructureError("no-value", name, what=what, witness=witness)
+    return found

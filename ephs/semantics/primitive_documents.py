@@ -24,6 +24,8 @@ from ephs.semantics.symbols.algebra import sp
 from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, term_from, term_of
 from ephs.semantics.symbols.tracing import Untraceable, symbols_of, trace
 
+FLAGS = {"reversible": "reversed_field", "irreversible": "one_sided"}
+"""Key that says that a structure need not be invariant under time reversal, by kind."""
 KINDS = ("part", "storage", "reversible", "irreversible")
 AGREEMENT = 1e-9
 """Largest relative difference between a primitive and its document read back: rounding of formulas with 10⁴ terms."""
@@ -45,6 +47,9 @@ def primitive_record(path: Path, primitive: Primitive) -> dict[str, Any]:
         return {"part": part.word, "ports": ports, "parameters": numbers} | _started(primitive)
     try:
         entry = {primitive.kind: primitive.name, "ports": ports} | _formula(primitive) | _started(primitive)
+        flag = FLAGS.get(primitive.kind, "")
+        if flag and getattr(primitive, flag):
+            entry[flag] = True
         if primitive.domain:
             entry["domain"] = {str(port): domain_record((low, high)) for port, low, high in primitive.domain}
         again = primitive_from(Reader("system"), str(path), entry)
@@ -71,13 +76,17 @@ def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
     kind = kinds[0]
     name = reader.text(f"{where}.{kind}", found[kind])
     domain: Bounds = _bounds(reader, f"{where}.domain", found.pop("domain", {})) if kind != "part" else {}
+    flag = FLAGS.get(kind, "")
+    flagged = found.pop(flag, False) if flag else False
+    if not isinstance(flagged, bool):
+        reader.refuse(f"{where}.{flag}", str(flagged), "true or false")
     initial = found.pop("initial", None) if kind in ("part", "storage") else None
     read = {"part": _part, "storage": _storage, "reversible": _reversible, "irreversible": _irreversible}[kind]
     keys = {"part": {"parameters"}, "storage": {"energy"}, "reversible": set[str](), "irreversible": {"M"}}[kind]
     more = {"storage": {"function"}, "reversible": {"L", "C"}}.get(kind, set())
     reader.record(where, found, {kind, "ports"} | keys, more)
     ports = _ports(reader, f"{where}.ports", found["ports"])
-    make = read(reader, where, name, ports, found, domain)
+    make = read(reader, where, name, ports, found | ({flag: flagged} if flag else {}), domain)
     try:
         made = make()
     except PatternError:
@@ -159,6 +168,7 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
     if skew is not None and len(skew.rows) != n:
         reader.refuse(f"{where}.L", f"{len(skew.rows)} rows", f"{n}")
     zero, k = np.zeros((n, n)), 0 if constraint is None else len(constraint.rows)
+    reversed_field = bool(found["reversed_field"])
 
     def structure(x: Point) -> tuple[Array, Array]:
         values = {str(port): float(v[0]) if v.size == 1 else v for port, v in x.items()}
@@ -168,8 +178,9 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
 
     def make() -> Primitive:
         if not domain and all(part is None or part.numbers for part in (skew, constraint)):
-            return structures.constant_structure(name, ports, *structure({}))
-        return constructors.reversible(name, ports, structure, Formula(Structure(skew, constraint)), k, domain)
+            return structures.constant_structure(name, ports, *structure({}), reversed_field=reversed_field)
+        formula = Formula(Structure(skew, constraint))
+        return constructors.reversible(name, ports, structure, formula, k, domain, reversed_field)
 
     return make
 
@@ -179,7 +190,8 @@ def _irreversible(reader: Reader, where: str, name: str, ports: Interface, found
     spaces = {port: (kind.power, kind.quantity.space) for port, kind in ports.items()}
     names = {str(port): space.dim if power else space.size for port, (power, space) in spaces.items()}
     matrix = _matrix(reader, f"{where}.M", found["M"], names, n)
-    return lambda: constructors.irreversible(_named(ports), matrix, domain=domain, name=name)
+    one_sided = bool(found["one_sided"])
+    return lambda: constructors.irreversible(_named(ports), matrix, domain=domain, one_sided=one_sided, name=name)
 
 
 def _bounds(reader: Reader, where: str, value: object) -> Bounds:

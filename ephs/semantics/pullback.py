@@ -65,7 +65,9 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
         skew, constraint = process.structure({})
         rows = constraint @ whole
         made = whole.T @ skew @ whole
-        return structures.constant_structure(process.name, interface, made, rows, entries, trusted=sound)
+        return structures.constant_structure(
+            process.name, interface, made, rows, entries, trusted=sound, reversed_field=process.reversed_field
+        )
     kernel = _kernel(process, maps)
     if isinstance(process, Irreversible):
         given = process
@@ -82,6 +84,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
             kernel,
             proof=proof,
             trusted=sound,
+            one_sided=process.one_sided,
         )
     inner = process
 
@@ -107,6 +110,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
         proof=proof,
         trusted=sound,
         working=inner.working,
+        reversed_field=inner.reversed_field,
     )
 
 

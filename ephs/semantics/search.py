@@ -6,6 +6,7 @@ the same trials by Hypothesis.
 
 import random
 from collections.abc import Sequence
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,17 @@ import numpy as np
 from ephs.semantics.bundle import Reference
 from ephs.semantics.checks import NEARER, check_at
 from ephs.semantics.errors import StructureError
-from ephs.semantics.trials import REFERENCES, Trial, chosen, coordinates, simpler, smallest, trial_of
+from ephs.semantics.trials import (
+    REFERENCES,
+    Trial,
+    beside,
+    chosen,
+    coordinates,
+    simpler,
+    smallest,
+    special_numbers,
+    trial_of,
+)
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive
@@ -24,7 +35,7 @@ DEFINED = 40
 """Trials in which a structure has to have a finite value once."""
 SHRINKS = 2000
 """Trials on the way to the simplest counterexample, at most."""
-UNDEFINED = ("finite", "undefined")
+UNDEFINED = ("finite", "undefined", "no-value")
 """Exceptions that mean that the structure is undefined at a state."""
 
 
@@ -70,12 +81,16 @@ def search(primitive: "Primitive", count: int) -> int:
     StructureError
         With the simplest counterexample found as its witness.
     """
-    source = random.Random(20)
+    source, special = random.Random(20), special_numbers(primitive)
     undefined: StructureError | None = None
     defined = 0
+    for numbers in islice(beside(primitive, special), count):
+        found = failure(primitive, trial_of(primitive, numbers, REFERENCES[0]))
+        if found is not None and found.kind not in UNDEFINED:
+            raise shrunk(primitive, numbers, REFERENCES[0], found)
     for share in NEARER:
         for number in range(count):
-            numbers, reference = chosen(primitive, source.randrange if number else _first)
+            numbers, reference = chosen(primitive, source.randrange, special) if number else chosen(primitive, _first)
             found = failure(primitive, trial_of(primitive, numbers, reference).nearer(primitive, share))
             if found is None:
                 defined += 1

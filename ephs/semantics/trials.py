@@ -8,7 +8,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, final
+from types import CellType, CodeType, FunctionType
+from typing import TYPE_CHECKING, cast, final
 
 import numpy as np
 
@@ -32,6 +33,13 @@ SMALL = 4
 ROTATING = (codes.SO3, codes.SE3, codes.SO3xR3)
 """Groups whose points begin with a quaternion."""
 DECADES = (0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6, -7, 7, -8, 8)
+HOT = "entropy effort"
+TEMPERATURES = (273.15, 293.15, 298.15, 300.0)
+"""Temperatures in K at which tables are usual."""
+NEAR = 1e-3
+"""Relative distance from a special number at which it is near."""
+SPECIAL = 64
+"""Numbers of a function that are tried, at most."""
 REFERENCES = (Reference(1.0, 0.0), Reference(), Reference(300.0, 300.0))
 """With θ₀ = 1 K and π₀ = 0, numbers of human size are exact as efforts of exergy, too."""
 
@@ -125,6 +133,20 @@ class Coordinate:
     kind: str
     angle: bool = False
 
+    def takes(self, special: float) -> bool:
+        """Whether a special number is one for this coordinate: within its bounds, a temperature for temperatures."""
+        suits = self.kind == HOT or special not in TEMPERATURES
+        return suits and not self.angle and self.low < special < self.high
+
+    def within(self, number: float) -> float:
+        """A number of about this size between the bounds."""
+        low, high = self.low, self.high
+        if low == -math.inf and high == math.inf:
+            return number
+        if high < math.inf and low > -math.inf:
+            return low + (high - low) * (0.5 + math.atan(number) / math.pi)
+        return low + abs(number) if low > -math.inf else high - abs(number)
+
 
 def coordinates(primitive: "Primitive") -> list[Coordinate]:
     """The numbers of a trial: energy efforts of an irreversible primitive, then the states that are read."""
@@ -145,6 +167,50 @@ def coordinates(primitive: "Primitive") -> list[Coordinate]:
     return out
 
 
+def special_numbers(primitive: "Primitive", more: Iterable[float] = ()) -> tuple[float, ...]:
+    """Numbers beside which a structure may change: those that its function is written with, and usual temperatures."""
+    found = [*TEMPERATURES, *more]
+    if primitive.formula is not None:
+        found += _written(primitive.formula.function, set())
+    found += [float(value) for _, value in primitive.parameters if isinstance(value, int | float)]
+    return tuple(dict.fromkeys(x for x in found if math.isfinite(x) and x))[:SPECIAL]
+
+
+def _written(value: object, seen: set[int]) -> list[float]:
+    """The numbers in a function's code, in what it closes over, and in the functions that it calls."""
+    if id(value) in seen or len(seen) > SPECIAL:
+        return []
+    seen.add(id(value))
+    parts: list[object] = []
+    match value:
+        case bool():
+            return []
+        case int() | float() | np.number():
+            return [float(value)] if not isinstance(value, np.complexfloating) else []
+        case tuple() | list():
+            parts = list(cast("Iterable[object]", value))
+        case np.ndarray():
+            parts = value.ravel().tolist() if value.size <= SMALL**2 else []
+        case CodeType():
+            parts = list(value.co_consts)
+        case FunctionType():
+            used = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
+            cells = [cell.cell_contents for cell in value.__closure__ or () if _filled(cell)]
+            parts = [value.__code__, *cells, *(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values()]
+            parts += [each for each in used if isinstance(each, int | float | FunctionType)]
+        case _:
+            pass
+    return [number for part in parts for number in _written(part, seen)]
+
+
+def _filled(cell: CellType) -> bool:
+    try:
+        _ = cell.cell_contents
+    except ValueError:
+        return False
+    return True
+
+
 def trial_of(primitive: "Primitive", numbers: Sequence[float], reference: Reference) -> Trial:
     """The trial with these numbers; rotations as rotation vectors."""
     bundle, at = primitive.bundle, 0
@@ -160,24 +226,38 @@ def trial_of(primitive: "Primitive", numbers: Sequence[float], reference: Refere
     return Trial(states, energy - bundle.intensive(reference), reference)
 
 
-def chosen(primitive: "Primitive", choose: Choose) -> tuple[list[float], Reference]:
-    """The numbers of a trial and its reference, from choices."""
+def beside(primitive: "Primitive", special: Iterable[float]) -> Iterator[list[float]]:
+    """The simplest numbers with one of them at each special number, near it, and next to it, on both sides."""
+    simple, _ = chosen(primitive, lambda _: 0)
+    where = coordinates(primitive)
+    for value in special:
+        for i, coordinate in enumerate(where):
+            if coordinate.takes(value):
+                ends = (math.nextafter(value, math.inf), math.nextafter(value, -math.inf))
+                for number in (value, value * (1.0 - NEAR), value * (1.0 + NEAR), *ends):
+                    yield [*simple[:i], number, *simple[i + 1 :]]
+
+
+def chosen(primitive: "Primitive", choose: Choose, special: Sequence[float] = ()) -> tuple[list[float], Reference]:
+    """The numbers of a trial and its reference, from choices; some of them next to special numbers."""
     reference = REFERENCES[choose(len(REFERENCES))]
     seen: dict[str, list[float]] = {}
     numbers: list[float] = []
     for coordinate in coordinates(primitive):
-        numbers.append(_number(choose, coordinate, seen.setdefault(coordinate.kind, [])))
+        mine = [value for value in special if coordinate.takes(value)]
+        numbers.append(_number(choose, coordinate, seen.setdefault(coordinate.kind, []), mine))
     return numbers, reference
 
 
-def _number(choose: Choose, coordinate: Coordinate, seen: list[float]) -> float:
-    """A number between two bounds: of human size, of any size, or next to one that was chosen before."""
+def _number(choose: Choose, coordinate: Coordinate, seen: list[float], special: Sequence[float]) -> float:
+    """A number between two bounds: of human size, of any size, or next to one that was chosen before, or is special."""
     low, high = coordinate.low, coordinate.high
-    way = choose(4)
+    way = choose(5 if special else 4)
     if coordinate.angle:
         found = float(ANGLES[choose(len(ANGLES))])
-    elif seen and way == 3:
-        base, gap = seen[choose(len(seen))], (0.0, 1.0, -1.0)[choose(3)]
+    elif way == 4 or (seen and way == 3):
+        among = special if way == 4 else seen
+        base, gap = among[choose(len(among))], (0.0, 1.0, -1.0)[choose(3)]
         found = base * (1.0 + gap * 10.0 ** -(1 + choose(9)))
     elif high - low < math.inf and way:
         found = low + (high - low) * (choose(65) + 0.5) / 65.0

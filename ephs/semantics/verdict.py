@@ -88,16 +88,19 @@ def examine(primitive: "Primitive") -> StructureVerdict:
         return StructureVerdict(conditions)
     tried = search(primitive, COUNT)
     how = f"none of {tried} states and efforts contradicts it"
-    return StructureVerdict(each if each.proved else Condition(each.statement, False, how) for each in conditions)
+    return StructureVerdict(
+        each if each.proved else Condition(each.statement, False, each.how or how) for each in conditions
+    )
 
 
 def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
-    """The conditions without that on parity where the primitive is one-sided."""
+    """The conditions without that on parity where the primitive is one-sided, or in a reversed field."""
     from ephs.semantics.checks import MIRRORED
 
-    if primitive.kind != "irreversible" or not primitive.one_sided:
-        return conditions
-    return tuple(each for each in conditions if each.statement != MIRRORED)
+    free = (primitive.kind == "irreversible" and primitive.one_sided) or (
+        primitive.kind == "reversible" and primitive.reversed_field
+    )
+    return tuple(each for each in conditions if not free or each.statement != MIRRORED[primitive.kind])
 
 
 def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
@@ -109,6 +112,10 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
         return proved("by definition of the reference environment", "H = 0 and e = 0")
     if primitive.proof is not None:
         return primitive.proof()
+    if primitive.formula is not None:
+        from ephs.semantics.verdicts.recorded import require_steady
+
+        require_steady(primitive)
     simplest(primitive)  # what fails here needs no symbols
     if primitive.kind == "reversible" and not primitive.reads:
         from ephs.semantics.verdicts.constant import decided
@@ -117,5 +124,7 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
     if primitive.formula is None:
         return tuple(Condition(statement, False, "") for statement in STATEMENTS[primitive.kind])
     from ephs.semantics.proving import conditions_of
+    from ephs.semantics.verdicts.recorded import require_recorded
 
-    return conditions_of(primitive)
+    gaps = require_recorded(primitive)
+    return (*conditions_of(primitive), *gaps)

@@ -11,7 +11,7 @@ from ephs.semantics.laws import random_probe, system_law
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.probe import Probe
 from ephs.semantics.search import UNDEFINED, failure, search, shrunk
-from ephs.semantics.trials import chosen, trial_of
+from ephs.semantics.trials import chosen, special_numbers, trial_of
 from ephs.semantics.verdict import StructureVerdict
 
 Numbers = tuple[list[float], Reference]
@@ -20,7 +20,7 @@ Numbers = tuple[list[float], Reference]
 @st.composite
 def trials(draw: st.DrawFn, primitive: Primitive) -> Numbers:
     """Numbers of states and efforts: temperatures with a < b, a > b, a ≈ b, velocities of both signs, all sizes."""
-    return chosen(primitive, lambda among: draw(st.integers(0, among - 1)))
+    return chosen(primitive, lambda among: draw(st.integers(0, among - 1)), special_numbers(primitive))
 
 
 def check_primitive(primitive: Primitive, *, max_examples: int = 500) -> StructureVerdict:

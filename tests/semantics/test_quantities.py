@@ -90,7 +90,7 @@ def test_an_energy_is_asked_inside_of_its_domain_only():
         return 100.0 * math.exp(s / 20.0) + 50.0 * (n * math.log(n) + (1.0 - n) * math.log(1.0 - n))
 
     assert storage({"s": Q.entropy, "n": RARE}, mixing).kernel is not None
-    with pytest.raises(StructureError, match=r"the energy has no value .*n=.*declare the domain"):
+    with pytest.raises(StructureError, match=r"the energy has no value .*n = .*declare a domain"):
         storage({"s": Q.entropy, "n": Quantity("share", ONE, 1)}, mixing)
     with pytest.raises(StructureError, match=r"the matrix has no value .*p=.*declare the domain"):
         irreversible({"p": Q.momentum, "s": Q.entropy}, lambda p, s: math.log(-abs(float(p))) * np.eye(2))

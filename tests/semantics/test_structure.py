@@ -266,7 +266,7 @@ def forged():
     honest = [True]
 
     def matrix(a, b):
-        return (1.0 if honest[0] or float(a) >= float(b) else -1.0) * np.array([[b / a, -1.0], [-1.0, a / b]])
+        return (1.0 if float(a) >= float(b) or honest[0] else -1.0) * np.array([[b / a, -1.0], [-1.0, a / b]])
 
     made = ephs.irreversible(AB, matrix)
     honest[0] = False

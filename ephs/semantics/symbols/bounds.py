@@ -17,6 +17,8 @@ Bounds = Mapping[Expr, Interval]
 WHOLE: Interval = (-math.inf, math.inf)
 PIECES = 600
 """Boxes into which a domain is cut, at most."""
+OPERATIONS = 20_000
+"""Operations on intervals, at most: less than a tenth of a second. Large expressions are bounded over fewer boxes."""
 FAR = 1e6
 """Bound beyond which an unbounded side is no longer cut by doubling."""
 
@@ -28,7 +30,7 @@ def at_least(expression: Expr, bounds: Bounds, *, strict: bool) -> bool:
     """
     symbols = sorted(expression.free_symbols, key=str)
     boxes: list[tuple[Interval, ...]] = [tuple(bounds.get(symbol, WHOLE) for symbol in symbols)]
-    for _ in range(PIECES):
+    for _ in range(min(PIECES, 1 + OPERATIONS // (1 + int(expression.count_ops())))):
         if not boxes:
             return True
         box = boxes.pop()

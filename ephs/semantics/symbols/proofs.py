@@ -23,6 +23,10 @@ from ephs.semantics.symbols.tracing import Trace, Untraceable, trace
 from ephs.semantics.trials import ROTATING, extent
 
 SYMBOLIC = "symbolically"
+LARGE = 4000
+"""Operations of a formula times its rows, beyond which it is not proved: elimination would take up to a minute."""
+ONCE = 200
+"""Operations of a formula beyond which its definiteness is not tried again with the exact numbers."""
 Symbols = tuple[Expr, ...]
 Ports = tuple[tuple[Path, Quantity, Symbols], ...]
 """Ports with the symbols of their states."""
@@ -79,6 +83,9 @@ def _of_functions(primitive: Primitive, functions: Any, parameters: Mapping[str,
     called = function if not isinstance(primitive, Reversible) else stacked(primitive.formula, n, k)  # pyright: ignore[reportArgumentType]
     found = trace(called, {**arguments, **parameters})
     slopes = None if gradient is None else trace(_flat(gradient), {**arguments, **parameters})
+    size = sum(int(sp.sympify(entry).count_ops()) for entry in found.outputs.flat)
+    if size * n > LARGE:
+        raise Untraceable(f"the formula has {size} operations")
     best: Findings = ()
     for outputs, derived in zip(_values(found), _values(slopes) if slopes else _nothing(), strict=False):
         key = (primitive.kind, tuple(primitive.interface.items()), ports, tuple(bounds.items()))
@@ -90,7 +97,7 @@ def _of_functions(primitive: Primitive, functions: Any, parameters: Mapping[str,
             efforts = tuple(symbol for port in primitive.bundle.ports for symbol in _listed(arguments[str(port)]))
             now = _irreversible(key, outputs, efforts)
         best = now if not best else tuple(a if a[1] else b for a, b in zip(best, now, strict=True))
-        if all(how for _, how in best):
+        if all(how or (size > ONCE and statement == STATEMENTS["irreversible"][1]) for statement, how in best):
             break
     return best
 

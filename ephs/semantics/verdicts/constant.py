@@ -15,7 +15,7 @@ import numpy as np
 
 from ephs.semantics.algebra.elimination import eliminated
 from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.checks import STATEMENTS
+from ephs.semantics.checks import FLAGS, STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.trials import Trial
@@ -49,7 +49,7 @@ def decided(reversible: "Reversible") -> tuple[Condition, ...]:
     return (
         _isotropy(reversible, isotropic, skew),
         _conservation(reversible, conserved, skew, constraint),
-        _parity(reversible, mirrored, skew, constraint),
+        *(() if reversible.reversed_field else (_parity(reversible, mirrored, skew, constraint),)),
         Condition(turned, True, "no rotation is read"),
     )
 
@@ -154,4 +154,5 @@ def _refuted(
     reversible: "Reversible", kind: str, found: float, entry: tuple[int, ...], **facts: object
 ) -> StructureError:
     witness = Trial({}, np.zeros(reversible.bundle.size), Reference()).witness(reversible, entry, found)
+    facts = {"flag": FLAGS["reversible"], **facts} if kind == "parity" else facts
     return StructureError(kind, reversible.name, found=found, entry=entry, witness=witness, **facts)

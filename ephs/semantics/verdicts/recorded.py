@@ -1,0 +1,246 @@
+"""A user's function against its record: what is run, proved and printed is the record, so the two must agree.
+
+They are compared at some dozens of states and efforts from 1e-6 to 1e6, and on both sides of every number that the
+function is written with. No sampling sees a window that lies between these points and is bounded by numbers that the
+function computes.
+"""
+
+import random
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.derive.recording import Recording, Untraceable, record
+from ephs.semantics.errors import StructureError
+from ephs.semantics.forms import run_tape, stacked
+from ephs.semantics.spaces import manifold
+from ephs.semantics.trials import NEAR, REFERENCES, Trial, beside, chosen, coordinates, special_numbers, trial_of
+from ephs.semantics.verdict import Condition
+from ephs.semantics.verdicts.rounding import ROUNDED, rounding, steps_of
+
+if TYPE_CHECKING:
+    from ephs.semantics.primitives import Primitive
+
+POINTS = 32
+"""Points of all sizes at which a function and its record are compared."""
+OWN = 8
+"""Points at which a primitive's own numbers are compared with its formula's, and calls are repeated."""
+DECADES = 6.0
+"""Sizes of the numbers go from 1e-6 to 1e6."""
+NEIGHBOURS = 4
+"""Points beside one without a value at which one is looked for."""
+DEFINED = "it has a value at every state"
+
+Point = tuple[list[float], Reference]
+
+
+def require_recorded(primitive: "Primitive") -> tuple[Condition, ...]:
+    """Compare a primitive's function with its record.
+
+    Returns
+    -------
+    tuple of Condition
+        That it has a value everywhere, open, if there is a point without one next to points that have one.
+
+    Raises
+    ------
+    StructureError
+        They differ, or there is no value in a part of the domain.
+    """
+    function = _function(primitive)
+    try:
+        recording = record(function, _arguments(primitive))
+    except Untraceable:
+        return ()
+    gap, offset = "", None
+    for number, (numbers, reference) in enumerate(_points(primitive, recording)):
+        trial = trial_of(primitive, numbers, reference)
+        given = _given(primitive, trial)
+        expected = _of_record(recording, given)
+        if not np.all(np.isfinite(expected)):
+            here = _gap(primitive, recording, numbers, reference)  # which refuses what is no single point
+            gap = gap or here
+        found = _called(function, given, np.float64 if number % 2 else float)
+        if found is not None:
+            _require_alike(primitive, recording, trial, found, expected)
+        own = _own(primitive, trial) if number < OWN else None
+        if own is not None and np.all(np.isfinite(own)):
+            if offset is None:  # an energy is known up to a constant
+                offset = own - expected if primitive.kind == "storage" else np.zeros(1)
+            _require_alike(primitive, recording, trial, own - offset, expected)
+    return (Condition(DEFINED, False, f"it has none at {gap}"),) if gap else ()
+
+
+def require_steady(primitive: "Primitive") -> None:
+    """Call or record a primitive's function twice.
+
+    Raises
+    ------
+    StructureError
+        It changes between two calls.
+    """
+    function, arguments = _function(primitive), _arguments(primitive)
+    try:
+        one, two = record(function, arguments), record(function, arguments)
+    except Untraceable:
+        _require_same_calls(primitive, function)
+        return
+    if one.tape != two.tape or not np.array_equal(one.parameters, two.parameters, equal_nan=True):
+        trial = trial_of(primitive, *chosen(primitive, lambda _: 0))
+        here, there = (_of_record(each, _given(primitive, trial)) for each in (one, two))
+        i = int(np.argmax(here != there)) if here.shape == there.shape else 0
+        raise _unlike("changing", primitive, trial, i, there[i], here[i])
+
+
+def _function(primitive: "Primitive") -> Callable[..., Any]:
+    """What is recorded: the formula with its parameters, its matrices as one."""
+    formula, given = primitive.formula, dict(primitive.parameters)
+    assert formula is not None
+    numbers = {name: given[name] for name in formula.parameters}
+
+    def whole(**values: Any) -> Any:
+        return function(**values, **numbers)
+
+    function = formula.function
+    if primitive.kind == "reversible":
+        function = stacked(formula, primitive.bundle.size, primitive.multipliers)
+    return whole if numbers else function
+
+
+def _arguments(primitive: "Primitive") -> dict[str, int | None]:
+    """Names of the arguments with how many numbers a vector has, None of a number: efforts, then states."""
+    sizes: dict[str, int] = {}
+    if primitive.kind == "irreversible":
+        sizes = {str(port): where.stop - where.start for port, where, _ in primitive.bundle.items()}
+    for port in primitive.reads:
+        sizes.setdefault(str(port), manifold(primitive.interface[port].quantity.space).size)
+    return {name: None if size == 1 else size for name, size in sizes.items()}
+
+
+def _given(primitive: "Primitive", trial: Trial) -> dict[str, Array]:
+    """The arguments at a trial, energy efforts first."""
+    given: dict[str, Array] = {}
+    if primitive.kind == "irreversible":
+        bundle = primitive.bundle
+        energy = trial.efforts + bundle.intensive(trial.reference)
+        given = {str(port): effort for port, effort in bundle.split(energy).items()}
+    for port in primitive.reads:
+        given.setdefault(str(port), np.asarray(trial.states[port], dtype=float))
+    return given
+
+
+def _points(primitive: "Primitive", recording: Recording) -> Iterator[Point]:
+    """Numbers of all sizes, the simplest first, then those that the function is written with."""
+    source, where = random.Random(21), coordinates(primitive)
+    simple, reference = chosen(primitive, lambda _: 0)
+    yield simple, reference
+    for i in range(len(where)):
+        for value in (0.0, -simple[i]):
+            if where[i].low < value < where[i].high:
+                yield [*simple[:i], value, *simple[i + 1 :]], reference
+    for number in range(POINTS):
+        if number % 2:
+            yield chosen(primitive, source.randrange)
+            continue
+        numbers: list[float] = []
+        for coordinate in where:
+            size = source.choice((1.0, -1.0)) * 10.0 ** source.uniform(-DECADES, DECADES)
+            numbers.append(source.uniform(-3.0, 3.0) if coordinate.angle else coordinate.within(size))
+        yield numbers, REFERENCES[number // 2 % len(REFERENCES)]
+    for numbers in beside(primitive, special_numbers(primitive, recording.parameters)):
+        yield numbers, reference
+
+
+def _of_record(recording: Recording, given: Mapping[str, Array]) -> Array:
+    return run_tape(recording.tape, _flat(given), recording.parameters).ravel()
+
+
+def _flat(given: Mapping[str, Array]) -> list[float]:
+    return [float(entry) for values in given.values() for entry in values]
+
+
+def _called(function: Callable[..., Any], given: Mapping[str, Array], kind: type) -> Array | None:
+    """The function's numbers for numbers; None where it says that there are none."""
+    try:
+        with np.errstate(all="ignore"):
+            found: Any = function(**{name: kind(x[0]) if x.size == 1 else x for name, x in given.items()})
+            return np.asarray(np.asarray(found, dtype=object), dtype=float).ravel()
+    except (ArithmeticError, TypeError, ValueError):  # no value, or none that is real
+        return None
+
+
+def _own(primitive: "Primitive", trial: Trial) -> Array | None:
+    """What a primitive says itself, which may not be its formula; None where it says nothing."""
+    try:
+        with np.errstate(all="ignore"):
+            if primitive.kind == "irreversible":
+                return primitive.matrix(trial.states, trial.efforts, trial.reference).ravel()
+            if primitive.kind == "reversible":
+                return np.concatenate([part.ravel() for part in primitive.structure(trial.states)])
+            return np.array([primitive.energy(trial.states)]) if primitive.kind == "storage" else None
+    except (ArithmeticError, ValueError):
+        return None
+
+
+def _require_alike(primitive: "Primitive", recording: Recording, trial: Trial, found: Array, expected: Array) -> None:
+    """Refuse a number that is not the record's, by more than both may be rounded."""
+    if found.shape != expected.shape:
+        raise _unlike("unlike", primitive, trial, 0, found.shape, expected.shape)
+    with np.errstate(all="ignore"):
+        apart = np.abs(found - expected) > ROUNDED * np.maximum(np.abs(found), np.abs(expected))
+        apart |= np.isnan(found) != np.isnan(expected)
+    if not apart.any():
+        return
+    numbers = _flat(_given(primitive, trial))
+    outputs = list(recording.tape.outputs)
+    allowed = rounding(lambda factor: steps_of(recording, numbers, factor)[outputs], expected)
+    with np.errstate(all="ignore"):
+        apart &= ~(np.abs(found - expected) <= allowed)
+    if apart.any() and not np.any(np.isinf(steps_of(recording, numbers))):  # what overflows may do so elsewhere
+        i = int(np.argmax(apart))
+        raise _unlike("unlike", primitive, trial, i, found[i], expected[i])
+
+
+def _gap(primitive: "Primitive", recording: Recording, numbers: list[float], reference: Reference) -> str:
+    """The point, if a function has a value near it; empty where its numbers are too large.
+
+    Raises
+    ------
+    StructureError
+        It has none around the point either.
+    """
+    trial = trial_of(primitive, numbers, reference)
+    source = random.Random(24)
+    for _ in range(NEIGHBOURS):
+        shifts = [source.uniform(-NEAR, NEAR) for _ in numbers]
+        moved = [x * (1.0 + shift) if x else shift for x, shift in zip(numbers, shifts, strict=True)]
+        if np.all(np.isfinite(_of_record(recording, _given(primitive, trial_of(primitive, moved, reference))))):
+            return str(trial.witness(primitive))
+    if np.any(np.isinf(steps_of(recording, _flat(_given(primitive, trial))))):
+        return ""
+    what = {"storage": "the energy", "reversible": "the structure"}.get(primitive.kind, "the matrix M")
+    raise StructureError("no-value", primitive.name, what=what, witness=trial.witness(primitive))
+
+
+def _require_same_calls(primitive: "Primitive", function: Callable[..., Any]) -> None:
+    """Refuse a function that cannot be recorded and changes between two calls."""
+    source = random.Random(23)
+    trials = [trial_of(primitive, *chosen(primitive, source.randrange if n else lambda _: 0)) for n in range(OWN)]
+    first = [_called(function, _given(primitive, trial), float) for trial in trials]
+    for trial, one in zip(reversed(trials), reversed(first), strict=True):
+        two = _called(function, _given(primitive, trial), float)
+        if one is not None and two is not None and not np.array_equal(one, two, equal_nan=True):
+            i = int(np.argmax(one != two)) if one.shape == two.shape else 0
+            raise _unlike("changing", primitive, trial, i, two.ravel()[i], one.ravel()[i])
+
+
+def _unlike(
+    kind: str, primitive: "Primitive", trial: Trial, entry: int, found: object, expected: object
+) -> StructureError:
+    n = primitive.bundle.size
+    place = () if primitive.kind == "storage" else (entry // n, entry % n)
+    size = abs(found - expected) if isinstance(found, float) and isinstance(expected, float) else 0.0
+    witness = trial.witness(primitive, place, float(size))
+    return StructureError(kind, primitive.name, found=found, expected=expected, entry=place or 0, witness=witness)
