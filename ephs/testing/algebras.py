@@ -21,6 +21,7 @@ from ephs.operad import (
 )
 from ephs.testing.laws import renamings
 from ephs.testing.patterns import fresh_paths, nestings, patterns
+from ephs.testing.patterns import quantities as any_quantities
 
 Elements: TypeAlias = Callable[[Interface], st.SearchStrategy[Any]]
 """Interface -> elements of it."""
@@ -92,6 +93,9 @@ def algebra_inputs(
     """Inputs of a law of algebras or maps: patterns or a nesting, elements for all boxes, new names."""
     wanted = law.inputs
     known: dict[str, Any] = {"algebra": subject, "map": subject}
+    if quantities is None and draw(st.booleans()):
+        # one or two, so that most junctions can be linked, three of them and more
+        quantities = st.sampled_from(draw(st.lists(any_quantities(), min_size=1, max_size=2)))
     if "nesting" in wanted:
         known["nesting"] = draw(nestings(of=quantities))
         known["elements"] = _elements(draw, known["nesting"].flatten(), fillings_strategy)

@@ -1,14 +1,15 @@
 """Levels of drawn systems: parts, inputs, and states exposed to the enclosing level."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
 
 from hypothesis import strategies as st
 
-from ephs.operad import Directory, Interface, Junction, Pattern, PortType, Quantity
+from ephs.operad import ROOT, Directory, Interface, Junction, Pattern, PortType, Quantity
 from ephs.semantics import System
 from ephs.semantics.system import Filling
+from ephs.testing.patterns import CHAIN
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
 
@@ -54,9 +55,15 @@ def levels(
             level.give(name, port)
     if depth > 1 and draw(st.booleans()):
         level.relay(open_count > 0)
+    if draw(st.booleans()):
+        level.tie()
     level.loosen()
+    level.leave(ports)
     level.exchange([*ports, *level.bare])
-    return System.of(Pattern(level.junctions, level.boxes, level.links), level.parts)
+    found = System.of(Pattern(level.junctions, level.boxes, level.links), level.parts)
+    for _ in range(draw(CHAIN)):
+        found = System.of(Pattern.identity(found.interface), {ROOT: found})
+    return found
 
 
 @dataclass(slots=True)
@@ -76,6 +83,8 @@ class _Level:
     """Junctions with a balance of flows that a storage or friction gives an effort."""
     bare: list[str] = field(default_factory=list[str])
     """Junctions on which nothing is yet."""
+    relayed: list[str] = field(default_factory=list[str])
+    """Junctions that the first box reads."""
 
     def own(self, open_count: int) -> None:
         """Junctions whose states are stored here; neighbours of the pool, as equal ones have little to exchange."""
@@ -108,7 +117,7 @@ class _Level:
         if not self.posed and self.draw(st.booleans()):
             return
         if self.depth > 1 and self.draw(st.booleans()):
-            self.inside(f"giver_{name}", name, port.same)
+            self.inside(f"giver_{name}", (name,), port.same)
         elif port.same:
             self.links.append([port.same, name])
         elif self.draw(st.booleans()):
@@ -121,23 +130,36 @@ class _Level:
             self.bearing.append(kept)
             self.links.append([name, kept])
 
-    def inside(self, box: str, name: str, same: str) -> None:
-        """A box that gives the junction its state, that of another junction or one of its own."""
-        ports = {"b": Outer(self.junctions[name].quantity, power=False, wanted=True, same="a" if same else "")}
-        self.boxes[box] = {"b": f"~{name}"}
-        if same:
-            ports = {"a": Outer(self.junctions[same].quantity, power=False), **ports}
-            self.boxes[box]["a"] = f"~{same}"
-        inner = levels(depth=self.depth - 1, most=1, pool=self.pool, ports=ports, posed=self.posed)
-        self.parts[box] = self.draw(inner)
+    def inside(self, box: str, names: Sequence[str], same: str) -> None:
+        """A box that gives the junctions one state, that of another junction or one of its own."""
+        first, *others = (same, *names) if same else names
+        quantity = self.junctions[first].quantity
+        ports = {"a": Outer(quantity, power=False, wanted=not same)}
+        ports |= {f"b{k}": Outer(quantity, power=False, wanted=True, same="a") for k in range(len(others))}
+        self.boxes[box] = {port: f"~{name}" for port, name in zip(ports, (first, *others), strict=True)}
+        self.parts[box] = self.draw(self.below(ports, most=1))
+
+    def below(self, ports: Mapping[str, Outer], most: int) -> st.SearchStrategy[System]:
+        """A further level with these ports."""
+        return levels(depth=self.depth - 1, most=most, pool=self.pool, ports=ports, posed=self.posed)
 
     def relay(self, exposed: bool) -> None:
-        """A junction whose state a box gives it: read here, and where there is one at an outer port."""
+        """Junctions to which a box gives one state: read here, and where there is one at outer ports."""
         same = self.draw(st.sampled_from(list(self.junctions))) if self.draw(st.booleans()) else ""
         quantity = self.junctions[same].quantity if same else self.draw(st.sampled_from(self.pool))
         shown = exposed and self.draw(st.booleans())
-        self.junctions["k"] = Junction(quantity, True, False) if shown else Junction(quantity)
-        self.inside("relay", "k", same)
+        self.relayed = ["k", "l"][: self.draw(st.integers(1, 2))]
+        for name in self.relayed:
+            self.junctions[name] = Junction(quantity, True, False) if shown else Junction(quantity)
+        self.inside("relay", self.relayed, same)
+
+    def tie(self) -> None:
+        """Two more names for the state of a junction, by one link, without a frame of their own."""
+        of = self.draw(st.sampled_from(list(self.junctions)))
+        ties = ["tie0", "tie1"]
+        self.junctions |= dict.fromkeys(ties, Junction(self.junctions[of].quantity.in_frame(None)))
+        self.links.append([of, *ties])
+        self.relayed += ties
 
     def loosen(self) -> None:
         """A second balance of flows for a state: its effort is an unknown, which friction determines."""
@@ -156,6 +178,13 @@ class _Level:
         self.boxes["drag"], self.parts["drag"] = wires, self.draw(irreversibles(interface))
         self.bearing.append(name)
 
+    def leave(self, ports: Mapping[str, Outer]) -> None:
+        """An outer power port without power inside, which is then open: its state alone is read."""
+        used = {name for wires in self.boxes.values() for name in wires.values()}
+        if unused := [name for name, port in ports.items() if port.power and name not in used]:
+            left = self.draw(st.sampled_from(["", "", *unused]))
+            self.bearing = [name for name in self.bearing if name != left]
+
     def exchange(self, waiting: list[str]) -> None:
         """Boxes between the junctions; every outer port needs something on it, so the first one takes them all."""
         draw, bearing = self.draw, self.bearing
@@ -164,7 +193,7 @@ class _Level:
             # now and then two ports of one box on one junction
             names += draw(st.lists(st.sampled_from(bearing), max_size=1))
             read = draw(st.lists(st.sampled_from(sorted(self.junctions)), max_size=1))
-            read += ["k"] if i == 0 and "k" in self.junctions else []
+            read += self.relayed if i == 0 else []
             ports: dict[str, Outer] = {}
             wires: dict[str, str] = {}
             for k, name in enumerate([*names, *read]):
@@ -184,6 +213,5 @@ class _Level:
             irreversibles(interface, reads=reads),
         ]
         if self.depth > 1:
-            inner = levels(depth=self.depth - 1, most=self.most, pool=self.pool, ports=ports, posed=self.posed)
-            choices.append(inner)
+            choices.append(self.below(ports, self.most))
         return st.one_of(choices)

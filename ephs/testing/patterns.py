@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
 from ephs.operad import (
+    ROOT,
     Directory,
     Interface,
     Junction,
@@ -39,6 +40,8 @@ _KNOWN = (
     quantity.direct_pose,
     quantity.direct_momentum,
 )
+CHAIN = st.sampled_from((0, 0, 0, 0, 0, 1, 2, 3))
+"""How many identities there are around a level."""
 _PAIRS = ("revolute", "prismatic", "cylindrical", "planar", "spherical", "fixed", "free")
 
 
@@ -84,7 +87,15 @@ def interfaces(
     names = fresh_paths(draw, draw(st.integers(min_ports, max_ports)), ())
     power = st.just(True) if not state_ports else st.booleans().map(lambda flag: not flag)
     kinds = quantities() if of is None else of
-    return Directory([(name, PortType(draw(kinds), draw(power))) for name in names])
+    found: dict[Path, PortType] = {}
+    for name in names:
+        found[name] = PortType(draw(_again(draw, [port.quantity for port in found.values()], kinds)), draw(power))
+    return Directory(found)
+
+
+def _again(draw: st.DrawFn, present: list[Quantity], kinds: st.SearchStrategy[Quantity]) -> st.SearchStrategy[Quantity]:
+    """Half of the time a quantity that there is, or few junctions could be linked."""
+    return st.sampled_from(present) if present and draw(st.booleans()) else kinds
 
 
 @st.composite
@@ -142,9 +153,7 @@ def patterns(
     junctions = {path: Junction(port.quantity, True, port.power) for path, port in outer.items()}
     for path in fresh_paths(draw, inner, [*outer, *boxes]):
         present = [junction.quantity for junction in junctions.values()]
-        # Half of them repeat a quantity, or few junctions could be linked.
-        again = bool(present) and draw(st.booleans())
-        junctions[path] = Junction(draw(st.sampled_from(present) if again else kinds))
+        junctions[path] = Junction(draw(_again(draw, present, kinds)))
     groups = _groups(draw, junctions) if links else []
     wires = _wires(draw, junctions, boxes, groups, state_ports)
     return Pattern(junctions, wires, groups)
@@ -155,7 +164,7 @@ def _groups(draw: st.DrawFn, junctions: dict[Path, Junction]) -> list[list[Path]
     for path, junction in junctions.items():
         alike.setdefault(junction.quantity, []).append(path)
     return [
-        draw(st.lists(st.sampled_from(members), min_size=2, unique=True))
+        draw(st.one_of(st.lists(st.sampled_from(members), min_size=2, unique=True), st.just(members)))
         for members in alike.values()
         if len(members) > 1 and draw(st.booleans())
     ]
@@ -209,10 +218,12 @@ def nestings(
     max_boxes: int = 3,
     of: st.SearchStrategy[Quantity] | None = None,
 ) -> Nesting:
-    """Trees of patterns that fit into each other, of at most so many levels.
+    """Trees of patterns that fit into each other, of at most so many levels, and chains of identities around them.
 
     Parameters
     ----------
+    max_depth
+        How many levels, identities around others not counted.
     interface
         The outer interface; any if it is not given.
     max_boxes
@@ -227,7 +238,10 @@ def nestings(
         if max_depth > 1 and draw(st.booleans()):
             inner = nestings(max_depth=max_depth - 1, interface=content.interface, max_boxes=max_boxes, of=of)
             children[box] = draw(inner)
-    return Nesting(pattern, children)
+    found = Nesting(pattern, children)
+    for _ in range(draw(CHAIN)):
+        found = Nesting(Pattern.identity(pattern.interface), {ROOT: found})
+    return found
 
 
 @st.composite

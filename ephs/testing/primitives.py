@@ -46,7 +46,7 @@ def storages(draw: st.DrawFn, interface: Interface) -> Storage:
         if quantity.kind == "pose":
             group = "SE3" if quantity.space.name == "SE(3)" else "SO3xR3"
             return _renamed(components.gravity(rng.standard_normal(3), group), interface)
-        if quantity == quantities.relative_pose("spherical"):
+        if quantity.in_frame(None) == quantities.relative_pose("spherical"):
             return _turning(interface, rng.uniform(0.5, 3.0))
         if quantity.kind == "relative_pose":
             pair = Pair.from_space(quantity.space)
@@ -72,7 +72,7 @@ def reversibles(
     Parameters
     ----------
     reads
-        State ports that may modulate L.
+        State ports that may modulate L and C.
     constrained
         Parities of the efforts that constraints may hold.
     """
@@ -84,14 +84,16 @@ def reversibles(
     skew = _cleared(keep @ _odd(skew - skew.T, parity) @ keep)
     rows = draw(st.integers(0, 1 if n > 1 and draw(st.booleans()) else 0))
     side = float(draw(st.sampled_from(constrained)))
-    constraint = _cleared(rng.standard_normal((rows, n)) * (parity == side) @ keep)
-    constraint = constraint[np.linalg.norm(constraint, axis=1) > 0.1]
+    constraint, turned = (_cleared(rng.standard_normal((rows, n)) * (parity == side) @ keep) for _ in range(2))
+    kept = np.linalg.norm(constraint, axis=1) > 0.1
+    constraint, turned = constraint[kept], turned[kept]
     used = reads if reads and draw(READING) else ()
     if not used:
         return structures.constant_structure("random Dirac structure", interface, skew, constraint, trusted=True)
 
     def structure(x: Point) -> tuple[Array, Array]:
-        return _scale(x) * skew, constraint
+        scale = _scale(x)
+        return scale * skew, constraint + (scale - 1.0) * turned
 
     rows = constraint.shape[0]
     return Reversible("random Dirac structure", interface, structure, used, multipliers=rows, trusted=True)

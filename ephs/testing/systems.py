@@ -42,9 +42,10 @@ def systems(
 ) -> System:
     """Hierarchical systems that have a motion: each state has one storage, at any level.
 
-    Among them are states that parts show to the levels around them or identify, that are read several levels away
-    from their storage, and that have several balances of flows, which are links of the flat pattern; components and
-    quantities of one's own.
+    Among them are states that parts show to the levels around them or identify, at three ports too, that are read
+    several levels away from their storage, and that have several balances of flows, which are links of the flat
+    pattern; links of three junctions, states in a frame, outer power ports without power inside, chains of identities;
+    components and quantities of one's own.
 
     Parameters
     ----------
@@ -68,6 +69,8 @@ def systems(
         if value < 1:
             raise InvalidArgument(f"{name}={value}: expected at least 1")
     pool = draw(st.sampled_from(SCALARS + OWN + (GROUPS if groups else ())))
+    if draw(st.booleans()):
+        pool = (pool[0].in_frame("B"), *pool[1:])
     alone = draw(st.booleans()) if isolated is None else isolated
     count = 0 if alone else 1
     return draw(levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=count, posed=posed))

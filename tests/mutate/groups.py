@@ -59,6 +59,10 @@ DERIVATIVES = (
 )
 
 GROUPS = {
+    "operad": Group(
+        ("ephs/operad/*.py", "ephs/operad/rewriting/*.py"),
+        ("tests/operad", "tests/semantics/test_stacked.py"),
+    ),
     "spaces": Group(
         ("ephs/semantics/spaces/*.py",),
         (SPACES, *PARTS),
@@ -103,7 +107,7 @@ GROUPS = {
         ),
         tuple(
             f"tests/semantics/test_{name}.py"
-            for name in ("base", "controls", "edge_cases", "laws", "relations", "subspace")
+            for name in ("base", "controls", "edge_cases", "laws", "relations", "stacked", "subspace")
         ),
     ),
     "algebras": Group(

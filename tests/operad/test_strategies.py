@@ -69,6 +69,11 @@ NESTINGS = {
     "four levels": lambda n: n.depth == 4,
     "filled by an identity": lambda n: any(c.pattern.is_identity for c in n.children.values()),
     "identity around another": lambda n: n.pattern.is_identity and n.depth == 2,
+    "identities in identities": lambda n: any(
+        each.pattern.is_identity and any(inner.pattern.is_identity for inner in each.children.values())
+        for child in n.children.values()
+        for each in child.children.values()
+    ),
     "two boxes filled": lambda n: len(n.children) >= 2,
     "link made by substitution": lambda n: not n.pattern.links and n.bottom_up().links,
     "a state of three levels": state_of_three_levels,
@@ -127,9 +132,15 @@ def test_patterns_keep_to_their_bounds(data):
     assert all(port.power for port in data.draw(interfaces(state_ports=False)).values())
 
 
+def levels(nesting):
+    """How many there are, identities around others not counted."""
+    around = nesting.pattern.is_identity and bool(nesting.children)
+    return int(not around) + max(map(levels, nesting.children.values()), default=0)
+
+
 @given(nestings(max_depth=2, max_boxes=2))
 def test_nestings_fit(nesting):
-    assert nesting.depth <= 2
+    assert levels(nesting) <= 2
     for box, child in nesting.children.items():
         assert child.pattern.interface == nesting.pattern.boxes[box].interface
 

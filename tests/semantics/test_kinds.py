@@ -49,7 +49,8 @@ def copied(draw, part):
     for i in range(draw(st.integers(1, 3))):
         wires = {}
         for port, port_type in part.interface.items():
-            fitting = [name for name, quantity in of.items() if quantity.matches(port_type.quantity)]
+            # equal frames: those that a part gains from the level around it only the flattened system shows
+            fitting = [name for name, quantity in of.items() if quantity == port_type.quantity]
             name = draw(st.sampled_from([*fitting, f"j{len(of)}"]))
             of.setdefault(name, port_type.quantity)
             wires[port] = name if port_type.power else f"~{name}"

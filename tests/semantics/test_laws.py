@@ -119,7 +119,7 @@ def test_a_step_of_the_nested_system_is_the_step_of_the_flat_one(system, seed):
 
 
 @few
-@given(systems(isolated=True, max_depth=2, max_junctions=2), seeds)
+@given(systems(isolated=True, max_depth=2, max_junctions=2).filter(lambda s: not s.pattern.is_identity), seeds)
 def test_names_of_boxes_mean_nothing(system, seed):
     """A system whose boxes are renamed has the same relation on the renamed states."""
     names = {box: f"z_{box}" for box in system.fillings}  # the order of names stays
@@ -153,7 +153,7 @@ def test_drawn_systems_move_and_dissipate():
 
     collect()
     assert np.mean(steps) > 0.9
-    assert np.mean(motions) > 0.25
+    assert np.mean(motions) > 0.2
     assert np.mean(heats) > 0.15
 
 

@@ -5,22 +5,30 @@ import functools
 import pytest
 from hypothesis import HealthCheck, Phase, find, given, settings
 
-from ephs.semantics import AssemblyError, Storage, System
+from ephs.semantics import AssemblyError, Reversible, Storage, System
 from ephs.testing import fillings, nestings, systems
 from ephs.testing.systems import PULL, STRETCH
+from tests.semantics.stacked import levels_of
 
 DRAWN = 120
 
 
+def counted(system):
+    """Whether it is a level that counts: identities are none."""
+    return int(not system.pattern.is_identity)
+
+
 def depth(system):
-    return 1 + max((depth(each) for each in system.fillings.values() if isinstance(each, System)), default=0)
+    return counted(system) + max(
+        (depth(each) for each in system.fillings.values() if isinstance(each, System)), default=0
+    )
 
 
 def level(system, path):
     """How many levels down the component of this path is."""
     box = next(box for box in system.fillings if box.is_prefix_of(path))
     inner = system.fillings[box]
-    return 1 + level(inner, path.relative_to(box)) if isinstance(inner, System) else 1
+    return counted(system) + (level(inner, path.relative_to(box)) if isinstance(inner, System) else 0)
 
 
 def carried(system):
@@ -44,7 +52,38 @@ def states(system):
     return system.states.values()
 
 
+def identities(system):
+    """How many identities follow one another from this level on."""
+    if counted(system):
+        return 0
+    (inner,) = system.fillings.values()
+    return 1 + (identities(inner) if isinstance(inner, System) else 0)
+
+
+def chain(system):
+    """The longest chain of identities."""
+    return max(identities(level) for _, level in levels_of(system))
+
+
+def inside(system):
+    """The levels below the outermost one."""
+    return [level for at, level in levels_of(system) if at]
+
+
+def open_ports(level):
+    """Outer power ports over junctions on which no inner power port lies."""
+    ports = [port for content in level.pattern.boxes.values() for port in content.ports.values()]
+    return {port for port, of in level.interface.items() if of.power} - {p.junction for p in ports if p.power}
+
+
 FACTS = {
+    "links of three": lambda s: any(len(group) > 2 for _, each in levels_of(s) for group in each.pattern.links),
+    "identities in identities": lambda s: chain(s) > 1,
+    "three identities": lambda s: chain(s) > 2,
+    "open power ports inside": lambda s: any(map(open_ports, inside(s))),
+    "one state at three ports": lambda s: any(len(group) > 2 for each in inside(s) for group in each.shared_ports),
+    "a constraint reads": lambda s: any(isinstance(p, Reversible) and p.reads and p.multipliers for _, p in s.leaves()),
+    "frames": lambda s: any(of.quantity.frame for _, each in levels_of(s) for of in each.pattern.junctions.values()),
     "three levels": lambda s: depth(s) == 3,
     "outer ports": lambda s: bool(s.interface),
     "links of the flat pattern": lambda s: bool(s.flatten().pattern.links),
@@ -67,6 +106,8 @@ REACH = {
         "three levels": 40, "outer ports": 20, "links of the flat pattern": 15, "a component reads": 40,
         "friction reads": 20, "read below its storage": 20, "read two levels below": 5, "read above its storage": 5,
         "a component of one's own": 15, "a quantity of one's own": 8, "a relative pose": 3,
+        "links of three": 40, "identities in identities": 20, "three identities": 10, "open power ports inside": 8,
+        "one state at three ports": 10, "a constraint reads": 4, "frames": 30,
         "equations": DRAWN,
     },
     "systems in two levels": {
@@ -74,8 +115,10 @@ REACH = {
     },
     "systems that are not posed": {"stored twice": 25, "stored by nobody": 15},
     "fillings": {
-        "links of the flat pattern": 20, "a component reads": 20, "stored twice": 5, "stored by nobody": 12,
+        "links of the flat pattern": 20, "a component reads": 20, "stored by nobody": 12,
         "stored outside": 12,
+        "links of three": 8, "identities in identities": 20, "three identities": 10, "open power ports inside": 20,
+        "one state at three ports": 3, "frames": 40,
     },
 }  # fmt: skip
 STRATEGIES = {

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 
 from ephs.operad import Directory, PortType
@@ -12,13 +12,13 @@ from ephs.semantics.checks import random_point
 from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.subspace import Subspace
 from ephs.testing import fillings, nestings, systems
-from tests.semantics.stacked import components_of, path_of, stacked, states_of
+from tests.broken import put_in_place
+from tests.semantics.stacked import components_of, equations_of, path_of, stacked, states_of
 
 REFERENCE = Reference(293.15, 300.0)
 patient = settings(suppress_health_check=list(HealthCheck), max_examples=30)
 DRAWN = {
     "systems": systems(),
-    "systems that are not posed": systems(posed=False),
     "fillings": nestings(max_depth=4, max_boxes=2).flatmap(fillings),
 }
 
@@ -73,3 +73,40 @@ def check_stacked(system, seed, *routes):
 def test_both_routes_give_the_relation_of_the_stack(strategy, data, seed):
     system = data.draw(DRAWN[strategy])
     check_stacked(system, seed, "nested", "flat")
+
+
+SPOILED = {
+    "efforts of three ports are joined at two": (
+        equations_of,
+        "pairwise(ports + outer)",
+        "pairwise((ports + outer)[:2])",
+    ),
+    "the outer flow has the sign of inner ones": (equations_of, "-1.0 for p in outer}", "1.0 for p in outer}"),
+    "a second flow counts twice": (equations_of, "1.0 for p in ports}", "1.0 + (p in ports[1:2]) for p in ports}"),
+    "an open outer port passes a flow": (equations_of, "-1.0 for p in outer}", "-1.0 for p in outer if ports}"),
+    "a closed port passes a flow": (equations_of, "1.0 for p in ports}", "1.0 for p in ports if outer or ports[1:]}"),
+    "a link joins two states": (states_of, "for path in group)", "for path in sorted(group)[:2])"),
+    "a state shown at three ports is one at two": (
+        states_of,
+        "if junction.exposed:",
+        "if path in sorted(level.interface)[:2]:",
+    ),
+    "state ports do not show the state": (states_of, "if junction.exposed:", "if junction.exposed and junction.power:"),
+}
+"""Rules of the stack, as text that is replaced: what a relation would be that misunderstands them."""
+
+
+@pytest.mark.parametrize("rule", SPOILED)
+def test_draws_tell_each_rule_from_a_wrong_one(rule, monkeypatch):
+    put_in_place(monkeypatch, *SPOILED[rule])
+
+    def differs(drawn):
+        try:
+            check_stacked(*drawn, "nested")
+        except AssertionError:
+            return True
+        return False
+
+    limits = settings(patient, max_examples=200, database=None, phases=[Phase.generate])
+    found = [st.tuples(strategy, st.integers(0, 2**16)) for strategy in DRAWN.values()]
+    assert find(st.one_of(found), differs, settings=limits)
