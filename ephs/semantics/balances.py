@@ -156,7 +156,7 @@ def _balance(probe: Probe, solved: Solved, terms: list[float], sizes: list[float
     largest = max((float(np.abs(n).max(initial=0.0)) for n in numbers), default=0.0)
     largest += probe.reference.temperature + probe.reference.pressure
     count = sum(n.size for n in numbers)
-    left = probe.h * (solved.residual + ROUNDING) * count * largest
+    left = probe.h * (solved.residual + ROUNDING + solved.rounding / largest) * count * largest
     defect = abs(sum(terms))
     detail = f"{what} is balanced to {defect:.1e} of {scale:.2e} {unit}"
     return Verdict(defect, EVALUATION * scale + left, detail)

@@ -115,6 +115,17 @@ def check_assembly(d: Descriptor, inputs: Mapping[Path, Any]) -> CheckItem:
     return CheckItem("assembly", True, f"{len(d.states)} states, {unknowns} equations in {unknowns} unknowns")
 
 
+def check_motion(system: System, reference: Reference, state: Mapping[str, object] | None) -> CheckItem:
+    """Whether a motion exists from the given state, else from the start, and what does not determine it."""
+    where = "the start" if state is None else "the state"
+    found = system.relation(reference).at(system.state(state))
+    if found.empty:
+        return CheckItem("motion", False, f"no motion exists from {where}: {'; '.join(found.empty.because)}")
+    determined = found.determined
+    words = "is determined" if determined else f"is not known to be determined: {'; '.join(determined.because)}"
+    return CheckItem("motion", True, f"from {where} the motion {words}")
+
+
 def _items(
     system: System, reference: Reference, state: Mapping[str, object] | None, probes: int, h: float
 ) -> Iterator[CheckItem]:
@@ -127,6 +138,7 @@ def _items(
         yield CheckItem("assembly", False, str(error))
         return
     yield check_assembly(d, found[0].inputs)
+    yield check_motion(system, reference, state)
     # probe after probe, as one step serves all its laws
     verdicts = [[_verdict(law, probe) for law in SYSTEM_LAWS] for probe in found]
     for law, measured in zip(SYSTEM_LAWS, zip(*verdicts, strict=True), strict=False):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ephs.semantics.bundle import Array
+from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import Outcome, SolveError
@@ -53,7 +54,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     SolveError
         It names the state that jumps farthest.
     """
-    if problem.scene is not None or not model.constraint_rows.size:
+    if problem.scene is not None or not (model.constraint_rows.size or _bare(problem)):
         return
     x = problem.descriptor.pack(problem.initial)
     jumping = _jumping(problem, model, x, h)
@@ -63,7 +64,20 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     if fastest is not None and fastest[0] * INSTANT * abs(h) > TURNED:  # such an instant is none to an oscillation
         jumping = _jumping(problem, model, x, np.copysign(TURNED / (INSTANT * fastest[0]), h))
     if jumping:
-        raise SolveError(Outcome.INCONSISTENT, jumping, "the constraints do not hold at the start")
+        raise SolveError(Outcome.INCONSISTENT, jumping, _reason(problem))
+
+
+def _bare(problem: Problem) -> bool:
+    """Whether there is a junction without storage: it constrains as a constraint does."""
+    d = problem.descriptor
+    stored = {i for slot in d.components if isinstance(slot.primitive, Storage) for i in slot.efforts}
+    return len(stored) < d.effort_size
+
+
+def _reason(problem: Problem) -> str:
+    """The equations that contradict each other at the start, where rounding of the states is not all that they do."""
+    found = problem.descriptor.system.relation(problem.reference).at(problem.initial).empty
+    return "the constraints do not hold at the start" + "".join(f"; {each}" for each in found.because)
 
 
 def _jumping(problem: Problem, model: Model, x: Array, h: float) -> str:

@@ -93,7 +93,6 @@ GROUPS = {
             "ephs/semantics/library/__init__.py",
             "ephs/semantics/forms.py",
             "ephs/semantics/derive/*.py",
-            "ephs/semantics/natural.py",
             "ephs/semantics/behaviour.py",
             "ephs/semantics/constructors.py",
         ),
@@ -101,13 +100,16 @@ GROUPS = {
     ),
     "relations": Group(
         (
-            "ephs/semantics/relations/*.py",
+            "ephs/semantics/meaning/*.py",
             "ephs/semantics/laws.py",
             "ephs/semantics/subspace.py",
         ),
-        tuple(
-            f"tests/semantics/test_{name}.py"
-            for name in ("base", "controls", "edge_cases", "laws", "relations", "stacked", "subspace")
+        (
+            *tuple(
+                f"tests/semantics/test_{name}.py"
+                for name in ("base", "controls", "edge_cases", "laws", "naturality", "relations", "stacked", "subspace")
+            ),
+            "tests/semantics/meaning",
         ),
     ),
     "algebras": Group(

@@ -26,7 +26,7 @@ def system(friction):
 def test_every_check_holds_of_the_damped_oscillator(state):
     report = system(library.friction(d=0.1)).check(Reference(300.0), state=state)
     assert report.ok, str(report)
-    assert [item.name.partition(":")[0] for item in report.items[3:]] == [law.name for law in SYSTEM_LAWS]
+    assert [item.name.partition(":")[0] for item in report.items[4:]] == [law.name for law in SYSTEM_LAWS]
     assert all(item.detail for item in report.items)
     assert str(report).count("holds") == len(report.items)
 

@@ -9,6 +9,7 @@ import numpy as np
 from ephs.operad import ROOT, Path, Quantity
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.errors import SemanticsError
+from ephs.semantics.given import defined
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
@@ -66,7 +67,8 @@ def _storage(storage: Storage, path: Path, point: BasePoint) -> LinearRelation:
         known = own("effort", bundle, path.__truediv__)
         rows += [field.exact({effort: 1.0, value: -1.0}) for effort, value in zip(efforts, known, strict=True)]
         return LinearRelation.of(field, [*rates, *flows, *efforts, *known], rows)
-    values = storage.effort(point.read(path, storage), point.reference)
+    x = point.read(path, storage)
+    values = defined(str(path), "the effort", storage.effort(x, point.reference), x)
     for effort, value, size in zip(efforts, values.tolist(), largest(bundle, values).tolist(), strict=True):
         rows.append(field.exact({effort: 1.0}) | field.rounded({ONE: -value}, {ONE: size}))
     return LinearRelation.of(field, [*rates, *flows, *efforts, ONE], rows)
@@ -84,7 +86,7 @@ def own(kind: str, bundle: Bundle, name: Callable[[Path], Path]) -> list[Variabl
 def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> LinearRelation:
     """f = A e + Cᵀ λ, 0 = C e; numbers are rounded beside the largest of the same units."""
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
-    multipliers = [Variable("inner", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]
+    multipliers = [Variable("met", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]
     sizes, beside = largest(bundle, dynamic), largest(bundle, constraint.T).T
     rows: list[Row[Any]] = []
     transposed, around = constraint.T.tolist(), beside.T.tolist()

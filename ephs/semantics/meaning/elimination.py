@@ -99,9 +99,7 @@ def _substituted(field: Field[N], rows: Sequence[Row[N]], gone: Sequence[bool]) 
         rest.append(row)
     minus = field.number(-1.0)
     for place, row in enumerate(rest):
-        if all(above[i] == i for i in row):
-            continue
-        new: Row[N] = {}
+        new: Row[Any] = {}
         for i, number in row.items():
             j = leader(i)
             if j in new:

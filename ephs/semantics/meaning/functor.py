@@ -14,14 +14,20 @@ from typing import Any, TypeAlias
 from ephs.operad import Path, Pattern, PortType
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
-from ephs.semantics.meaning.variables import Variable, at_port, into
+from ephs.semantics.meaning.variables import Role, Variable, at_port, into
 
 _Port: TypeAlias = tuple[float, Path | None, Path, PortType]
 """Sign of its flow in the balance, box or None at the interface, port and what it is."""
 
 
-def relation_of_pattern(field: Field[Any], pattern: Pattern) -> LinearRelation:
-    """F(f): at each junction flows balance, the outer one counting negative, and efforts are shared."""
+def relation_of_pattern(field: Field[Any], pattern: Pattern, inside: Role = "inner") -> LinearRelation:
+    """F(f): at each junction flows balance, the outer one counting negative, and efforts are shared.
+
+    Parameters
+    ----------
+    inside
+        The role of variables at boxes: ``"met"`` of boxes that are being filled.
+    """
     at: dict[Path, list[_Port]] = {}
     for box, content in pattern.boxes.items():
         for port, wire in content.ports.items():
@@ -33,7 +39,7 @@ def relation_of_pattern(field: Field[Any], pattern: Pattern) -> LinearRelation:
     variables: list[Variable] = []
     rows: list[Row[Any]] = []
     for ports in at.values():
-        flows, efforts = ([_at(kind, where) for where in ports] for kind in ("flow", "effort"))
+        flows, efforts = ([_at(inside, kind, where) for where in ports] for kind in ("flow", "effort"))
         signs = [sign for sign, *_ in ports]
         for i in range(len(flows[0])):
             rows.append(field.exact({each[i]: sign for sign, each in zip(signs, flows, strict=True)}))
@@ -43,23 +49,27 @@ def relation_of_pattern(field: Field[Any], pattern: Pattern) -> LinearRelation:
     return LinearRelation.of(field, variables, rows)
 
 
-def _at(kind: str, where: _Port) -> list[Variable]:
+def _at(inside: Role, kind: str, where: _Port) -> list[Variable]:
     _, box, port, described = where
     if box is None:
         return at_port("outer", kind, port, described.quantity)
-    return at_port("inner", kind, port, described.quantity, box)
+    return at_port(inside, kind, port, described.quantity, box)
 
 
 def filled(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """Put relations into boxes: (whole ∩ ⊕ parts), without what lies at the filled boxes."""
+    return _met(whole.renamed(lambda v: v._replace(role="met") if v.role == "inner" and v.box in parts else v), parts)
+
+
+def _met(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     inside = [part.renamed(lambda v, box=box: into(box, v)) for box, part in parts.items()]
     joined = whole.join(*inside)
-    return joined.without(v for v in joined.variables if v.role == "inner" and v.box in parts)
+    return joined.without(v for v in joined.variables if v.role == "met")
 
 
 def glued(field: Field[Any], pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """(F(f) ∩ ⊕ parts) projected to the outer ports."""
-    return filled(relation_of_pattern(field, pattern), parts)
+    return _met(relation_of_pattern(field, pattern, "met"), parts)
 
 
 def power(relation: LinearRelation) -> dict[Variable, tuple[Variable, int]]:

@@ -134,20 +134,26 @@ class LinearRelation:
             rows.append(row)
         return LinearRelation.of(self.field, self.variables, rows)
 
-    def remainder(self, values: Mapping[Variable, float]) -> float:
-        """The largest remainder of an equation, each of length one, at values of the variables; zero where missing."""
+    def remainder(self, values: Mapping[Variable, float], *, unit: bool = True) -> float:
+        """The largest remainder of an equation at values of the variables, zero where missing.
+
+        Parameters
+        ----------
+        unit
+            Whether each equation is brought to length one.
+        """
         order = sorted(self.variables | {ONE})
         at = np.array([1.0 if variable == ONE else values.get(variable, 0.0) for variable in order])
-        return float(np.abs(self.matrix(order) @ at).max(initial=0.0))
+        return float(np.abs(self.matrix(order, unit=unit) @ at).max(initial=0.0))
 
-    def matrix(self, order: Sequence[Variable]) -> Array:
-        """The equations (m, n) as rows of length one, in an order of the n variables."""
+    def matrix(self, order: Sequence[Variable], *, unit: bool = True) -> Array:
+        """The equations (m, n) as rows, of length one where ``unit``, in an order of the n variables."""
         place = {variable: i for i, variable in enumerate(order)}
         out = np.zeros((len(self.equations), len(place)))
         for row, terms in zip(out, self.equations, strict=True):
             for variable, number in terms.items():
                 row[place[variable]] = self.field.value(number)
-        return out / np.linalg.norm(out, axis=1, keepdims=True)
+        return out / np.linalg.norm(out, axis=1, keepdims=True) if unit else out
 
     def subspace(self, order: Sequence[Variable]) -> Subspace:
         """The relation as a subspace of ℝⁿ, in an order of the n variables."""

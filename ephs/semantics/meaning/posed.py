@@ -86,14 +86,18 @@ def hidden(fibre: _Fibre, point: BasePoint) -> LinearRelation:
 
 
 def determined(fibre: _Fibre, point: BasePoint) -> Answer:
-    """Whether outer flows determine all rates: two motions of the same outer flows differ by nothing.
+    """Whether outer flows, or outer efforts, determine all rates: two motions of the same ones differ by nothing.
 
     Differences satisfy the equations without their constants, and H″ of them those of the hidden equations, which last.
     """
+    flows = _determined(fibre, point, "flow")
+    return flows if flows or not _determined(fibre, point, "effort") else Answer(True)
+
+
+def _determined(fibre: _Fibre, point: BasePoint, given: str) -> Answer:
+    """The same where one kind of variables is given at all outer ports."""
     found = fibre.at(Path(), replace(point, storages=False))
-    zero = {v for v in found.variables if v.kind == "effort" and v.role == "own"} | {
-        v for v in found.variables if v.kind == "flow" and v.role == "outer"
-    }
+    zero = {v for v in found.variables if (v.kind, v.role) in (("effort", "own"), (given, "outer"))}
     rows = [{v: number for v, number in row.items() if v not in zero} for row in found.equations]
     whole = LinearRelation.of(point.field, found.variables - zero, rows).join(_lasting(fibre, point))
     known = whole.determined()

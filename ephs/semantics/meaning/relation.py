@@ -116,14 +116,16 @@ class Relation:
         AssemblyError
             An unknown path, a wrong shape, or a number that is not finite.
         SemanticsError
-            The numbers are rational, and a component's structure is not constant.
+            The numbers are rational, and a component's structure is not constant; or it has no value at the state.
         """
         arguments = _efforts(dict(self.fibre.leaves()), efforts or {})
         states, contradiction = place(self.classes, state or {}, ports or {})
         numbers: Field[Any] = FIELDS[self.numbers]()
         names = names_of(self.classes)
         point = BasePoint(states, names, arguments, self.reference, numbers, storages=self.numbers == "float")
-        return Instant(self, point, contradiction)
+        found = Instant(self, point, contradiction)
+        _ = found.linear  # what has no value says so here
+        return found
 
     def compose(self, pattern: Pattern, fillings: Mapping[Path, object]) -> "Relation":
         """Fill the boxes of a pattern with relations, systems and primitives; the latter mean their relations.
@@ -223,7 +225,8 @@ class Instant:
 
     @property
     def determined(self) -> Answer:
-        """Whether outer flows determine the rates of all states, hidden equations differentiated once.
+        """Whether outer flows, or outer efforts, determine the rates of all states; hidden equations are
+        differentiated once.
 
         False with the states and junctions that nothing determines.
         """
@@ -306,9 +309,11 @@ class _Glued:
         return glued(point.field, self.pattern, {box: part.at(path / box, point) for box, part in self.parts.items()})
 
     def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]:
-        for row in relation_of_pattern(point.field, self.pattern).equations:
+        # ports of an identity's box are those of the identity
+        rows = () if self.pattern.is_identity else relation_of_pattern(point.field, self.pattern, "met").equations
+        for row in rows:
             first = next(iter(row))
-            wire = self.pattern.boxes[first.box].ports[first.port] if first.role == "inner" else None
+            wire = self.pattern.boxes[first.box].ports[first.port] if first.role == "met" else None
             junction = path / (first.port if wire is None else wire.junction)
             yield first.kind, junction, {into(path, v): number for v, number in row.items()}
         for box, part in self.parts.items():

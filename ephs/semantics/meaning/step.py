@@ -5,7 +5,7 @@ does so nonlinearly it has an affine tangent at each guess; Newton's method glue
 know that time is discrete, nor at how many levels the system is written.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -52,7 +52,7 @@ class Solved:
     efforts
         Efforts (n,) at the ports of each irreversible component, by its path.
     residual
-        Largest remainder of an equation of length one; infinite where no guess has one.
+        Largest remainder of an equation; infinite where no guess has one.
     rounding
         Bound of the rates' errors from rounding, by running error analysis; zero where they are not determined.
     """
@@ -101,8 +101,11 @@ def solved(
         return fold(system, leaf, lambda pattern, parts: glued(field, pattern, parts)).join(given)
 
     guess, residual = newton(tangents)
-    rounding = _rounding(tangents(guess, False)) if np.isfinite(residual) else 0.0
-    return replace(_solution(as_system(system), names, guess, residual), rounding=rounding)
+    if not np.isfinite(residual):
+        return _solution(as_system(system), names, guess, residual)
+    last = tangents(guess, False)
+    found = _solution(as_system(system), names, guess, last.remainder(guess, unit=False))
+    return replace(found, rounding=_rounding(last))
 
 
 def newton(tangents: Callable[[Guess, bool], LinearRelation]) -> tuple[Guess, float]:
@@ -120,17 +123,27 @@ def newton(tangents: Callable[[Guess, bool], LinearRelation]) -> tuple[Guess, fl
     for _ in range(ITERATIONS):
         if best in (0.0, np.inf) or (best < SOLVED and best > 0.5 * before):
             break
-        target, share = _nearest(tangents(guess, False), guess), 1.0
-        error, new = _error(tangents, target), target
-        # far from the solution a full step may increase the remainder; near it only rounding remains
-        while not error < best and best > NEAR and share > 1e-3:
-            share *= 0.5
-            new = {v: (1.0 - share) * guess.get(v, 0.0) + share * value for v, value in target.items()}
-            error = _error(tangents, new)
-        if not error < best:
+        for target in _targets(tangents(guess, False), guess):
+            new, error = _halved(tangents, guess, target, best)
+            if error < best:
+                break
+        else:
             break
         guess, before, best = new, best, _error(tangents, new, fresh=True)
     return guess, best
+
+
+def _halved(
+    tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, target: Guess, best: float
+) -> tuple[Guess, float]:
+    """The target, or a point on the way there whose remainder is below the best one, and that."""
+    new, share, error = target, 1.0, _error(tangents, target)
+    # far from the solution a full step may increase the remainder; near it only rounding remains
+    while not error < best and best > NEAR and share > 1e-3:
+        share *= 0.5
+        new = {v: (1.0 - share) * guess.get(v, 0.0) + share * value for v, value in target.items()}
+        error = _error(tangents, new)
+    return new, error
 
 
 def _error(tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, *, fresh: bool = False) -> float:
@@ -141,17 +154,17 @@ def _error(tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, *, f
         return np.inf
 
 
-def _nearest(relation: LinearRelation, guess: Guess) -> Guess:
-    """The solution of a tangent; where it has none or many, what contradicts least and is nearest to the guess."""
+def _targets(relation: LinearRelation, guess: Guess) -> Iterator[Guess]:
+    """The solution of a tangent, if it has one; then what contradicts least and is nearest to the guess."""
     if not relation.empty:
         found = relation.values()
         if len(found) == len(relation.variables):
-            return found
+            yield found
     order = sorted(relation.variables - {ONE})
     matrix = relation.matrix([*order, ONE])
     at = np.array([guess.get(v, 0.0) for v in order])
     change = least_squares(matrix[:, :-1], -(matrix[:, :-1] @ at + matrix[:, -1]), part=CONSTRAINT)
-    return dict(zip(order, (at + change).tolist(), strict=True))
+    yield dict(zip(order, (at + change).tolist(), strict=True))
 
 
 def tangent(
@@ -222,7 +235,10 @@ def _touching(
     constant = value - jacobian @ at
     rows: list[Row[Any]] = []
     for name, entries, number in zip(results, jacobian.tolist(), constant.tolist(), strict=True):
-        row = field.rounded(dict(zip(arguments, entries, strict=True))) | field.rounded({ONE: number})
+        terms = {ONE: number}
+        for argument, entry in zip(arguments, entries, strict=True):  # two ports may read one state
+            terms[argument] = terms.get(argument, 0.0) + entry
+        row = field.rounded(terms)
         rows.append(row if name is None else row | field.exact({name: -1.0}))
     return rows
 

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from ephs.operad import ROOT, Path, Quantity
 
-Role: TypeAlias = Literal["outer", "inner", "own", "one"]
+Role: TypeAlias = Literal["outer", "inner", "met", "own", "one"]
 
 
 class Variable(NamedTuple):
@@ -16,7 +16,8 @@ class Variable(NamedTuple):
     Parameters
     ----------
     role
-        ``outer`` at a port of the interface, ``inner`` at a port of an open box, ``own`` inside and named for good by
+        ``outer`` at a port of the interface, ``inner`` at a port of an open box, ``met`` where a box is being filled,
+        or known inside a component only; ``own`` inside and named for good by
         its full path, such as the rate of a state; ``one`` is the constant 1, which makes affine relations linear.
     kind
         ``flow``, ``effort``, ``rate`` and others.
@@ -52,8 +53,8 @@ def at_port(role: Role, kind: str, port: Path, quantity: Quantity, box: Path = R
 
 
 def into(box: Path, variable: Variable) -> Variable:
-    """The name that a variable of what fills a box has in the whole: its interface is what the box shows inside."""
+    """The name that a variable of what fills a box has in the whole: its interface meets that of the box."""
     role, kind, inside, port, place = variable
     if role == "outer":
-        return Variable("inner", kind, box, port, place)
-    return Variable("inner", kind, box / inside, port, place) if role == "inner" else variable
+        return Variable("met", kind, box, port, place)
+    return Variable(role, kind, box / inside, port, place) if role in ("inner", "met") else variable

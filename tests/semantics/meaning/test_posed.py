@@ -1,0 +1,169 @@
+"""Which states have a motion, and one: what says so, what runs, and what the laws of gluing are in exact numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+import ephs
+from ephs import Pattern
+from ephs import library as lib
+from ephs import quantity as Q
+from ephs.operad import ROOT, Path
+from ephs.semantics import SemanticsError
+from ephs.semantics.meaning import relation_of_pattern
+from ephs.semantics.meaning.fields import Rational, Rounded, as_written
+from ephs.semantics.meaning.functor import filled
+from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.variables import Variable
+from ephs.testing import nestings
+
+TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
+OPEN = {
+    # a storage whose effort a junction without storage holds at zero
+    "mass": (
+        Pattern.from_text("x: displacement; p: momentum; a(p); g(q=x, p)")(a=lib.point_mass(m=1.0), g=lib.pkc()),
+        "a.p",
+        "x",
+    ),
+    "inductor": (
+        Pattern.from_text("q: charge; b: flux_linkage; a(b); g(q, b)")(
+            a=lib.inductor(l=2.0), g=ephs.gyrator({"q": Q.charge, "b": Q.flux_linkage}, TURN)
+        ),
+        "a.b",
+        "q",
+    ),
+    "two levels": (
+        Pattern.from_text("p: momentum; a(p); o(p)")(
+            a=lib.point_mass(m=3.0),
+            o=Pattern.from_text("x: displacement; p: momentum, exposed; g(q=x, p)")(g=lib.pkc()),
+        ),
+        "a.p",
+        "o.x",
+    ),
+}
+METHODS = ("auto", "natural", "natural4", "radau", "rk54")
+
+
+@pytest.mark.parametrize("case", OPEN)
+def test_a_state_without_motion_is_empty_and_says_by_which_equations(case):
+    system, state, junction = OPEN[case]
+    for route in ("flat", "nested"):
+        moving = system.relation(route=route).at({state: 1.0})
+        assert moving.empty and not moving.determined
+        words = " ".join(moving.empty.because)
+        assert f"flow balance of junction {junction} " in words and "component a " in words
+        resting = system.relation(route=route).at({state: 0.0})
+        assert not resting.empty and resting.determined
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("case", OPEN)
+def test_no_method_runs_from_a_state_without_motion(case, method):
+    system, state, _ = OPEN[case]
+    with pytest.raises(ephs.SimulationError):
+        ephs.simulate(system, 0.05, initial={state: 1.0}, step=0.01, method=method)
+
+
+@pytest.mark.parametrize("case", OPEN)
+def test_check_names_the_junction(case):
+    system, state, junction = OPEN[case]
+    found = system.check(state={state: 1.0})
+    (motion,) = (item for item in found.items if item.name == "motion")
+    assert not found.ok and not motion.ok and f"junction {junction}" in motion.detail
+    assert system.check(state={state: 0.0}).ok
+
+
+def quadratic(p, s):
+    g = abs(p)
+    return np.array([[g * s, -g * p], [-g * p, g * p * p / s]])
+
+
+def test_what_an_irreversible_component_does_is_not_known_before_the_efforts():
+    """A spring on a damper of quadratic force has a motion, q̇ = −√(k q): at rest M is zero, which says nothing."""
+    damper = ephs.irreversible({"p": Q.momentum, "s": Q.entropy}, quadratic)
+    system = Pattern.from_text("q: displacement; p: momentum; s: entropy; k(q); g(q, p); d(p, s); env(s)")(
+        k=lib.spring(k=1.0), g=lib.pkc(), d=damper, env=lib.environment()
+    )
+    assert not system.relation().at({"k.q": 1.0}).empty
+    there = system.relation().at({"k.q": 1.0}, efforts={"d": [-1.0, 0.0]})
+    assert there.determined and there.values[Path.parse("k.q")] == pytest.approx(-1.0)
+    sol = ephs.simulate(system, 1.0, initial={"k.q": 1.0}, step=0.01, method="natural4")
+    assert sol["k.q"].ravel()[-1] == pytest.approx(0.25, rel=1e-9)
+
+
+def test_what_nothing_determines_is_named():
+    loose = Pattern.from_text("p: momentum; q: momentum; a(p); l(p, p2=q); b(p=q)")(
+        a=lib.point_mass(m=1.0), l=lib.rigid_link(), b=lib.point_mass(m=1.0)
+    )
+    assert loose.relation().at({"a.p": 1.0, "b.p": 1.0}).determined  # once the link's condition is differentiated
+    doubled = Pattern.from_text("q: displacement; p: momentum; g(q, p)")(g=lib.pkc())
+    assert doubled.relation().at().determined  # no state at all
+    heat = Pattern.from_text("s: entropy; a(s); t: entropy; b(s=t); w(s, t)")(
+        a=lib.environment(),
+        b=lib.environment(),
+        w=ephs.constraint({"s": Q.entropy, "t": Q.entropy}, np.array([[1.0, -1.0]])),
+    )
+    answer = heat.relation().at().determined
+    assert not answer and "the rate of a.s is arbitrary" in answer.because
+
+
+def test_storages_on_linked_junctions_have_one_rate():
+    spring, mass = lib.spring(k=1.0), lib.point_mass(m=1.0)
+    system = Pattern.from_text(
+        "j: displacement; k: displacement; p: momentum; v: momentum; j ~ k; s(q=j); t(q=k); m(p); n(p=v); "
+        "x(q=j, p); y(q=k, p=v)"
+    )(s=spring, t=spring, m=mass, n=mass, x=lib.pkc(), y=lib.pkc())
+    for route in ("flat", "nested"):
+        together = system.relation(route=route).at({"s.q": 0.5, "m.p": 2.0, "n.p": 2.0})
+        assert together.values[Path.parse("s.q")] == 2.0 and not together.empty
+        assert system.relation(route=route).at({"s.q": 0.5, "m.p": 1.0, "n.p": 3.0}).empty
+
+
+@settings(suppress_health_check=list(HealthCheck), max_examples=25)
+@given(nestings(max_depth=2))
+def test_the_relation_of_a_composite_pattern_is_the_composite_of_the_relations(nesting):
+    """F(f ∘ g) = F(f) ∘ F(g), in ℚ and in floats; and not where a balance is missing."""
+    f, inner = nesting.pattern, {box: each.pattern for box, each in nesting.children.items()}
+    whole = f.substitute(inner)
+    for field in (Rational(), Rounded()):
+        parts = {box: relation_of_pattern(field, g) for box, g in inner.items()}
+        found = filled(relation_of_pattern(field, f), parts)
+        assert found.same(relation_of_pattern(field, whole))
+        less = relation_of_pattern(field, f)
+        if less.equations:
+            less = LinearRelation.of(field, less.variables, less.equations[1:])
+            assert not filled(less, parts).same(relation_of_pattern(field, whole)) or not found.variables
+    identity = Pattern.identity(f.interface)
+    exact = relation_of_pattern(Rational(), f)
+    assert filled(relation_of_pattern(Rational(), identity), {ROOT: exact}).same(exact)
+
+
+def test_exact_relations_leave_the_efforts_of_storages_open():
+    system = Pattern.from_text("q: displacement; p: momentum, exposed; k(q); g(q, p)")(k=lib.spring(k=3.0), g=lib.pkc())
+    exact = system.relation(field="rational").at().linear
+    rate, effort = (Variable("own", kind, ROOT, Path.parse("k.q"), 0) for kind in ("rate", "effort"))
+    flow, velocity = (Variable("outer", kind, ROOT, Path.parse("p"), 0) for kind in ("flow", "effort"))
+    assert {frozenset(row.items()) for row in exact.canonical} == {
+        frozenset({flow: 1, effort: -1}.items()),
+        frozenset({velocity: 1, rate: -1}.items()),
+    }
+    damped = Pattern.from_text("p: momentum; s: entropy; m(p); d(p, s); env(s)")(
+        m=lib.point_mass(m=1.0), d=lib.friction(d=1.0), env=lib.environment()
+    )
+    with pytest.raises(SemanticsError, match=r"d: its structure depends on efforts"):
+        damped.relation(field="rational").at()
+
+
+def test_numbers_know_what_is_near_zero():
+    x, y = (Variable("own", "rate", ROOT, Path.parse(name), 0) for name in "xy")
+
+    def rank(field, entry):
+        rows = [field.rounded({x: 1.0, y: 1.0}), field.rounded({x: 1.0, y: entry})]
+        return 2 - LinearRelation.of(field, [x, y], rows).dimension
+
+    near, far, same = Rounded(), Rounded(), Rounded()
+    assert rank(near, 1.0 + 1.5e-15) == 1 and not near.clear
+    assert rank(far, 1.0 + 1e-9) == 2 and far.clear
+    assert rank(same, 1.0) == 1 and same.clear
+    assert rank(Rational(), 1.0 + 1.5e-15) == 2
+    assert rank(Rational(as_written), 0.1 + 0.9) == 1
