@@ -9,7 +9,7 @@ where a state port is exposed.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, final
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, final
 
 from ephs.operad.collector import paused_collector
 from ephs.operad.directory import Directory, Entries
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ephs.operad.algebra import Algebra, Element
     from ephs.operad.isomorphism import Renaming
     from ephs.operad.lint import Diagnostic
+    from ephs.semantics.meaning import LinearRelation
 
 T = TypeVar("T")
 Boxes: TypeAlias = Entries[Entries[str | Port] | Box]
@@ -257,17 +258,12 @@ class Pattern:
         return rename(self, boxes or {}, junctions or {}, ports or {})
 
     def isomorphic(self, other: "Pattern", *, fix_interface: bool = False) -> "Renaming | None":
-        """Whether the pattern is the other one up to names: a renaming that makes it so, or None.
+        """Whether the pattern is the other one up to names: a renaming with ``renaming(self) == other``, or None.
 
         Parameters
         ----------
         fix_interface
             Whether outer ports must keep their names.
-
-        Returns
-        -------
-        Renaming or None
-            ``renaming(self) == other``.
         """
         from ephs.operad.isomorphism import isomorphism
 
@@ -280,13 +276,16 @@ class Pattern:
         return automorphisms(self, fix_interface=fix_interface)
 
     def canonical_hash(self) -> str:
-        """A digest that isomorphic patterns share, the same in every process.
-
-        Others have others, but for patterns so regular that colour refinement does not tell them apart.
-        """
+        """A digest that isomorphic patterns share in every process, and others do not but for very regular ones."""
         from ephs.operad.isomorphism import canonical_hash
 
         return canonical_hash(self)
+
+    def relation(self, *, field: Literal["float", "rational"] = "float") -> "LinearRelation":
+        """F(f), the relation of the junctions: numbers with error bounds, or exact."""
+        from ephs.semantics.meaning.relation import FIELDS, relation_of_pattern
+
+        return relation_of_pattern(FIELDS[field](), self)
 
     def to_networkx(self) -> "nx.MultiGraph[Any]":
         """The bipartite graph of boxes and junctions, an edge for each port.

@@ -6,7 +6,9 @@ from fractions import Fraction
 from typing import Any, Literal, TypeAlias, final
 
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Path, Pattern
-from ephs.semantics.algebra.elimination import Row, eliminated, reduced
+from ephs.semantics.algebra.elimination import RATIONAL, Row, eliminated, reduced
+from ephs.semantics.meaning import LinearRelation, glued, variables
+from ephs.semantics.meaning.variables import Variable
 
 Number: TypeAlias = int | Fraction
 Kind: TypeAlias = Literal["effort", "flow", "one", "rate", "state", "before", "after"]
@@ -89,39 +91,26 @@ def _interface(element: object) -> Interface | None:
     return element.interface if isinstance(element, ExactRelation) else None
 
 
+def _linear(element: ExactRelation, box: Path) -> LinearRelation:
+    """The relation of what fills a box; states inside have their names in the whole."""
+
+    def variable(key: Coordinate) -> Variable:
+        kind, path, i = key
+        if key == ONE:
+            return variables.ONE
+        outer = kind in ("flow", "effort")
+        return Variable("outer" if outer else "own", kind, ROOT, path if outer else box / path, i)
+
+    rows = [{variable(key): value for key, value in row} for row in element.equations]
+    return LinearRelation.of(RATIONAL, {name for row in rows for name in row}, rows)
+
+
 def _compose(pattern: Pattern, parts: Mapping[Path, ExactRelation]) -> ExactRelation:
-    """Ports on a junction share an effort, their flows sum to the outer one; inner unknowns are then eliminated."""
-    inner: dict[Path, int] = {}
-    rows: list[dict[Any, Any]] = []
-    balances: dict[Coordinate, dict[Any, Number]] = {}
-    for path, junction in pattern.junctions.items():
-        if junction.exposed and junction.power:
-            for i in range(junction.quantity.space.dim):
-                balances["effort", path, i] = {("flow", path, i): -1}
-    for box, part in parts.items():
-        ports = pattern.boxes[box].ports
-        inner |= {box / name: dim for name, dim in part.inner}
-        for port, of in ports.items():
-            if of.power:
-                for i in range(part.interface[port].quantity.space.dim):
-                    balances.setdefault(("effort", of.junction, i), {})["inner", box, port, i] = 1
-        for equation in part.equations:
-            row: dict[Any, Fraction] = {}
-            for key, value in equation:
-                kind, name, i = key
-                if kind == "flow":
-                    new: Any = ("inner", box, name, i)
-                elif kind == "effort":
-                    new = ("effort", ports[name].junction, i)
-                else:
-                    new = key if key == ONE else (kind, box / name, i)
-                row[new] = row.get(new, Fraction(0)) + value
-            rows.append(row)
-    rows += balances.values()
-    outer = {("effort", path) for path, of in pattern.interface.items() if of.power}
-    outer |= {("flow", path) for path, of in pattern.interface.items() if of.power}
-    kept = {key for row in rows for key in row if key[0] not in ("inner", "effort", "flow") or key[:2] in outer}
-    return _made(pattern.interface, inner, eliminated(rows, kept, _order))
+    found = glued(RATIONAL, pattern, {box: _linear(part, box) for box, part in parts.items()})
+    rows: list[dict[Any, Fraction]] = [
+        {(v.kind, v.port, v.place): n for v, n in row.items()} for row in found.equations
+    ]
+    return ExactRelation.of(pattern.interface, rows, {box / n: d for box, part in parts.items() for n, d in part.inner})
 
 
 def _rename(element: ExactRelation, names: Mapping[Path, Path]) -> ExactRelation:
