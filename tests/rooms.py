@@ -50,6 +50,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
 """From the ground up. Rooms that stand together know each other and all storeys below; no others."""
 DOORS = {
     ("ephs.operad.pattern", "ephs.show"): "patterns are displayed in notebooks",
+    ("ephs.operad.pattern", "ephs.semantics.meaning"): "patterns have their relation",
     ("ephs.operad.algebra", "ephs.semantics.algebra"): "calling the empty pattern gives the empty system",
     ("ephs.semantics.catalogue", "ephs.mechanics.elements"): "documents of systems name components of mechanics",
     ("ephs.semantics.library.units", "ephs.solve.exchange"): "an FMI unit in the library runs sampled",
