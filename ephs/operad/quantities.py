@@ -130,7 +130,7 @@ class Quantity:
 
     def in_frame(self, frame: str | None) -> "Quantity":
         """The same quantity, given in the named frame."""
-        return replace(self, frame=frame)
+        return self if frame == self.frame else replace(self, frame=frame)
 
     @property
     def environment(self) -> bool:

@@ -225,7 +225,9 @@ class _Kinds:
         stored = np.full(len(ports), -1)
         if storing:
             stored[[place[port] for port in bundle.ports]] = np.arange(len(bundle.ports))
-        states = [self.quantities.number(bundle.quantity(port)) for port in bundle.ports] if storing else []
+        states = (
+            [self.quantities.number(bundle.quantity(port).in_frame(None)) for port in bundle.ports] if storing else []
+        )
         reads = range(len(bundle.ports)) if storing else [place[port] for port in primitive.reads]
         return Kind(
             ports=ports,
@@ -271,7 +273,10 @@ class _Kinds:
         outside[found] = total[STATES] + np.arange(found.size)
         state = np.where(stores >= 0, stores, outside)[label]
         arrays = [np.empty(int(count), dtype=np.int64) for count in total]
-        quantities = [j.quantity for j, mine in zip(pattern.junctions.values(), own, strict=True) if mine]
+        # frames are no part of numbers, and come from the levels above, too
+        quantities = [
+            j.quantity.in_frame(None) for j, mine in zip(pattern.junctions.values(), own, strict=True) if mine
+        ]
         arrays[JUNCTIONS][:inner] = [self.quantities.number(quantity) for quantity in quantities]
         for c in copies:
             kind = c.kind

@@ -158,7 +158,7 @@ def number_flat(flat: System) -> Numbering:
             if state is None:
                 raise AssemblyError("unread-state", path, port=port, junction=junction)
             reads.append(state)
-    of = [quantities.number(pattern.junctions[path].quantity) for path in number]
+    of = [quantities.number(pattern.junctions[path].quantity.in_frame(None)) for path in number]
     outer = [i for path, i in number.items() if pattern.junctions[path].exposed and pattern.junctions[path].power]
     index = [np.array(numbers, dtype=np.int64) for numbers in (order, wires, reads, of, outer, states)]
     return Numbering(tuple(primitives.values), tuple(quantities.values), *index, parts=())
@@ -180,5 +180,5 @@ def _states(flat: System, quantities: Interned[Quantity]) -> tuple[list[int], di
                 raise AssemblyError("two-storages", path, junction=junction, found=found)
             provider[key] = len(states)
             paths.append(path / port)
-            states.append(quantities.number(primitive.interface[port].quantity))
+            states.append(quantities.number(primitive.interface[port].quantity.in_frame(None)))
     return states, provider

@@ -49,8 +49,7 @@ def copied(draw, part):
     for i in range(draw(st.integers(1, 3))):
         wires = {}
         for port, port_type in part.interface.items():
-            # equal frames: those that a part gains from the level around it only the flattened system shows
-            fitting = [name for name, quantity in of.items() if quantity == port_type.quantity]
+            fitting = [name for name, quantity in of.items() if quantity.matches(port_type.quantity)]
             name = draw(st.sampled_from([*fitting, f"j{len(of)}"]))
             of.setdefault(name, port_type.quantity)
             wires[port] = name if port_type.power else f"~{name}"
@@ -215,3 +214,15 @@ def test_faults_inside_parts_are_named_as_in_the_flattened_system(fault):
         system.descriptor()
     assert raised.value.kind == fault
     assert str(raised.value.path).startswith("c0")
+
+
+def test_frames_from_the_levels_above_are_no_part_of_numbers():
+    part = Pattern.from_text("a: displacement, exposed as state; b: displacement; a ~ b; k(q=b)")(k=lib.spring(k=1.0))
+    framed = Pattern(
+        junctions={name: junction(Q.displacement.in_frame("world")) for name in ("x", "y")},
+        boxes={"p": {"a": "~x"}, "q": {"a": "~y"}},
+    )
+    system = framed(p=part, q=part)
+    assert "world" in {each.quantity.frame for each in system.flatten().pattern.junctions.values()}
+    by_kinds, plain = Descriptor(system, number_by_kinds(system)), assemble(system.flatten())
+    assert by_kinds.junctions == plain.junctions and len(plain.junctions) == 2
