@@ -9,6 +9,7 @@ import numpy as np
 
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
+from ephs.semantics.errors import SemanticsError
 from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.audit import Bounds, Tests, audit
@@ -61,6 +62,8 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         told = [error.equation]
         if error.outcome in _AT_CONSTRAINTS and run.problem.dependences:
             told.append(run.problem.dependences())
+        if error.outcome in (*_AT_CONSTRAINTS, Outcome.INCONSISTENT) and run.t == run.t0:
+            told.append(_no_motion(run.problem))
         equation = "; ".join(filter(None, told))
         serves = run.bounds.serves if run.bounds is not None else serves_not
         partial = run.solution()
@@ -71,6 +74,17 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         raise Interrupted(Outcome.INTERRUPTED, run.t * run.problem.seconds, "", "", run.solution()) from error
     except MemoryError as error:
         raise SimulationError(Outcome.MEMORY, run.t * run.problem.seconds, "", str(error), run.solution()) from error
+
+
+def _no_motion(problem: Problem) -> str:
+    """The equations that contradict each other at the start of a system without scene, if no motion exists there."""
+    if problem.scene is not None:
+        return ""
+    try:
+        found = problem.descriptor.system.relation(problem.reference).at(problem.initial).empty
+    except SemanticsError:
+        return ""
+    return f"no motion exists from there: {'; '.join(found.because)}" if found else ""
 
 
 def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:

@@ -64,7 +64,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     if fastest is not None and fastest[0] * INSTANT * abs(h) > TURNED:  # such an instant is none to an oscillation
         jumping = _jumping(problem, model, x, np.copysign(TURNED / (INSTANT * fastest[0]), h))
     if jumping:
-        raise SolveError(Outcome.INCONSISTENT, jumping, _reason(problem))
+        raise SolveError(Outcome.INCONSISTENT, jumping, "the constraints do not hold at the start")
 
 
 def _bare(problem: Problem) -> bool:
@@ -72,12 +72,6 @@ def _bare(problem: Problem) -> bool:
     d = problem.descriptor
     stored = {i for slot in d.components if isinstance(slot.primitive, Storage) for i in slot.efforts}
     return len(stored) < d.effort_size
-
-
-def _reason(problem: Problem) -> str:
-    """The equations that contradict each other at the start, where rounding of the states is not all that they do."""
-    found = problem.descriptor.system.relation(problem.reference).at(problem.initial).empty
-    return "the constraints do not hold at the start" + "".join(f"; {each}" for each in found.because)
 
 
 def _jumping(problem: Problem, model: Model, x: Array, h: float) -> str:

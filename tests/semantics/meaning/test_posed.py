@@ -59,8 +59,10 @@ def test_a_state_without_motion_is_empty_and_says_by_which_equations(case):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("case", OPEN)
 def test_no_method_runs_from_a_state_without_motion(case, method):
-    system, state, _ = OPEN[case]
-    with pytest.raises(ephs.SimulationError):
+    system, state, junction = OPEN[case]
+    with pytest.raises(
+        ephs.SimulationError, match=f"no motion exists from there: .*flow balance of junction {junction} "
+    ):
         ephs.simulate(system, 0.05, initial={state: 1.0}, step=0.01, method=method)
 
 
