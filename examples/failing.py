@@ -136,7 +136,7 @@ def driving() -> ephs.System:
     """A mass with friction that drives it at some speeds, which no search has found."""
 
     def brake(p: float, s: float) -> Any:
-        d = 0.5 - 3.0 * math.exp(-(((abs(float(p)) - 7.75) / 0.03) ** 2))
+        d = 0.5 - 3.0 * math.exp(-(((float(p) ** 2 - 60.0625) / 0.45) ** 2))  # at 7.75 m/s, which is no number here
         return d * np.array([[s, -p], [-p, p * p / s]])
 
     pattern = Pattern(

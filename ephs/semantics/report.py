@@ -118,7 +118,10 @@ def check_assembly(d: Descriptor, inputs: Mapping[Path, Any]) -> CheckItem:
 def check_motion(system: System, reference: Reference, state: Mapping[str, object] | None) -> CheckItem:
     """Whether a motion exists from the given state, else from the start, and what does not determine it."""
     where = "the start" if state is None else "the state"
-    found = system.relation(reference).at(system.state(state))
+    try:
+        found = system.relation(reference).at(system.state(state))
+    except SemanticsError as error:
+        return CheckItem("motion", state is None, f"{where}: {error}")
     if found.empty:
         return CheckItem("motion", False, f"no motion exists from {where}: {'; '.join(found.empty.because)}")
     determined = found.determined

@@ -49,7 +49,8 @@ class Oscillations:
 def fastest_of(problem: Problem, x: Array) -> tuple[float, Path] | None:
     """Angular frequency in rad/s of the fastest oscillation about the states x, and its spring; None of none."""
     try:
-        found = oscillations(problem, x)
+        with np.errstate(all="ignore"):
+            found = oscillations(problem, x)
     except (SolveError, SemanticsError, ArithmeticError, np.linalg.LinAlgError):  # as states of a failed run may be
         return None
     return (float(found.rates[-1]), found.springs[-1]) if found is not None and found.rates[-1] > 0.0 else None

@@ -79,6 +79,8 @@ def _rounding_of_given(storage: "Storage", numbers: list[float], gradient: Array
 def _off_differences(storage: "Storage", x: "Point", gradient: Array) -> Defect | None:
     """Along a random direction, and along one coordinate: other ones at other states."""
     n = storage.bundle.size
+    if n == 0:
+        return None
     source = np.random.default_rng(int(abs(hash(tuple(float(each) for port in storage.reads for each in x[port])))))
     for direction in (np.eye(n)[source.integers(n)], *source.standard_normal((1 if n > 1 else 0, n))):
         slope = float(gradient @ direction)
