@@ -87,7 +87,7 @@ def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array
     """f = A e + Cᵀ λ, 0 = C e; numbers are rounded beside the largest of the same units."""
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
     multipliers = [Variable("met", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]
-    sizes, beside = largest(bundle, dynamic), largest(bundle, constraint.T).T
+    sizes, beside = largest(bundle, largest(bundle, dynamic).T).T, largest(bundle, constraint.T).T
     rows: list[Row[Any]] = []
     transposed, around = constraint.T.tolist(), beside.T.tolist()
     for i, (entries, size) in enumerate(zip(dynamic.tolist(), sizes.tolist(), strict=True)):
@@ -103,14 +103,10 @@ def _rounded(field: Field[Any], names: list[Variable], entries: list[float], siz
 
 
 def largest(bundle: Bundle, numbers: Array) -> Array:
-    """The largest number of the same units beside each, (n,) or (n, k): in a square matrix by rows and columns."""
+    """The largest number of rows of the same units in place of each, (n,) or (n, k)."""
     kinds, count = _units(bundle)
     out = np.zeros((count, *numbers.shape[1:]))
     np.maximum.at(out, kinds, np.abs(numbers))
-    if numbers.ndim == 2 and numbers.shape[0] == numbers.shape[1]:
-        both = np.zeros((count, count))
-        np.maximum.at(both.T, kinds, out.T)
-        return both[kinds[:, None], kinds]
     return out[kinds]
 
 

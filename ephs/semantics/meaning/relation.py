@@ -36,7 +36,7 @@ FIELDS: Mapping[str, Any] = {"float": Rounded, "rational": Rational}
 
 
 class Fibre(Protocol):
-    """LinearRelation relation over a point of the base."""
+    """Linear relation over a point of the base."""
 
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         """The primitives with their full paths."""

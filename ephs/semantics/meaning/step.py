@@ -86,9 +86,9 @@ def solved(
     states, contradiction = place(classes, state, ports or {})
     if contradiction:
         return Solved({}, {}, {}, {}, np.inf)
-    names = {path: name for path, name in names_of(classes).items() if any(c.stores for c in classes if c.name == name)}
+    stored = {each.name for each in classes if each.stores}
+    names = {path: name for path, name in names_of(classes).items() if name in stored}
     given = _prescribed(system.interface, inputs or {})
-
     slopes: dict[Path, Array] = {}
 
     def tangents(guess: Guess, fresh: bool) -> LinearRelation:
