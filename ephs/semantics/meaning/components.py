@@ -16,8 +16,8 @@ from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable, at_port
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 
-TURNING = {"SO3": 3, "SE3": 3, "SE2": 1}
-"""How many coordinates of a group, the first ones, are angles; the others are lengths."""
+TURNING = {"se(3)": 3, "so(3)xr3": 3, "free": 3, "cylindrical": 1, "planar": 1}
+"""How many coordinates of spaces of both, the first ones, are angles, by lower-case name; the others are lengths."""
 
 
 def at_ports(kind: str, bundle: Bundle) -> list[Variable]:
@@ -120,5 +120,5 @@ def _units(bundle: Bundle) -> tuple[Any, int]:
 
 def _words(quantity: Quantity) -> list[tuple[str, bool]]:
     """Unit and kind of each coordinate; angles and lengths of one quantity differ in unit."""
-    turning = TURNING.get(quantity.space.name)
-    return [(quantity.unit, turning is not None and i < turning) for i in range(quantity.space.dim)]
+    turning = TURNING.get(quantity.space.name.rstrip("*").lower(), 0)
+    return [(quantity.unit, i < turning) for i in range(quantity.space.dim)]

@@ -169,3 +169,17 @@ def test_numbers_know_what_is_near_zero():
     assert rank(same, 1.0) == 1 and same.clear
     assert rank(Rational(), 1.0 + 1.5e-15) == 2
     assert rank(Rational(as_written), 0.1 + 0.9) == 1
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-12])
+def test_spins_are_not_hidden_by_velocities(apart):
+    """Two bodies held together at 1000 m/s: a difference of their spins of 1e-12 rad/s is a contradiction."""
+    ports = {"p": Q.body_momentum, "p2": Q.body_momentum}
+    hold = ephs.constraint(ports, np.hstack([np.eye(6), -np.eye(6)]))
+    body = ephs.storage({"p": Q.body_momentum}, lambda p: 0.5 * (p @ p))
+    system = Pattern.from_text("a: body_momentum; b: body_momentum; one(p=a); two(p=b); hold(p=a, p2=b)")(
+        one=body, two=body, hold=hold
+    )
+    flight = np.array([0.0, 0.0, 0.0, 1000.0, 0.0, 0.0])
+    found = system.relation().at({"one.p": flight + apart * np.eye(6)[0], "two.p": flight})
+    assert bool(found.empty) == (apart > 0.0)
