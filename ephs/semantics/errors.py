@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, final
 from ephs.operad.messages import nearest_of as nearest_of
 
 if TYPE_CHECKING:
-    from ephs.semantics.trials import Witness
+    from ephs.semantics.verdicts.trials import Witness
 
 _TEXTS = {
     "fillings": ("{path}: the boxes to fill are {expected}, the fillings given are {found}; fill each box once"),
@@ -155,7 +155,7 @@ class StructureError(SemanticsError):
     @property
     def witness(self) -> "Witness | None":
         """The smallest counterexample found: states, efforts, entry, size; None where a parameter is at fault."""
-        from ephs.semantics.trials import Witness
+        from ephs.semantics.verdicts.trials import Witness
 
         found = self.facts.get("witness")
         return found if isinstance(found, Witness) else None

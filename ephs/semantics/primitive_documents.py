@@ -13,7 +13,6 @@ from ephs.operad.reading import Reader
 from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
-from ephs.semantics.checks import random_efforts, random_point
 from ephs.semantics.domains import Bounds
 from ephs.semantics.errors import SemanticsError, StructureError
 from ephs.semantics.extents import between
@@ -23,6 +22,7 @@ from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, R
 from ephs.semantics.symbols.algebra import sp
 from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, term_from, term_of
 from ephs.semantics.symbols.tracing import Untraceable, symbols_of, trace
+from ephs.semantics.verdicts.checks import random_efforts, random_point
 
 FLAGS = {"reversible": "reversed_field", "irreversible": "one_sided"}
 """Key that says that a structure need not be invariant under time reversal, by kind."""

@@ -17,7 +17,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import manifold
 from ephs.semantics.support import Support
-from ephs.semantics.verdict import Condition, StructureVerdict, examine
+from ephs.semantics.verdicts.verdict import Condition, StructureVerdict, examine
 
 if TYPE_CHECKING:
     from ephs.semantics.derive.linear import Linear

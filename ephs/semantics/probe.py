@@ -8,10 +8,10 @@ import numpy as np
 
 from ephs.operad import Directory, Path, PortType
 from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.checks import random_point
 from ephs.semantics.descriptor import Input
 from ephs.semantics.primitives import Irreversible, Storage
 from ephs.semantics.system import System
+from ephs.semantics.verdicts.checks import random_point
 
 
 @final

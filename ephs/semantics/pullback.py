@@ -18,7 +18,7 @@ from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relations import Storage
 from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible
-from ephs.semantics.verdict import Condition
+from ephs.semantics.verdicts.verdict import Condition
 
 
 @final

@@ -11,8 +11,8 @@ from ephs.semantics.errors import SemanticsError
 from ephs.semantics.forms import obstacle
 from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
 from ephs.semantics.markup import table
-from ephs.semantics.search import search
 from ephs.semantics.system import System
+from ephs.semantics.verdicts.search import search
 
 PROBES = 3
 """States and efforts at which a structure is evaluated again, whatever its verdict."""

@@ -10,9 +10,9 @@ from ephs.semantics.errors import StructureError
 from ephs.semantics.laws import random_probe, system_law
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.probe import Probe
-from ephs.semantics.search import UNDEFINED, failure, search, shrunk
-from ephs.semantics.trials import chosen, special_numbers, trial_of
-from ephs.semantics.verdict import StructureVerdict
+from ephs.semantics.verdicts.search import UNDEFINED, failure, search, shrunk
+from ephs.semantics.verdicts.trials import chosen, special_numbers, trial_of
+from ephs.semantics.verdicts.verdict import StructureVerdict
 
 Numbers = tuple[list[float], Reference]
 

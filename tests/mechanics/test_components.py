@@ -17,11 +17,11 @@ from ephs.operad import Path, Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
-from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
-from ephs.semantics.search import search
 from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
 from ephs.semantics.subspace import isotropy
+from ephs.semantics.verdicts.checks import dirac, random_efforts, random_point
+from ephs.semantics.verdicts.search import search
 from ephs.testing import check_primitive, mechanisms
 
 REFERENCE = Reference()

@@ -11,7 +11,7 @@ import ephs
 from ephs import AssemblyError, Pattern, System, junction, library
 from ephs import quantity as Q
 from ephs.semantics import Storage
-from ephs.semantics.checks import random_point
+from ephs.semantics.verdicts.checks import random_point
 from ephs.testing import systems
 from tests.semantics.test_documents import MECHANICS, VALID
 

@@ -10,8 +10,8 @@ from ephs.operad import Path
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.bundle import Bundle
-from ephs.semantics.checks import dirac, random_efforts, random_point
 from ephs.semantics.subspace import isotropy
+from ephs.semantics.verdicts.checks import dirac, random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
 
 GASES = (

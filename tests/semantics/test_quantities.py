@@ -12,9 +12,9 @@ from ephs.operad import Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, library
 from ephs.semantics.bundle import Bundle
-from ephs.semantics.checks import random_point
 from ephs.semantics.extents import expected, inside
 from ephs.semantics.primitives import power_ports
+from ephs.semantics.verdicts.checks import random_point
 
 ONE = Space("real", 1, 1)
 ROUNDING = float(np.finfo(float).eps)

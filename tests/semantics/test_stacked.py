@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from ephs.operad import Directory, PortType
 from ephs.semantics import Irreversible, Reference
 from ephs.semantics.bundle import Bundle
-from ephs.semantics.checks import random_point
 from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.subspace import Subspace
+from ephs.semantics.verdicts.checks import random_point
 from ephs.testing import fillings, nestings, systems
 from tests.broken import put_in_place
 from tests.semantics.stacked import components_of, equations_of, path_of, stacked, states_of

@@ -15,10 +15,10 @@ import ephs
 from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
-from ephs.semantics.proving import conditions_of
 from ephs.semantics.stage.store import STORE
 from ephs.semantics.symbols import proofs as prover
-from ephs.semantics.verdict import Condition, StructureVerdict
+from ephs.semantics.verdicts.proving import conditions_of
+from ephs.semantics.verdicts.verdict import Condition, StructureVerdict
 from ephs.testing import check_entropy_production, check_primitive
 from tests.semantics.test_primitives import ARGUMENTS, made
 from tests.semantics.zoo import AB, MALFORMED, QP, ZOO, conduct, drag, hidden, outer

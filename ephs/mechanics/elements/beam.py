@@ -22,13 +22,13 @@ from ephs.mechanics.elements.strain import ORDERS, strain_energy, strain_resista
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import coupled, stored
 from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.system import System
-from ephs.semantics.verdict import proved
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import proved
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

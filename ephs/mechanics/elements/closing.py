@@ -13,11 +13,11 @@ from ephs.mechanics.elements import notation
 from ephs.mechanics.elements.components import columns_of, gap_over, joint_matrix, relative
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics.bundle import Array
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.derive.closing import Closing
 from ephs.semantics.primitives import Kernel, Point, Reversible
 from ephs.semantics.spaces import SE3, Pair
-from ephs.semantics.verdict import proved
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import proved
 
 Q1, Q2, Q_R = Path.of("q1"), Path.of("q2"), Path.of("q_r")
 MULTIPLIERS: Final = 6

@@ -16,7 +16,6 @@ from ephs.mechanics.shapes.dry import Dry
 from ephs.operad import Directory, Path, PortType, Quantity, quantity
 from ephs.semantics import formulas, structures
 from ephs.semantics.bundle import Array
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.errors import StructureError
@@ -26,7 +25,8 @@ from ephs.semantics.spaces import SE3, Pair, codes, manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.special import squared_turn, turn_ratio
-from ephs.semantics.verdict import proved
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import proved
 
 POSES = {"SE3": quantity.pose, "SO3xR3": quantity.direct_pose}
 MOMENTA = {"SE3": quantity.body_momentum, "SO3xR3": quantity.direct_momentum}

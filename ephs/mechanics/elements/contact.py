@@ -22,11 +22,11 @@ from ephs.mechanics.shapes.pairs import Touch
 from ephs.mechanics.shapes.selecting import Vector
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
 from ephs.semantics import library, structures
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.forms import stored
 from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.system import System
-from ephs.semantics.verdict import proved
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import proved
 
 RELATIVE = quantity.relative_pose("free")
 Q_R = Path.of("q_r")

@@ -14,12 +14,12 @@ from ephs.mechanics.shapes.law import Law
 from ephs.operad import Directory, PortType, quantity
 from ephs.semantics import structures
 from ephs.semantics.bundle import Array
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import stored
 from ephs.semantics.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.spaces import Pair
-from ephs.semantics.verdict import proved
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import proved
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

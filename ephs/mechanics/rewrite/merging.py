@@ -19,7 +19,7 @@ from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage, power_ports
 from ephs.semantics.pullback import Map, pull_back
 from ephs.semantics.spaces import SE3
-from ephs.semantics.verdict import Condition
+from ephs.semantics.verdicts.verdict import Condition
 
 NAME = "merge rigidly connected bodies"
 REFERENCE = Reference()

@@ -38,11 +38,11 @@ from ephs.operad import Path, Pattern
 from ephs.operad.collector import paused_collector
 from ephs.semantics import extents
 from ephs.semantics.bundle import Reference
-from ephs.semantics.checks import random_efforts
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.kept import once
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.system import System
+from ephs.semantics.verdicts.checks import random_efforts
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.findings import POLICIES, judged
 from ephs.solve.breakpoints import Breakpoints

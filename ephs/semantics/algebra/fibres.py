@@ -10,11 +10,11 @@ from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.algebra.free import systems
 from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.checks import random_point
 from ephs.semantics.meaning import Relation, relation_of
 from ephs.semantics.meaning.relation import Renamed
 from ephs.semantics.primitives import Irreversible
 from ephs.semantics.system import Filling
+from ephs.semantics.verdicts.checks import random_point
 
 Meaning: TypeAlias = Relation | Filling
 """A relation, or a system or primitive in place of its relation."""

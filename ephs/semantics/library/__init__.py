@@ -14,7 +14,6 @@ import numpy as np
 from ephs.operad import Directory, Interface, PortType, Quantity, quantity
 from ephs.operad.messages import nearest_of
 from ephs.semantics import formulas
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import coupled, dissipated, stored
@@ -33,7 +32,8 @@ from ephs.semantics.library.magnetics import (
 from ephs.semantics.library.units import fmu as fmu
 from ephs.semantics.primitives import Formula, Irreversible, Kernel, Reversible, Storage, power_ports
 from ephs.semantics.structures import constant_structure, dissipation, exponential, quadratic
-from ephs.semantics.verdict import Condition, proved
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import Condition, proved
 
 __all__ = [
     "capacitor",

@@ -11,7 +11,6 @@ import numpy as np
 
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics.bundle import Bundle
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.forms import stacked
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
@@ -20,7 +19,8 @@ from ephs.semantics.symbols.bounds import Interval
 from ephs.semantics.symbols.calculus import trivialised
 from ephs.semantics.symbols.signs import sign_shown, squares_shown, vanishes
 from ephs.semantics.symbols.tracing import Trace, Untraceable, trace
-from ephs.semantics.trials import ROTATING, extent
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.trials import ROTATING, extent
 
 SYMBOLIC = "symbolically"
 LARGE = 4000

@@ -15,11 +15,11 @@ import numpy as np
 
 from ephs.semantics.algebra.elimination import eliminated
 from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.checks import FLAGS, STATEMENTS
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces.rank import TINY
-from ephs.semantics.trials import Trial
-from ephs.semantics.verdict import Condition
+from ephs.semantics.verdicts.checks import FLAGS, STATEMENTS
+from ephs.semantics.verdicts.trials import Trial
+from ephs.semantics.verdicts.verdict import Condition
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Reversible

@@ -16,9 +16,18 @@ from ephs.semantics.derive.recording import Recording, Untraceable, record
 from ephs.semantics.errors import StructureError
 from ephs.semantics.forms import run_tape, stacked
 from ephs.semantics.spaces import manifold
-from ephs.semantics.trials import NEAR, REFERENCES, Trial, beside, chosen, coordinates, special_numbers, trial_of
-from ephs.semantics.verdict import Condition
 from ephs.semantics.verdicts.rounding import ROUNDED, rounding, steps_of
+from ephs.semantics.verdicts.trials import (
+    NEAR,
+    REFERENCES,
+    Trial,
+    beside,
+    chosen,
+    coordinates,
+    special_numbers,
+    trial_of,
+)
+from ephs.semantics.verdicts.verdict import Condition
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive

@@ -21,12 +21,12 @@ from ephs.operad import PortType
 from ephs.semantics import StructureError
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.bundle import Reference
-from ephs.semantics.checks import random_efforts, random_point
 from ephs.semantics.kernel_table import OK, address_of, prototype
 from ephs.semantics.laws import random_probe
 from ephs.semantics.pullback import Map, pull_back
-from ephs.semantics.search import search
 from ephs.semantics.spaces import PAIRS, SE3, pair
+from ephs.semantics.verdicts.checks import random_efforts, random_point
+from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))

@@ -9,11 +9,11 @@ import ephs
 from ephs import quantity as Q
 from ephs.mechanics.elements import components
 from ephs.operad import Path, PortType
-from ephs.semantics.checks import random_efforts, random_point
 from ephs.semantics.derive.maps import Block, Maps
 from ephs.semantics.derive.relations import compiled, program, sizes
 from ephs.semantics.pullback import Map, pull_back, pulled_ports
 from ephs.semantics.spaces import PAIRS, SE3, pair
+from ephs.semantics.verdicts.checks import random_efforts, random_point
 
 EPS = np.finfo(float).eps
 MOMENTUM = PortType(Q.body_momentum, True)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs import quantity as Q
-from ephs.semantics.checks import random_efforts, random_point
 from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import compiled, program, sizes
@@ -20,6 +19,7 @@ from ephs.semantics.primitives import midpoint
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.special import root
 from ephs.semantics.stage import PLAIN
+from ephs.semantics.verdicts.checks import random_efforts, random_point
 
 EPS = np.finfo(float).eps
 seeds = st.integers(0, 2**20)

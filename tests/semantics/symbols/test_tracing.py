@@ -15,11 +15,11 @@ from ephs import quantity as Q
 from ephs.mechanics.elements import components
 from ephs.operad import Path
 from ephs.semantics import Reference
-from ephs.semantics.checks import random_point
 from ephs.semantics.forms import storage_form
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text
+from ephs.semantics.verdicts.checks import random_point
 from tests.semantics.test_primitives import ARGUMENTS
 
 UNARY = [np.sin, np.cos, np.tanh, np.arctan, np.exp, np.cosh, np.sinh, np.expm1, abs]

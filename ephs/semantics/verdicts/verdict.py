@@ -81,7 +81,7 @@ def examine(primitive: "Primitive") -> StructureVerdict:
     StructureError
         There is a counterexample.
     """
-    from ephs.semantics.search import COUNT, search
+    from ephs.semantics.verdicts.search import COUNT, search
 
     conditions = _asked(primitive, _proofs(primitive))
     if all(each.proved for each in conditions):
@@ -95,7 +95,7 @@ def examine(primitive: "Primitive") -> StructureVerdict:
 
 def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
     """The conditions without that on parity where the primitive is one-sided, or in a reversed field."""
-    from ephs.semantics.checks import MIRRORED
+    from ephs.semantics.verdicts.checks import MIRRORED
 
     free = (primitive.kind == "irreversible" and primitive.one_sided) or (
         primitive.kind == "reversible" and primitive.reversed_field
@@ -105,8 +105,8 @@ def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[C
 
 def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
     """Each condition with its proof, or without one."""
-    from ephs.semantics.checks import STATEMENTS
-    from ephs.semantics.search import simplest
+    from ephs.semantics.verdicts.checks import STATEMENTS
+    from ephs.semantics.verdicts.search import simplest
 
     if primitive.kind == "environment":
         return proved("by definition of the reference environment", "H = 0 and e = 0")
@@ -123,7 +123,7 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
         return decided(primitive)
     if primitive.formula is None:
         return tuple(Condition(statement, False, "") for statement in STATEMENTS[primitive.kind])
-    from ephs.semantics.proving import conditions_of
+    from ephs.semantics.verdicts.proving import conditions_of
     from ephs.semantics.verdicts.recorded import require_recorded
 
     gaps = require_recorded(primitive)

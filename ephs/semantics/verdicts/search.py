@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.semantics.bundle import Reference
-from ephs.semantics.checks import NEARER, check_at
 from ephs.semantics.errors import StructureError
-from ephs.semantics.trials import (
+from ephs.semantics.verdicts.checks import NEARER, check_at
+from ephs.semantics.verdicts.trials import (
     REFERENCES,
     Trial,
     beside,

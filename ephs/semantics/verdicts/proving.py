@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.semantics.checks import STATEMENTS
 from ephs.semantics.stage.known import known
-from ephs.semantics.verdict import Condition
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import Condition
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive

@@ -18,7 +18,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.subspace import Subspace
-from ephs.semantics.trials import ROTATING, Trial
+from ephs.semantics.verdicts.trials import ROTATING, Trial
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
