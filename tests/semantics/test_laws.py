@@ -153,7 +153,7 @@ def test_drawn_systems_move_and_dissipate():
 
     collect()
     assert np.mean(steps) > 0.9
-    assert np.mean(motions) > 0.25
+    assert np.mean(motions) > 0.2
     assert np.mean(heats) > 0.15
 
 
