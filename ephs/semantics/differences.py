@@ -1,12 +1,14 @@
-"""Default gradients and discrete gradients of energies, by differences."""
+"""Slopes of functions, default gradients and discrete gradients of energies, by differences."""
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.extents import room
+from ephs.semantics.spaces.rank import DIFFERENCE
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Point, Storage
@@ -15,6 +17,17 @@ NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
 """Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Tolerance of a difference of energies, relative to them and to the rounding of the states times the gradient."""
+
+
+def slope(function: Callable[[Array], Array], at: Array) -> Array:
+    """The derivative (m, n) of a function at a point (n,) by central differences; rounding of their terms is zero."""
+    columns: list[Array] = []
+    for i in range(at.size):
+        shift = DIFFERENCE * max(1.0, abs(float(at[i]))) * np.eye(at.size)[i]
+        there, back = function(at + shift), function(at - shift)
+        change, terms = there - back, np.abs(there) + np.abs(back)
+        columns.append(np.where(np.abs(change) > ROUNDING * terms, change, 0.0) / (2.0 * shift[i]))
+    return np.array(columns).T if columns else np.zeros((np.size(function(at)), 0))
 
 
 def increments(storage: "Storage", x0: "Point", v: Array) -> Array:

@@ -155,7 +155,7 @@ def recorded_structure(kernel: Kernel, n: int, reads: tuple[Path, ...]) -> Calla
 
 
 def recorded_values(kernel: Kernel) -> Callable[[Sequence[float]], Array]:
-    """What the tape of a kernel says of its numbers, in the shape of what was recorded; NaN where it has no value."""
+    """Evaluation of a kernel's tape at numbers, in the recorded shape; NaN where it has no value."""
     relation = kernel.relation
     match relation:
         case relations.Storage():

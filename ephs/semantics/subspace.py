@@ -110,8 +110,3 @@ class Subspace:
 
 def _condition(sigma: Array, rank: int, largest: float) -> float:
     return float(largest / sigma[rank - 1]) if rank else 1.0
-
-
-def isotropy(subspace: Subspace, form: Array) -> float:
-    """Largest value of a form (n, n) on an orthonormal basis: 0 for an isotropic subspace."""
-    return float(np.abs(subspace.basis.T @ form @ subspace.basis).max(initial=0.0))

@@ -39,7 +39,7 @@ ROUNDED = 1e-9
 MASSLESS = 1e-14
 """Inertia, as a part of the largest, below which it is rounding: rows determine what has none."""
 LEAST = 1e-2
-"""What counts as the inertia of such freedoms, as a part of the least one, so that they are dependent first."""
+"""Substitute inertia of massless freedoms, relative to the least one: pivoting takes them as dependent first."""
 
 
 @final

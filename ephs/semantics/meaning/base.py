@@ -16,14 +16,12 @@ from ephs.operad.links import closure
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.initial import read_state
-from ephs.semantics.meaning.fields import Field, Rounded
+from ephs.semantics.meaning.fields import ROUNDED, Field, Rounded
 from ephs.semantics.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import manifold
 
 Values = Mapping[str, object] | Mapping[Path, object] | Mapping[Path, Array]
 """Values of states by path."""
-ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Rounding of a coordinate, relative to the largest one, up to which two values of a state are equal."""
 
 
 @final
@@ -183,5 +181,8 @@ def place(classes: Sequence[StateClass], state: Values, ports: Values) -> tuple[
 
 def _equal(quantity: Quantity, one: Array, other: Array) -> bool:
     space = manifold(quantity.space)
+    # rounding of a coordinate is relative to the largest one
     size = max(1.0, float(np.abs(one).max(initial=0.0)))
-    return float(np.abs(space.increment(one, other)).max(initial=0.0)) <= ROUNDING * space.size * size
+    return (
+        float(np.abs(space.increment(one, other)).max(initial=0.0)) <= ROUNDED * space.size * size
+    )  # of a coordinate, relative to the largest

@@ -1,6 +1,6 @@
 """Relations of components: what a primitive says of the variables at its ports, at an instant."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -13,11 +13,11 @@ from ephs.semantics.given import defined
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
-from ephs.semantics.meaning.variables import ONE, Variable, at_port
+from ephs.semantics.meaning.variables import ONE, Variable, at_port, own
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 
 TURNING = {"se(3)": 3, "so(3)xr3": 3, "free": 3, "cylindrical": 1, "planar": 1}
-"""How many coordinates of spaces of both, the first ones, are angles, by lower-case name; the others are lengths."""
+"""Number of angular coordinates, which come first, by lower-case name of the space; the others are lengths."""
 
 
 def at_ports(kind: str, bundle: Bundle) -> list[Variable]:
@@ -57,14 +57,10 @@ def at_instant(primitive: Primitive, path: Path, point: BasePoint) -> LinearRela
 def _storage(storage: Storage, path: Path, point: BasePoint) -> LinearRelation:
     field, bundle = point.field, storage.bundle
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
-
-    def state(port: Path) -> Path:
-        return point.names[path / port]
-
-    rates = own("rate", bundle, state)
+    rates = rates_of(storage, path, point.names)
     rows = [field.exact({rate: 1.0, flow: -1.0}) for rate, flow in zip(rates, flows, strict=True)]
     if not point.storages:
-        known = own("effort", bundle, path.__truediv__)
+        known = efforts_of(storage, path)
         rows += [field.exact({effort: 1.0, value: -1.0}) for effort, value in zip(efforts, known, strict=True)]
         return LinearRelation.of(field, [*rates, *flows, *efforts, *known], rows)
     x = point.read(path, storage)
@@ -74,13 +70,15 @@ def _storage(storage: Storage, path: Path, point: BasePoint) -> LinearRelation:
     return LinearRelation.of(field, [*rates, *flows, *efforts, ONE], rows)
 
 
-def own(kind: str, bundle: Bundle, name: Callable[[Path], Path]) -> list[Variable]:
-    """The variables inside that belong to the ports, by what names a port's path has there."""
-    return [
-        Variable("own", kind, ROOT, name(port), i)
-        for port, _, quantity in bundle.items()
-        for i in range(quantity.space.dim)
-    ]
+def rates_of(storage: Storage, path: Path, names: Mapping[Path, Path]) -> list[Variable]:
+    """Rates of the states of the storage at this path, by the names of states: storages of one state share its rate."""
+    items = storage.bundle.items()
+    return [v for port, _, quantity in items for v in own("rate", names[path / port], quantity.space.dim)]
+
+
+def efforts_of(primitive: Primitive, path: Path) -> list[Variable]:
+    """Efforts of the component at this path, named for good."""
+    return [v for port, _, quantity in primitive.bundle.items() for v in own("effort", path / port, quantity.space.dim)]
 
 
 def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> LinearRelation:

@@ -50,7 +50,7 @@ class Field(ABC, Generic[N]):
 
     @abstractmethod
     def pivot(self, rows: Sequence[Row[N]], variable: Any) -> int:
-        """Which of the rows a variable is best eliminated with."""
+        """Index of the pivot row for the elimination of a variable."""
 
     def exact(self, terms: Mapping[Any, float]) -> Row[N]:
         """A linear form whose coefficients are meant exactly."""
@@ -59,7 +59,7 @@ class Field(ABC, Generic[N]):
     def rounded(self, terms: Mapping[Any, float], sizes: Mapping[Any, float] | None = None) -> Row[N]:
         """A linear form whose coefficients were computed, with rounding beside themselves or beside larger sizes.
 
-        What is within its rounding is zero.
+        Coefficients within their rounding error are zero.
         """
         beside = sizes or {}
         errors = {key: ROUNDED * max(abs(value), beside.get(key, 0.0)) for key, value in terms.items() if value}
@@ -125,9 +125,9 @@ class Rational(Field[Fraction]):
 Bounded: TypeAlias = tuple[float, float]
 """A float, and the bound of its error."""
 CLEAR = 1e3
-"""A pivot that is as many times its error bound is clearly not zero."""
+"""Ratio of a pivot to its error bound from which it is clearly not zero."""
 NEAR_ZERO = 0.1
-"""What counts as zero and is smaller than this part of its error bound is clearly rounding."""
+"""Ratio of a dropped number to its error bound up to which it is clearly rounding."""
 
 
 @final

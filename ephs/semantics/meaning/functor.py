@@ -58,10 +58,13 @@ def _at(inside: Role, kind: str, where: _Port) -> list[Variable]:
 
 def filled(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """Put relations into boxes: (whole ∩ ⊕ parts), without what lies at the filled boxes."""
-    return _met(whole.renamed(lambda v: v._replace(role="met") if v.role == "inner" and v.box in parts else v), parts)
+    return _composed(
+        whole.renamed(lambda v: v._replace(role="met") if v.role == "inner" and v.box in parts else v), parts
+    )
 
 
-def _met(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
+def _composed(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
+    """(whole ∩ ⊕ parts), without the variables at which they met."""
     inside = [part.renamed(lambda v, box=box: into(box, v)) for box, part in parts.items()]
     joined = whole.join(*inside)
     return joined.without(v for v in joined.variables if v.role == "met")
@@ -69,7 +72,7 @@ def _met(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> LinearR
 
 def glued(field: Field[Any], pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
     """(F(f) ∩ ⊕ parts) projected to the outer ports."""
-    return _met(relation_of_pattern(field, pattern, "met"), parts)
+    return _composed(relation_of_pattern(field, pattern, "met"), parts)
 
 
 def power(relation: LinearRelation) -> dict[Variable, tuple[Variable, int]]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundle import Array
+from ephs.semantics.differences import slope
 from ephs.semantics.meaning.base import BasePoint
-from ephs.semantics.meaning.components import own
+from ephs.semantics.meaning.components import efforts_of, rates_of
 from ephs.semantics.meaning.elimination import eliminated
 from ephs.semantics.meaning.fields import Row
 from ephs.semantics.meaning.linear import LinearRelation
@@ -24,7 +25,7 @@ from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.spaces.rank import DIFFERENCE
 
 Labelled: TypeAlias = "tuple[str, Path, Row[Any]]"
-"""What an equation is of: the kind of variables at a junction, or ``component``; where that is; the row."""
+"""Origin of an equation (``flow`` or ``effort`` of a junction, or ``component``), its path, and the row."""
 WORDS: Mapping[str, str] = {
     "flow": "flow balance of junction",
     "effort": "one effort at junction",
@@ -131,15 +132,12 @@ def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
 def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Row[Any]]:
     """H″ by rows: of each effort at a storage's ports, minus its change with the rates of the states."""
 
-    def state(port: Path) -> Path:
-        return point.names[path / port]
-
     def effort(v: Array) -> Array:
         return storage.effort(storage.retract(point.read(path, storage), v), point.reference)
 
-    rates = own("rate", storage.bundle, state)
-    hessian = _slope(effort, len(rates)).tolist()
-    efforts = own("effort", storage.bundle, path.__truediv__)
+    rates = rates_of(storage, path, point.names)
+    hessian = slope(effort, np.zeros(len(rates))).tolist()
+    efforts = efforts_of(storage, path)
     return {
         name: {
             rate: point.field.number(-entry, DIFFERENCE * abs(entry))
@@ -148,14 +146,3 @@ def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Ro
         }
         for name, row in zip(efforts, hessian, strict=True)
     }
-
-
-def _slope(function: Any, size: int) -> Array:
-    """The derivative (n, n) at zero by central differences; what they cannot tell from nothing is zero."""
-    columns: list[Array] = []
-    for i in range(size):
-        shift = DIFFERENCE * np.eye(size)[i]
-        there, back = function(shift), function(-shift)
-        change, noise = there - back, 16.0 * np.finfo(float).eps * (np.abs(there) + np.abs(back))
-        columns.append(np.where(np.abs(change) > noise, change, 0.0) / (2.0 * DIFFERENCE))
-    return np.array(columns).T if columns else np.zeros((0, 0))

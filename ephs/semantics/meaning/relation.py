@@ -19,12 +19,12 @@ from ephs.operad import ROOT, Algebra, Directory, Interface, Path, Pattern
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.meaning.base import BasePoint, StateClass, Values, component_classes, glued_classes, names_of, place
-from ephs.semantics.meaning.components import at_instant, at_ports, own
+from ephs.semantics.meaning.components import at_instant, at_ports, efforts_of
 from ephs.semantics.meaning.fields import Field, Rational, Rounded
 from ephs.semantics.meaning.functor import glued, relation_of_pattern
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
-from ephs.semantics.meaning.variables import ONE, Variable, into
+from ephs.semantics.meaning.variables import ONE, Variable, into, own
 from ephs.semantics.primitives import Primitive, Storage
 from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import Filling, as_system, fold, require_fillings
@@ -205,11 +205,11 @@ class Instant:
     @property
     def order(self) -> list[Variable]:
         """All variables: rates by the names of states, flows, then efforts by port, the constant last."""
-        out = [Variable("own", "rate", ROOT, name, i) for name, dim in self.rates for i in range(dim)]
+        out = [variable for name, dim in self.rates for variable in own("rate", name, dim)]
         bundle = Bundle.of(self.relation.interface)
         if not self.point.storages:
             for path, primitive in self.relation.fibre.leaves():
-                out += own("effort", primitive.bundle, path.__truediv__) if isinstance(primitive, Storage) else []
+                out += efforts_of(primitive, path) if isinstance(primitive, Storage) else []
         return [*out, *sorted(at_ports("flow", bundle)), *sorted(at_ports("effort", bundle)), ONE]
 
     @property
@@ -238,10 +238,10 @@ class Instant:
     def values(self) -> dict[Path, Array]:
         """Rates of states that are determined alone, without outer flows: name of the state -> (n,)."""
         found, out = self.linear.values(), dict[Path, Array]()
-        for each in self.relation.classes:
-            names = [Variable("own", "rate", ROOT, each.name, i) for i in range(each.quantity.space.dim)]
-            if each.stores and all(name in found for name in names):
-                out[each.name] = np.array([found[name] for name in names])
+        for name, dim in self.rates:
+            names = own("rate", name, dim)
+            if all(variable in found for variable in names):
+                out[name] = np.array([found[variable] for variable in names])
         return out
 
     @property

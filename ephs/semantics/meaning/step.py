@@ -11,22 +11,23 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.operad import ROOT, Path
+from ephs.operad import Path
 from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.descriptor import Input
+from ephs.semantics.differences import slope
 from ephs.semantics.errors import SemanticsError
 from ephs.semantics.meaning.base import Values, names_of, place
-from ephs.semantics.meaning.components import at_ports, own
+from ephs.semantics.meaning.components import at_ports, efforts_of
 from ephs.semantics.meaning.fields import Field, Rounded, Row
 from ephs.semantics.meaning.functor import glued
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.relation import relation_of
-from ephs.semantics.meaning.variables import ONE, Variable, at_port
+from ephs.semantics.meaning.variables import ONE, Variable, at_port, own
 from ephs.semantics.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
-from ephs.semantics.spaces.rank import CONSTRAINT, DIFFERENCE
+from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.semantics.system import Filling, System, as_system, fold
 
 ITERATIONS = 30
@@ -190,14 +191,14 @@ def tangent(
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
     moving = [port for port in primitive.reads if path / port in names]
     sizes = {port: primitive.interface[port].quantity.space.dim for port in primitive.reads}
-    rates = [Variable("own", "rate", ROOT, names[path / port], i) for port in moving for i in range(sizes[port])]
+    rates = [variable for port in moving for variable in own("rate", names[path / port], sizes[port])]
     if isinstance(local, Storing):
         rows = [field.exact({rate: 1.0, flow: -1.0}) for rate, flow in zip(rates, flows, strict=True)]
         rows += _touching(field, local.effort, rates, efforts, guess, slopes, path)
         return LinearRelation.of(field, [*flows, *efforts, *rates, ONE], rows)
-    here = own("effort", bundle, path.__truediv__)
+    here = efforts_of(primitive, path)
     count = primitive.multipliers if isinstance(primitive, Reversible) else 0
-    multipliers = [Variable("own", "multiplier", ROOT, path, i) for i in range(count)]
+    multipliers = own("multiplier", path, count)
     conditions: list[Any] = [None] * count
     still = {port: np.zeros(sizes[port]) for port in primitive.reads}
 
@@ -230,7 +231,7 @@ def _touching(
     at = np.array([guess.get(v, 0.0) for v in arguments])
     value = np.asarray(function(at), dtype=float)
     if path not in slopes:
-        slopes[path] = _differenced(function, at, value.size)
+        slopes[path] = slope(function, at)
     jacobian = slopes[path]
     constant = value - jacobian @ at
     rows: list[Row[Any]] = []
@@ -241,20 +242,6 @@ def _touching(
         row = field.rounded(terms)
         rows.append(row if name is None else row | field.exact({name: -1.0}))
     return rows
-
-
-def _differenced(function: Callable[[Array], Array], at: Array, size: int) -> Array:
-    """The derivative (size, n) at a point (n,) by central differences; rounding of their terms is zero."""
-    jacobian = np.zeros((size, at.size))
-    for i in range(at.size):
-        delta = DIFFERENCE * max(1.0, abs(float(at[i])))
-        up, down = at.copy(), at.copy()
-        up[i] += delta
-        down[i] -= delta
-        there, back = function(up), function(down)
-        noise = np.finfo(float).eps * (np.abs(there) + np.abs(back))
-        jacobian[:, i] = np.where(np.abs(there - back) > 4.0 * noise, there - back, 0.0) / (2.0 * delta)
-    return jacobian
 
 
 def _rounding(relation: LinearRelation) -> float:
@@ -287,15 +274,12 @@ def _solution(system: System, names: Mapping[Path, Path], guess: Guess, residual
     for path, primitive in system.leaves():
         if isinstance(primitive, Storage):
             for port, _, quantity in primitive.bundle.items():
-                name = names[path / port]
-                rates[path / port] = vector([Variable("own", "rate", ROOT, name, i) for i in range(quantity.space.dim)])
+                rates[path / port] = vector(own("rate", names[path / port], quantity.space.dim))
         elif isinstance(primitive, Reversible):
             if primitive.multipliers:
-                multipliers[path] = vector(
-                    [Variable("own", "multiplier", ROOT, path, i) for i in range(primitive.multipliers)]
-                )
+                multipliers[path] = vector(own("multiplier", path, primitive.multipliers))
         else:
-            efforts[path] = vector(own("effort", primitive.bundle, path.__truediv__))
+            efforts[path] = vector(efforts_of(primitive, path))
     outer = {
         port: (vector(at_port("outer", "flow", port, q)), vector(at_port("outer", "effort", port, q)))
         for port, _, q in Bundle.of(system.interface).items()

@@ -52,6 +52,11 @@ def at_port(role: Role, kind: str, port: Path, quantity: Quantity, box: Path = R
     return [Variable(role, kind, box, port, i) for i in range(quantity.space.dim)]
 
 
+def own(kind: str, path: Path, size: int) -> list[Variable]:
+    """The variables of a vector inside, named for good by a full path."""
+    return [Variable("own", kind, ROOT, path, i) for i in range(size)]
+
+
 def into(box: Path, variable: Variable) -> Variable:
     """The name that a variable of what fills a box has in the whole: its interface meets that of the box."""
     role, kind, inside, port, place = variable

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.semantics.algebra.elimination import eliminated
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import StructureError
+from ephs.semantics.meaning.components import process
+from ephs.semantics.meaning.fields import ROUNDED, Rational, as_written
+from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.verdicts.checks import FLAGS, STATEMENTS
 from ephs.semantics.verdicts.trials import Trial
@@ -24,13 +26,11 @@ from ephs.semantics.verdicts.verdict import Condition
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Reversible
 
-ROUNDED = 8.0 * float(np.finfo(float).eps)
-"""Relative error of a number that was computed in a few operations."""
 BESIDE = 8.0 * ROUNDED
 """Rounding that products of matrices leave, relative to the largest number of the same units."""
 READINGS: Mapping[str, Callable[[float], Fraction]] = {
     "as given": Fraction,
-    "as written in decimals": lambda number: Fraction(repr(number)),
+    "as written in decimals": as_written,
 }
 """Rational number of a float, by the name of the reading; the first one is exact."""
 OF_UNITS = "up to the rounding of numbers of the same units"
@@ -98,23 +98,20 @@ def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: A
         return _proved(statement, "as given")
     mirrored = -parity[:, None] * skew * parity, constraint * parity
     for words, read in READINGS.items():
-        if _relation(skew, constraint, read) == _relation(*mirrored, read):
+        one, other = (
+            _without_multipliers(process(Rational(read), reversible.bundle, *each))
+            for each in ((skew, constraint), mirrored)
+        )
+        if one.same(other):
             return _proved(statement, words)
     if pure:
         return _searched(reversible, statement, "parity", alike, BESIDE * _beside(reversible, skew))
     return Condition(statement, False, "both sides are equal up to the rounding of the whole structure")
 
 
-def _relation(skew: Array, constraint: Array, read: Callable[[float], Fraction]) -> list[object]:
-    """Equations in f and e alone, in reduced form: equal for equal structures."""
-    n, rows = len(skew), list[dict[tuple[str, int], Fraction]]()
-    for i, (of_efforts, of_multipliers) in enumerate(zip(skew.tolist(), constraint.T.tolist(), strict=True)):
-        row = {("f", i): Fraction(-1)}
-        row |= {("e", j): read(entry) for j, entry in enumerate(of_efforts) if entry}
-        row |= {("λ", k): read(entry) for k, entry in enumerate(of_multipliers) if entry}
-        rows.append(row)
-    rows += [{("e", j): read(entry) for j, entry in enumerate(row) if entry} for row in constraint.tolist()]
-    return list(eliminated(rows, [(letter, i) for letter in "fe" for i in range(n)], lambda key: key))
+def _without_multipliers(relation: LinearRelation) -> LinearRelation:
+    """Equations in f and e alone."""
+    return relation.onto(variable for variable in relation.variables if variable.role == "outer")
 
 
 def _dot(row: Array, amounts: Array, read: Callable[[float], Fraction]) -> Fraction:
