@@ -120,9 +120,10 @@ _OSCILLATOR = {"q": junction(Q.displacement), "p": junction(Q.momentum)}
 _BOXES = {"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}}
 
 
-def oscillator(energy: Callable[..., Any] | None = None) -> ephs.System:
-    """A mass on a spring of one's own."""
-    spring = lib.spring(k=1.5) if energy is None else ephs.storage({"q": Q.displacement}, energy)
+def oscillator(energy: Callable[..., Any] | None = None, below: float = np.inf) -> ephs.System:
+    """A mass on a spring of one's own, whose energy is a model below a length."""
+    domain = {"q": (-np.inf, below)}
+    spring = lib.spring(k=1.5) if energy is None else ephs.storage({"q": Q.displacement}, energy, domain=domain)
     return Pattern(_OSCILLATOR, _BOXES)(pe=spring, ke=lib.point_mass(m=1.0), pkc=lib.pkc())
 
 

@@ -184,7 +184,7 @@ CASES = (
         step=0.1, options=fixed(initial={"left.v": 1.0, "right.v": 1.0, "mass.p": 50.0}),
     ),
     Case(
-        Outcome.DOMAIN, "the square root of a negative number", lambda: oscillator(beyond), SYSTEMS, "pe",
+        Outcome.DOMAIN, "the square root of a negative number", lambda: oscillator(beyond, 1.0), SYSTEMS, "pe",
         within=(0.3, 0.35), options=fixed(initial={"ke.p": 3.0}),
     ),
     Case(

@@ -13,6 +13,8 @@ from ephs.show.graph import width_of
 
 LESS = 1e-9
 """Least decrease of a name's cost for a move."""
+OVERLAP = 100.0
+"""Cost of lying on something: more than that of any place."""
 _AIR = 1.5
 Place = tuple[Point, str, float]
 
@@ -50,16 +52,16 @@ class Sheet:
         trouble = 0.0
         if len(self.pieces):
             under = inside((left, top, right, bottom), self.pieces[:, 0], self.pieces[:, 1])
-            trouble += 6.0 * float(np.count_nonzero(under)) + float(under.sum())
+            trouble += OVERLAP * float(np.count_nonzero(under)) + float(under.sum())
         if len(self.discs):
             nearest = np.clip(self.discs[:, :2], (left, top), (right, bottom))
             depth = self.discs[:, 2] - np.hypot(*(nearest - self.discs[:, :2]).T)
-            trouble += 4.0 * float(np.count_nonzero(depth > 0)) + 3.0 * float(np.clip(depth, 0.0, None).sum())
+            trouble += OVERLAP * float(np.count_nonzero(depth > 0)) + 3.0 * float(np.clip(depth, 0.0, None).sum())
         for other in self.written:
             across = min(right, other[2]) - max(left, other[0])
             down = min(bottom, other[3]) - max(top, other[1])
             if across > 0 and down > 0:
-                trouble += 10.0 + 2.0 * across * down
+                trouble += OVERLAP + 2.0 * across * down
         if self.bounds is not None:
             limits = (self.bounds[0] - left, self.bounds[1] - top, right - self.bounds[2], bottom - self.bounds[3])
             trouble += 20.0 * sum(max(0.0, limit + 3.0) for limit in limits)

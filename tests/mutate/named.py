@@ -116,8 +116,8 @@ BREAKS = {
     ),
     "sameness of everything": Break(
         "ephs/semantics/meaning/linear.py",
-        "            if row:\n                return False",
-        "            if row:\n                return True",
+        "row.values())):\n                return False",
+        "row.values())):\n                return True",
     ),
     "gluing": Break(
         "ephs/semantics/meaning/functor.py",

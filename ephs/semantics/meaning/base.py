@@ -183,6 +183,4 @@ def _equal(quantity: Quantity, one: Array, other: Array) -> bool:
     space = manifold(quantity.space)
     # rounding of a coordinate is relative to the largest one
     size = max(1.0, float(np.abs(one).max(initial=0.0)))
-    return (
-        float(np.abs(space.increment(one, other)).max(initial=0.0)) <= ROUNDED * space.size * size
-    )  # of a coordinate, relative to the largest
+    return float(np.abs(space.increment(one, other)).max(initial=0.0)) <= ROUNDED * space.size * size

@@ -49,6 +49,10 @@ class Field(ABC, Generic[N]):
         """Whether two numbers are exactly opposite."""
 
     @abstractmethod
+    def clearly(self, number: N) -> bool:
+        """Whether a number that is kept is clearly not zero."""
+
+    @abstractmethod
     def pivot(self, rows: Sequence[Row[N]], variable: Any) -> int:
         """Index of the pivot row for the elimination of a variable."""
 
@@ -116,6 +120,10 @@ class Rational(Field[Fraction]):
     def opposite(self, one: Fraction, other: Fraction) -> bool:
         """Whether two numbers are opposite."""
         return one == -other
+
+    def clearly(self, number: Fraction) -> bool:
+        """It is not zero."""
+        return True
 
     def pivot(self, rows: Sequence[Row[Fraction]], variable: Any) -> int:
         """The shortest row."""
@@ -186,6 +194,10 @@ class Rounded(Field[Bounded]):
     def opposite(self, one: Bounded, other: Bounded) -> bool:
         """Whether two numbers are exactly opposite."""
         return one[0] == -other[0] and one[1] == other[1] == 0.0
+
+    def clearly(self, number: Bounded) -> bool:
+        """Whether a number is far above its error bound."""
+        return abs(number[0]) >= CLEAR * number[1]
 
     def pivot(self, rows: Sequence[Row[Bounded]], variable: Any) -> int:
         """Of the rows in which the variable is large the shortest; sizes are beside those of columns, then of rows."""

@@ -74,7 +74,7 @@ class LinearRelation:
         return bool(eliminated(self.field, self.equations, ONE.__ne__))
 
     def within(self, other: "LinearRelation") -> bool:
-        """Whether it implies all equations of the other one."""
+        """Whether it implies all equations of the other one: what is left of them is not clearly there."""
         pivots = echelon(self.field, self.equations, lambda _: True)
         for given in other.equations:
             row = dict(given)
@@ -83,12 +83,13 @@ class LinearRelation:
                     factor = self.field.quotient(row[variable], pivot[variable])
                     self.field.subtract(row, factor, pivot)
                     row.pop(variable, None)
-            if row:
+            # bounds of entries that were dropped are not carried on, so what is just above its bound may be rounding
+            if any(map(self.field.clearly, row.values())):
                 return False
         return True
 
     def same(self, other: "LinearRelation") -> bool:
-        """Whether it is the same relation: exact over ℚ, else to the error bounds. Empty ones are the same."""
+        """Whether it is the same relation: exact over ℚ, else not clearly another one. Empty ones are the same."""
         if self.variables != other.variables:
             return False
         return (self.within(other) and other.within(self)) or (self.empty and other.empty)
