@@ -116,8 +116,8 @@ BREAKS = {
     ),
     "sameness of everything": Break(
         "ephs/semantics/meaning/linear.py",
-        "row.values())):\n                return False",
-        "row.values())):\n                return True",
+        "            if self.field.support(row):\n                return False",
+        "            if self.field.support(row):\n                return True",
     ),
     "gluing": Break(
         "ephs/semantics/meaning/functor.py",

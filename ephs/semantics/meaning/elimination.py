@@ -24,7 +24,7 @@ def eliminated(field: Field[N], rows: Iterable[Row[N]], forgotten: Callable[[Any
     names, work = _numbered(rows)
     gone = [forgotten(name) for name in names]
     _, left = _pivoted(field, _substituted(field, work, gone), gone)
-    return [{names[i]: number for i, number in row.items()} for row in left]
+    return [{names[i]: number for i, number in row.items() if not gone[i]} for row in left]
 
 
 def echelon(field: Field[N], rows: Iterable[Row[N]], first: Callable[[Any], bool]) -> list[tuple[Any, Row[N]]]:
@@ -49,9 +49,10 @@ def reduced(field: Field[N], rows: Iterable[Row[N]], order: Callable[[Any], Any]
         row = dict(given)
         for variable in [key for key in row if key in pivots]:
             field.subtract(row, row[variable], pivots[variable])
-        if not row:
+        support = field.support(row)
+        if not support:
             continue
-        pivot = min(row, key=order)
+        pivot = min(support, key=order)
         scale = row[pivot]
         row = {key: field.quotient(value, scale) for key, value in row.items()}
         for owner in list(uses.get(pivot, ())):
@@ -134,10 +135,12 @@ def _pivoted(
         if where is None or len(where) != count:
             continue  # done, or in the heap again with the right count
         del uses[variable]
-        if not where:
-            continue
         numbers = sorted(where)
-        chosen = numbers.pop(field.pivot([work[i] for i in numbers], variable))
+        certain = [i for i in numbers if field.certain(work[i][variable])]
+        if not certain:  # it may be in none of them
+            continue
+        chosen = certain[field.pivot([work[i] for i in certain], variable)]
+        numbers.remove(chosen)
         pivot = work.pop(chosen)
         rest = {key: value for key, value in pivot.items() if key != variable}
         watched = [key for key in rest if key in uses]
@@ -153,4 +156,4 @@ def _pivoted(
             uses[key].discard(chosen)
             heappush(order, (len(uses[key]), key))
         pivots.append((variable, pivot))
-    return pivots, [row for row in work.values() if row]
+    return pivots, [row for row in work.values() if field.support(row)]

@@ -1,8 +1,8 @@
 """Fields of numbers: rational numbers, and floats that know their error.
 
 A field decides one question: is this number zero? Rational numbers decide it. A float that is larger than the bound of
-its error is not; within the bound it counts as zero, and the field records how near such decisions were. No threshold
-depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
+its error is not; within the bound it counts as zero, keeps its bound, and the field records how near such decisions
+were. So what is not zero in floats is not zero in ℚ, either. No threshold depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
 """
 
 from abc import ABC, abstractmethod
@@ -14,7 +14,7 @@ import numpy as np
 
 N = TypeVar("N")
 Row: TypeAlias = dict[Any, N]
-"""A linear form that vanishes: variable -> coefficient, without zeros."""
+"""A linear form that vanishes: variable -> coefficient; without zeros, but for those that are known to an error."""
 EPSILON = float(np.finfo(float).eps)
 ROUNDED = 8.0 * EPSILON
 """Relative error of a number that was computed in a few operations."""
@@ -42,36 +42,36 @@ class Field(ABC, Generic[N]):
 
     @abstractmethod
     def subtract(self, row: Row[N], factor: N, other: Mapping[Any, N]) -> None:
-        """Row ← row − factor · other, in place, without zeros."""
+        """Row ← row − factor · other, in place."""
 
     @abstractmethod
     def opposite(self, one: N, other: N) -> bool:
         """Whether two numbers are exactly opposite."""
 
     @abstractmethod
-    def clearly(self, number: N) -> bool:
-        """Whether a number that is kept is clearly not zero."""
+    def certain(self, number: N) -> bool:
+        """Whether a number is certainly not zero."""
 
     @abstractmethod
     def pivot(self, rows: Sequence[Row[N]], variable: Any) -> int:
-        """Index of the pivot row for the elimination of a variable."""
+        """Index of the pivot row for the elimination of a variable, which is certainly there in all rows."""
 
     def exact(self, terms: Mapping[Any, float]) -> Row[N]:
         """A linear form whose coefficients are meant exactly."""
         return {key: self.number(value) for key, value in terms.items() if value}
 
     def rounded(self, terms: Mapping[Any, float], sizes: Mapping[Any, float] | None = None) -> Row[N]:
-        """A linear form whose coefficients were computed, with rounding beside themselves or beside larger sizes.
-
-        Coefficients within their rounding error are zero.
-        """
+        """A linear form whose coefficients were computed, with rounding beside themselves or beside larger sizes."""
         beside = sizes or {}
-        errors = {key: ROUNDED * max(abs(value), beside.get(key, 0.0)) for key, value in terms.items() if value}
         return {
-            key: self.number(terms[key], error)
-            for key, error in errors.items()
-            if self.decides or abs(terms[key]) > error
+            key: self.number(value, ROUNDED * max(abs(value), beside.get(key, 0.0)))
+            for key, value in terms.items()
+            if value
         }
+
+    def support(self, row: Row[N]) -> list[Any]:
+        """The variables that are certainly in a linear form."""
+        return [key for key, number in row.items() if self.certain(number)]
 
 
 def as_written(value: float) -> Fraction:
@@ -121,9 +121,9 @@ class Rational(Field[Fraction]):
         """Whether two numbers are opposite."""
         return one == -other
 
-    def clearly(self, number: Fraction) -> bool:
-        """It is not zero."""
-        return True
+    def certain(self, number: Fraction) -> bool:
+        """Whether a number is not zero."""
+        return bool(number)
 
     def pivot(self, rows: Sequence[Row[Fraction]], variable: Any) -> int:
         """The shortest row."""
@@ -131,7 +131,7 @@ class Rational(Field[Fraction]):
 
 
 Bounded: TypeAlias = tuple[float, float]
-"""A float, and the bound of its error."""
+"""A float, and the bound of its error; the float is zero where it may be."""
 CLEAR = 1e3
 """Ratio of a pivot to its error bound from which it is clearly not zero."""
 NEAR_ZERO = 0.1
@@ -147,7 +147,7 @@ class Rounded(Field[Bounded]):
     kept
         Least size of a pivot, as a multiple of its error bound.
     dropped
-        Largest size of what counted as zero, as a part of its error bound.
+        Largest size of what counts as zero, as a part of its error bound.
     """
 
     __slots__ = ("dropped", "kept")
@@ -164,7 +164,8 @@ class Rounded(Field[Bounded]):
 
     def number(self, value: float, error: float = 0.0) -> Bounded:
         """A float and the bound of its error."""
-        return (float(value), error)
+        size = abs(value)
+        return (float(value), error) if size > error else (0.0, error + size)
 
     def value(self, number: Bounded) -> float:
         """The float."""
@@ -178,7 +179,7 @@ class Rounded(Field[Bounded]):
         return quotient, (da + size * db) / max(abs(b) - db, EPSILON * abs(b)) + EPSILON * size
 
     def subtract(self, row: Row[Bounded], factor: Bounded, other: Mapping[Any, Bounded]) -> None:
-        """Row ← row − factor · other; what is within its error bound is dropped."""
+        """Row ← row − factor · other; what is within its error bound is zero with that bound."""
         f, df = factor
         size = abs(f)
         for variable, (b, db) in other.items():
@@ -188,16 +189,19 @@ class Rounded(Field[Bounded]):
             error = da + size * db + df * (abs(b) + db) + EPSILON * (abs(product) + abs(left))
             if abs(left) > error:
                 row[variable] = (left, error)
-            elif row.pop(variable, None) is not None and left:
+            elif error:
+                row[variable] = (0.0, error + abs(left))
                 self.dropped = max(self.dropped, abs(left) / error)
+            else:
+                row.pop(variable, None)
 
     def opposite(self, one: Bounded, other: Bounded) -> bool:
         """Whether two numbers are exactly opposite."""
         return one[0] == -other[0] and one[1] == other[1] == 0.0
 
-    def clearly(self, number: Bounded) -> bool:
-        """Whether a number is far above its error bound."""
-        return abs(number[0]) >= CLEAR * number[1]
+    def certain(self, number: Bounded) -> bool:
+        """Whether a number is above its error bound."""
+        return bool(number[0])
 
     def pivot(self, rows: Sequence[Row[Bounded]], variable: Any) -> int:
         """Of the rows in which the variable is large the shortest; sizes are beside those of columns, then of rows."""
@@ -211,10 +215,11 @@ class Rounded(Field[Bounded]):
         columns: dict[Any, float] = {}
         for row in rows:
             for key, (value, _) in row.items():
-                columns[key] = max(columns.get(key, 0.0), abs(value))
+                if value:
+                    columns[key] = max(columns.get(key, 0.0), abs(value))
         largest = columns[variable]
         shares = [
-            abs(row[variable][0]) / largest / max(abs(value) / columns[key] for key, (value, _) in row.items())
+            abs(row[variable][0]) / largest / max(abs(value) / columns[key] for key, (value, _) in row.items() if value)
             for row in rows
         ]
         enough = 0.1 * max(shares)

@@ -74,7 +74,7 @@ class LinearRelation:
         return bool(eliminated(self.field, self.equations, ONE.__ne__))
 
     def within(self, other: "LinearRelation") -> bool:
-        """Whether it implies all equations of the other one: what is left of them is not clearly there."""
+        """Whether it implies all equations of the other one."""
         pivots = echelon(self.field, self.equations, lambda _: True)
         for given in other.equations:
             row = dict(given)
@@ -83,13 +83,12 @@ class LinearRelation:
                     factor = self.field.quotient(row[variable], pivot[variable])
                     self.field.subtract(row, factor, pivot)
                     row.pop(variable, None)
-            # bounds of entries that were dropped are not carried on, so what is just above its bound may be rounding
-            if any(map(self.field.clearly, row.values())):
+            if self.field.support(row):
                 return False
         return True
 
     def same(self, other: "LinearRelation") -> bool:
-        """Whether it is the same relation: exact over ℚ, else not clearly another one. Empty ones are the same."""
+        """Whether it is the same relation: exact over ℚ, else to the error bounds. Empty ones are the same."""
         if self.variables != other.variables:
             return False
         return (self.within(other) and other.within(self)) or (self.empty and other.empty)
@@ -103,7 +102,7 @@ class LinearRelation:
                 if key != variable:
                     factor = field.quotient(number, row[variable])
                     field.subtract(combination, factor, out.get(key, {key: field.one}))
-            out[variable] = combination
+            out[variable] = {key: number for key, number in combination.items() if field.certain(number)}
         return out | {variable: {variable: field.one} for variable in self.variables - out.keys()}
 
     def determined(self, given: Iterable[Variable] = ()) -> dict[Variable, Row[Any]]:

@@ -71,7 +71,7 @@ def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
         labels[label] = f"{WORDS[kind]} {path}"
         rows.append(row | {label: field.one})
     left = eliminated(field, rows, lambda variable: variable not in labels and variable != ONE)
-    chosen = min((row for row in left if ONE in row), key=len, default=None)
+    chosen = min((row for row in left if ONE in field.support(row)), key=len, default=None)
     if chosen is None:  # by this order of eliminations it is within rounding
         return ("equations that contradict each other by little more than rounding",)
     weights: dict[str, float] = {}

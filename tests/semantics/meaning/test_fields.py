@@ -1,0 +1,63 @@
+"""Floats with bounds of their errors: what they find is what ℚ finds of the same numbers, and bounds are never lost."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ephs.operad import ROOT, Path
+from ephs.semantics.meaning.fields import Rational, Rounded
+from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.relation import Instant
+from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.probe import random_probe
+from ephs.testing import systems
+
+X, Y, Z = (Variable("own", "rate", ROOT, Path.parse(name), 0) for name in "xyz")
+
+
+class Evaluated(Rational):
+    """ℚ over the floats at a state, whose rounding it takes for meant."""
+
+    __slots__ = ()
+    decides = False
+
+
+def rounded(relation: LinearRelation) -> LinearRelation:
+    """A relation over ℚ in floats, each coefficient rounded."""
+    field = Rounded()
+    rows = [field.rounded({v: relation.field.value(n) for v, n in row.items()}) for row in relation.equations]
+    return LinearRelation.of(field, relation.variables, rows)
+
+
+@settings(suppress_health_check=list(HealthCheck), max_examples=25)
+@given(systems(), st.integers(0, 2**16))
+def test_floats_find_the_relation_that_rational_numbers_find(system, seed):
+    probe = random_probe(system, seed)
+    found = system.relation(probe.reference).at(probe.state, probe.ports, efforts=probe.efforts)
+    exact = rounded(Instant(found.relation, replace(found.point, field=Evaluated())).linear)
+    assert found.linear.same(exact) and found.dimension == exact.dimension
+    less = replace(exact, equations=exact.equations[1:])
+    assert less.dimension == exact.dimension or not found.linear.same(less)
+
+
+def test_a_number_within_its_bound_keeps_it():
+    """x + y + δz = 0 and x + y = 0, where δ is rounding: z is free, and z = 0 in ℚ."""
+    field = Rounded()
+    row = field.rounded({X: 0.1 + 0.2, Y: 1.0, Z: 1.0})
+    field.subtract(row, field.one, field.rounded({X: 0.3, Y: 1.0, Z: 1.0}))
+    assert set(row) == {X, Y, Z} and field.support(row) == []
+    assert row[X][1] > 8 * abs(0.1 + 0.2 - 0.3)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_a_bound_is_handed_on(scale):
+    """0.3 − (0.1 + 0.2) is no pivot, and what is computed with it is known no better."""
+    field = Rounded()
+    near = field.number(0.1 + 0.2 - 0.3, 1e-16)
+    rows = [{X: field.one, Y: near}, {Y: field.one, Z: field.number(-scale)}]
+    found = LinearRelation.of(field, [X, Y, Z], rows)
+    held = LinearRelation.of(field, [X, Y, Z], [{X: field.one, Z: field.number(0.5e-16 * scale)}, rows[1]])
+    apart = LinearRelation.of(field, [X, Y, Z], [{X: field.one, Z: field.number(1e-15 * scale)}, rows[1]])
+    assert held.within(found) and not apart.within(found)
