@@ -2,7 +2,8 @@
 
 A field decides one question: is this number zero? Rational numbers decide it. A float that is larger than the bound of
 its error is not; within the bound it counts as zero, keeps its bound, and the field records how near such decisions
-were. So what is not zero in floats is not zero in ℚ, either. No threshold depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
+were. So what is not zero in floats is not zero in ℚ, either. No threshold depends on units: whoever scales an equation
+or a variable scales numbers and bounds alike.
 """
 
 from abc import ABC, abstractmethod

@@ -39,7 +39,7 @@ def test_floats_find_the_relation_that_rational_numbers_find(system, seed):
     exact = rounded(Instant(found.relation, replace(found.point, field=Evaluated())).linear)
     assert found.linear.same(exact) and found.dimension == exact.dimension
     less = replace(exact, equations=exact.equations[1:])
-    assert less.dimension == exact.dimension or not found.linear.same(less)
+    assert less.dimension == exact.dimension or less.empty or not found.linear.same(less)
 
 
 def test_a_number_within_its_bound_keeps_it():
