@@ -122,11 +122,7 @@ def check_motion(system: System, reference: Reference, state: Mapping[str, objec
         found = system.relation(reference).at(system.state(state))
     except SemanticsError as error:
         return CheckItem("motion", state is None, f"{where}: {error}")
-    if empty := found.empty:
-        return CheckItem("motion", False, f"no motion exists from {where}: {'; '.join(empty.because)}")
-    determined = found.determined
-    words = "is determined" if determined else f"is not known to be determined: {'; '.join(determined.because)}"
-    return CheckItem("motion", True, f"from {where} the motion {words}")
+    return CheckItem("motion", not found.empty, f"from {where} {found.doubt or 'the motion is determined'}")
 
 
 def _items(

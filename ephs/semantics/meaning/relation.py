@@ -235,6 +235,14 @@ class Instant:
         return determined(self.relation.fibre, self.point)
 
     @property
+    def doubt(self) -> str:
+        """Why no motion exists, or why it is not known to be determined; empty where it is."""
+        if empty := self.empty:
+            return f"no motion exists: {'; '.join(empty.because)}"
+        known = self.determined
+        return "" if known else f"the motion is not known to be determined: {'; '.join(known.because)}"
+
+    @property
     def values(self) -> dict[Path, Array]:
         """Rates of states that are determined alone, without outer flows: name of the state -> (n,)."""
         found, out = self.linear.values(), dict[Path, Array]()

@@ -3,6 +3,8 @@
 *relation*: junction by junction what the pattern says, component by component what its filling says.
 *descriptor*: the square form: efforts of storages, balances of flows, conditions.
 *reduced*: what is left when interface variables are eliminated.
+
+Where no motion exists from the start, or more than one may, the equations end with the reason.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -11,6 +13,7 @@ from itertools import pairwise
 from typing import Literal, final
 
 from ephs.operad import Path, Quantity
+from ephs.semantics.errors import SemanticsError
 from ephs.semantics.symbols.algebra import Expr, sp, text_of
 from ephs.semantics.symbols.elimination import coefficient_of, eliminate, settled, tidy
 from ephs.semantics.symbols.voices import say
@@ -40,11 +43,14 @@ class Equations:
     ----------
     names
         Symbol -> how LaTeX writes it.
+    doubt
+        Why they have no solution at the start, or several; else empty.
     """
 
     form: Form
     rows: tuple[Equation, ...]
     names: Mapping[Expr, str]
+    doubt: str = ""
 
     def __iter__(self) -> Iterator[Equation]:
         return iter(self.rows)
@@ -73,7 +79,7 @@ class Equations:
                 about = row.about
                 lines.append(f"{about}:")
             lines.append(f"  {text_of(row.left)} = {text_of(row.right)}")
-        return "\n".join(lines)
+        return "\n".join([*lines, f"at the start {self.doubt}"] if self.doubt else lines)
 
     def latex(self) -> str:
         """An ``align`` environment with a line for each equation."""
@@ -85,6 +91,9 @@ class Equations:
                 spelled = escaped(about, formula=False)
                 lines.append(rf"  \intertext{{{spelled}}}")
             lines.append(rf"  {self._tex(row.left)} &= {self._tex(row.right)} \\")
+        if self.doubt:
+            spelled = escaped(f"at the start {self.doubt}", formula=False)
+            lines.append(rf"  \intertext{{{spelled}}}")
         return "\n".join([r"\begin{align*}", *lines, r"\end{align*}"])
 
     def _tex(self, expression: Expr) -> str:
@@ -113,7 +122,14 @@ def equations_of(system: System, form: Form) -> Equations:
     if form not in writers:
         raise ValueError(f"form is {form!r}, expected one of {', '.join(writers)}")
     writer = Writer(system.flatten())
-    return Equations(form, tuple(writers[form](writer)), writer.words.latex)
+    return Equations(form, tuple(writers[form](writer)), writer.words.latex, _doubt(system))
+
+
+def _doubt(system: System) -> str:
+    try:
+        return system.relation().at(system.state()).doubt
+    except SemanticsError as error:
+        return str(error)
 
 
 def _moving(writer: Writer, junction: Path, quantity: Quantity, flow: Expr) -> Expr:

@@ -1,5 +1,7 @@
 """Which states have a motion, and one: what says so, what runs, and what the laws of gluing are in exact numbers."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -73,6 +75,11 @@ def test_check_names_the_junction(case):
     (motion,) = (item for item in found.items if item.name == "motion")
     assert not found.ok and not motion.ok and f"junction {junction}" in motion.detail
     assert system.check(state={state: 0.0}).ok
+    for form in ("relation", "descriptor"):
+        equations = system.with_initial({state: 1.0}).equations(form)
+        words = f"at the start no motion exists: .*junction {junction} "
+        assert re.search(words, str(equations)) and re.search(words, equations.latex().replace("\\", ""))
+        assert not system.equations(form).doubt
 
 
 def quadratic(p, s):
@@ -107,6 +114,7 @@ def test_what_nothing_determines_is_named():
     )
     answer = heat.relation().at().determined
     assert not answer and "the rate of a.s is arbitrary" in answer.because
+    assert "not known to be determined: the rate of a.s is arbitrary" in str(heat.equations("relation"))
 
 
 def test_storages_on_linked_junctions_have_one_rate():
