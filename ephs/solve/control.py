@@ -18,6 +18,8 @@ UNFELT, EXACT = 1e-10, 1e-12
 """Error in tolerances below which the next step is the longest allowed: proportional and symmetric control."""
 FINEST = 1e-11
 """Least symmetric step as a fraction of the run."""
+CRAWL, STRETCH = 1e-12, 64
+"""Least mean advance of a step, as a fraction of the run, in so many steps: at 1e-12 a run needs 1e12 steps."""
 SHORTEST = 16.0
 """Least step, in roundings of the time."""
 NEAREST = 1e6
@@ -200,6 +202,36 @@ def told_apart(t0: float, until: float, step: float | None) -> None:
         raise OptionError("step", step, expected)
     if abs(until - t0) < NEAREST * rounding:
         raise OptionError("until", until, f"a time at least {NEAREST * rounding:.3g} s from t0 = {t0!r} s")
+
+
+@final
+class Advance:
+    """Watches that steps of variable length come forward: near a singularity they may shrink without an end.
+
+    Parameters
+    ----------
+    span
+        Length of the run in its unit of time; 0 where steps are constant, which come to their end.
+    """
+
+    def __init__(self, t0: float, span: float) -> None:
+        self._span, self._steps, self._t = span, 0, t0
+
+    def require(self, steps: int, t: float) -> None:
+        """After a number of steps, at a time.
+
+        Raises
+        ------
+        SolveError
+            The last ones are too short to come to the end of the run.
+        """
+        count = steps - self._steps
+        if count < STRETCH:
+            return
+        mean = abs(t - self._t) / count
+        if mean < CRAWL * self._span:
+            raise SolveError(Outcome.TINY, "", f"{mean:.3g} s")
+        self._steps, self._t = steps, t
 
 
 class Policy(Protocol):

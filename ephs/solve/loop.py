@@ -14,7 +14,7 @@ from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import SLIVER, Control, Grid, Policy, first_step
+from ephs.solve.control import SLIVER, Advance, Control, Grid, Policy, first_step
 from ephs.solve.ending import audited, failures_of, repeatable
 from ephs.solve.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
 from ephs.solve.events import Event, Watch
@@ -116,9 +116,9 @@ class _Run(Generic[S]):
         self.grid = None if policy else Grid(0.0, abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
         self.save_at = save_at
-        self.setup, self.ended = 0.0, False
+        self.setup, self.looked, self.ended = 0.0, begin, False
         self.steps = self.rejected = self.saved = 0
-        self.looked = begin
+        self.way = Advance(t0, abs(until - t0) if policy else 0.0)
         self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
         self.blocks: list[Sequence[tuple[float, S, float]]] = []
         self.pending: list[tuple[float, S, float]] = []
@@ -275,6 +275,7 @@ class _Run(Generic[S]):
 
     def _look(self) -> None:
         """Report progress and write the journal at intervals."""
+        self.way.require(self.steps, self.t)
         if self.journal is not None and self.journal.due:
             self.write()
         elif len(self.pending) + sum(map(len, self.blocks)) >= BLOCK:

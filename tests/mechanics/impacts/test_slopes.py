@@ -80,7 +80,7 @@ def test_round_bodies_roll_up_to_a_slope_and_slip_beyond(steep, shape, ground, t
     (kind, ratio), mu = ROUND[shape], 0.1
     theta, inertia = float(np.arctan(steep * mu * (1.0 + 1.0 / ratio))), ratio * MASS * RADIUS**2
     scene, down, _ = sloped(tmp_path, theta, ground, kind, RADIUS, [0.03, 0.03, inertia], mu, LYING)
-    sol = run(scene, 0.25)
+    sol = run(scene, 0.05)
     until, rolls, weight = sol.t[-1], steep < 1.0, MASS * G * np.cos(theta)
     pull = G * np.sin(theta) / (1.0 + ratio) if rolls else G * (np.sin(theta) - mu * np.cos(theta))
     spin = pull / RADIUS if rolls else mu * weight / (ratio * MASS * RADIUS)
