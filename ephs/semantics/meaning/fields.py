@@ -1,9 +1,8 @@
 """Fields of numbers: rational numbers, and floats that know their error.
 
 A field decides one question: is this number zero? Rational numbers decide it. A float that is larger than the bound of
-its error is not; within the bound it counts as zero, keeps its bound, and the field records how near such decisions
-were. So what is not zero in floats is not zero in ℚ, either. No threshold depends on units: whoever scales an equation
-or a variable scales numbers and bounds alike.
+its error is not; within the bound it counts as zero and keeps its bound. So what is not zero in floats is not zero in
+ℚ, either. No threshold depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
 """
 
 from abc import ABC, abstractmethod
@@ -133,35 +132,14 @@ class Rational(Field[Fraction]):
 
 Bounded: TypeAlias = tuple[float, float]
 """A float, and the bound of its error; the float is zero where it may be."""
-CLEAR = 1e3
-"""Ratio of a pivot to its error bound from which it is clearly not zero."""
-NEAR_ZERO = 0.1
-"""Ratio of a dropped number to its error bound up to which it is clearly rounding."""
 
 
 @final
 class Rounded(Field[Bounded]):
-    """Floats with bounds of their errors (running error analysis).
+    """Floats with bounds of their errors (running error analysis)."""
 
-    Attributes
-    ----------
-    kept
-        Least size of a pivot, as a multiple of its error bound.
-    dropped
-        Largest size of what counts as zero, as a part of its error bound.
-    """
-
-    __slots__ = ("dropped", "kept")
+    __slots__ = ()
     one = (1.0, 0.0)
-
-    def __init__(self) -> None:
-        self.kept = np.inf
-        self.dropped = 0.0
-
-    @property
-    def clear(self) -> bool:
-        """Whether no decision was near."""
-        return self.kept >= CLEAR and self.dropped <= NEAR_ZERO
 
     def number(self, value: float, error: float = 0.0) -> Bounded:
         """A float and the bound of its error."""
@@ -192,7 +170,6 @@ class Rounded(Field[Bounded]):
                 row[variable] = (left, error)
             elif error:
                 row[variable] = (0.0, error + abs(left))
-                self.dropped = max(self.dropped, abs(left) / error)
             else:
                 row.pop(variable, None)
 
@@ -206,13 +183,8 @@ class Rounded(Field[Bounded]):
 
     def pivot(self, rows: Sequence[Row[Bounded]], variable: Any) -> int:
         """Of the rows in which the variable is large the shortest; sizes are beside those of columns, then of rows."""
-        best = self._best(rows, variable) if len(rows) > 1 else 0
-        value, error = rows[best][variable]
-        if error:
-            self.kept = min(self.kept, abs(value) / error)
-        return best
-
-    def _best(self, rows: Sequence[Row[Bounded]], variable: Any) -> int:
+        if len(rows) == 1:
+            return 0
         columns: dict[Any, float] = {}
         for row in rows:
             for key, (value, _) in row.items():
