@@ -1,4 +1,4 @@
-"""Linear subspaces of ℝⁿ with the operations that relations need, by orthonormal bases.
+"""Linear subspaces of ℝⁿ by orthonormal bases, for pictures of relations and their distances.
 
 Rank is decided relative to the largest singular value, after each row of a kernel was brought to unit length:
 this suits an oracle that compares relations, not an integrator.
@@ -24,14 +24,9 @@ class Subspace:
     ----------
     basis
         (n, r), orthonormal columns.
-    condition
-        Largest singular value, or the usual one, over the least that counted, and of equations the length before they
-        were restricted to the subspace over that after; multiplied over the eliminations that led here: by what factor
-        the basis may carry rounding.
     """
 
     basis: Array
-    condition: float = 1.0
 
     @staticmethod
     def from_kernel(matrix: Array) -> "Subspace":
@@ -43,7 +38,7 @@ class Subspace:
             return Subspace(np.eye(n))
         _, sigma, vt = svd(rows)
         rank = rank_of(sigma, ELIMINATION)
-        return Subspace(np.ascontiguousarray(vt[rank:].T), _condition(sigma, rank, sigma[0]))
+        return Subspace(np.ascontiguousarray(vt[rank:].T))
 
     @staticmethod
     def from_span(vectors: Array, usual: float = 0.0) -> "Subspace":
@@ -52,7 +47,7 @@ class Subspace:
             return Subspace(np.zeros((vectors.shape[0], 0)))
         u, sigma, _ = svd(vectors, full_matrices=False)
         rank = rank_of(sigma, ELIMINATION, usual)
-        return Subspace(np.ascontiguousarray(u[:, :rank]), _condition(sigma, rank, max(sigma[0], usual)))
+        return Subspace(np.ascontiguousarray(u[:, :rank]))
 
     @property
     def ambient(self) -> int:
@@ -71,30 +66,7 @@ class Subspace:
 
     def project(self, kept: Iterable[int]) -> "Subspace":
         """Keep some coordinates: ∃ the others. The rank is decided on an orthonormal basis, so it is well scaled."""
-        return Subspace.from_span(self.basis[list(kept), :], 1.0)._after(self)
-
-    def restrict(self, matrix: Array) -> "Subspace":
-        """The vectors of this subspace which also satisfy matrix z = 0."""
-        product = matrix @ self.basis
-        # a dependent row leaves rounding, which is no equation
-        lengths = np.linalg.norm(product, axis=1) / np.maximum(np.linalg.norm(matrix, axis=1), TINY)
-        left = lengths > ELIMINATION
-        coefficients = Subspace.from_kernel(product[left])
-        shortened = 1.0 / lengths[left].min(initial=1.0)
-        return Subspace(self.basis @ coefficients.basis, shortened * coefficients.condition)._after(self)
-
-    def image(self, matrix: Array) -> "Subspace":
-        """The image under a linear map, (m, n)."""
-        return Subspace.from_span(matrix @ self.basis)._after(self)
-
-    def direct_sum(self, other: "Subspace") -> "Subspace":
-        """Side by side in ℝⁿ⁺ᵐ."""
-        (n, r), (m, s) = self.basis.shape, other.basis.shape
-        both = np.block([[self.basis, np.zeros((n, s))], [np.zeros((m, r)), other.basis]])
-        return Subspace(both, max(self.condition, other.condition))
-
-    def _after(self, before: "Subspace") -> "Subspace":
-        return Subspace(self.basis, self.condition * before.condition)
+        return Subspace.from_span(self.basis[list(kept), :], 1.0)
 
     def distance(self, other: "Subspace") -> float:
         """Largest entry of the difference of the orthogonal projectors: 0 if equal, of order 1 if not."""
@@ -106,7 +78,3 @@ class Subspace:
         """Distance of a vector from the subspace, relative to its length."""
         off = vector - self.basis @ (self.basis.T @ vector)
         return float(np.linalg.norm(off) / max(np.linalg.norm(vector), TINY))
-
-
-def _condition(sigma: Array, rank: int, largest: float) -> float:
-    return float(largest / sigma[rank - 1]) if rank else 1.0

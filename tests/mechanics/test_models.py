@@ -163,7 +163,7 @@ def _scaled(relation, d):
     for i, j in enumerate(order):
         move[i, j] = 1.0
     move[-1, -1] = 1.0
-    return relation.subspace.image(move)
+    return Subspace(move @ relation.subspace.basis)
 
 
 @pytest.mark.parametrize("kind", kinds())
