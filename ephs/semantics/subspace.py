@@ -1,4 +1,4 @@
-"""Linear subspaces of ℝⁿ by orthonormal bases, for pictures of relations and their distances.
+"""Linear subspaces of ℝⁿ by orthonormal bases: projectors of relations and their distances.
 
 Rank is decided relative to the largest singular value, after each row of a kernel was brought to unit length:
 this suits an oracle that compares relations, not an integrator.

@@ -13,8 +13,8 @@ from ephs.show.graph import width_of
 
 LESS = 1e-9
 """Least decrease of a name's cost for a move."""
-OVERLAP = 100.0
-"""Cost of lying on something: more than that of any place."""
+OVERLAP = 1e6
+"""Cost of lying on something: more than that of any place along a wire, 0.05 a pixel."""
 _AIR = 1.5
 Place = tuple[Point, str, float]
 

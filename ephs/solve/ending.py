@@ -81,10 +81,10 @@ def _no_motion(problem: Problem) -> str:
     if problem.scene is not None:
         return ""
     try:
-        found = problem.descriptor.system.relation(problem.reference).at(problem.initial).empty
+        found = problem.descriptor.system.relation(problem.reference).at(problem.initial)
     except SemanticsError:
         return ""
-    return f"no motion exists from there: {'; '.join(found.because)}" if found else ""
+    return f"at the start {found.doubt}" if found.empty else ""
 
 
 def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:

@@ -274,7 +274,7 @@ class _Run(Generic[S]):
         return stopped is not None
 
     def _look(self) -> None:
-        """Report progress and write the journal at intervals."""
+        """Report progress and write the journal at intervals; a run that does not come forward ends."""
         self.way.require(self.steps, self.t)
         if self.journal is not None and self.journal.due:
             self.write()

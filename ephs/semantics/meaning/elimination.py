@@ -23,6 +23,7 @@ def eliminated(field: Field[N], rows: Iterable[Row[N]], forgotten: Callable[[Any
     """
     names, work = _numbered(rows)
     gone = [forgotten(name) for name in names]
+    # a forgotten variable that is left counts as zero in all rows
     _, left = _pivoted(field, _substituted(field, work, gone), gone)
     return [{names[i]: number for i, number in row.items() if not gone[i]} for row in left]
 
@@ -137,7 +138,7 @@ def _pivoted(
         del uses[variable]
         numbers = sorted(where)
         certain = [i for i in numbers if field.certain(work[i][variable])]
-        if not certain:  # it may be in none of them
+        if not certain:  # no row has it but within its error bound
             continue
         chosen = certain[field.pivot([work[i] for i in certain], variable)]
         numbers.remove(chosen)

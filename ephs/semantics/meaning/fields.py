@@ -1,8 +1,8 @@
 """Fields of numbers: rational numbers, and floats that know their error.
 
 A field decides one question: is this number zero? Rational numbers decide it. A float that is larger than the bound of
-its error is not; within the bound it counts as zero and keeps its bound. So what is not zero in floats is not zero in
-ℚ, either. No threshold depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
+its error is not zero in ℚ either, after the same operations; within the bound it counts as zero and keeps its bound.
+No threshold depends on units: whoever scales an equation or a variable scales numbers and bounds alike.
 """
 
 from abc import ABC, abstractmethod

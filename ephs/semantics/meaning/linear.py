@@ -35,7 +35,7 @@ class LinearRelation:
     @staticmethod
     def of(field: Field[Any], variables: Iterable[Variable], equations: Iterable[Row[Any]] = ()) -> "LinearRelation":
         """The relation of some equations; without any it is everything."""
-        return LinearRelation(field, frozenset(variables), tuple(row for row in equations if row))
+        return LinearRelation(field, frozenset(variables), tuple(row for row in equations if field.support(row)))
 
     def join(self, *others: "LinearRelation") -> "LinearRelation":
         """All at once; variables of one name are one."""

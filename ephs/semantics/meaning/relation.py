@@ -239,7 +239,7 @@ class Instant:
         """Why no motion exists, or why it is not known to be determined; empty where it is."""
         if empty := self.empty:
             return f"no motion exists: {'; '.join(empty.because)}"
-        known = self.determined
+        known = determined(self.relation.fibre, self.point)
         return "" if known else f"the motion is not known to be determined: {'; '.join(known.because)}"
 
     @property

@@ -4,7 +4,7 @@
 *descriptor*: the square form: efforts of storages, balances of flows, conditions.
 *reduced*: what is left when interface variables are eliminated.
 
-Where no motion exists from the start, or more than one may, the equations end with the reason.
+A warning follows the equations where the initial state admits no motion, or where the motion is not determined.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -44,7 +44,7 @@ class Equations:
     names
         Symbol -> how LaTeX writes it.
     doubt
-        Why they have no solution at the start, or several; else empty.
+        Why no motion exists from the initial state, or why it is not known to be determined; empty where it is.
     """
 
     form: Form
@@ -101,7 +101,8 @@ class Equations:
 
     def _repr_latex_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         rows = "".join(rf"{self._tex(row.left)} &= {self._tex(row.right)} \\" for row in self.rows)
-        return rf"$\displaystyle \begin{{aligned}}{rows}\end{{aligned}}$"
+        warning = rf"& \text{{at the start {self.doubt}}}" if self.doubt else ""
+        return rf"$\displaystyle \begin{{aligned}}{rows}{warning}\end{{aligned}}$"
 
 
 def equations_of(system: System, form: Form) -> Equations:

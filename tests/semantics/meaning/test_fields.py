@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ephs.operad import ROOT, Path
-from ephs.semantics.meaning.fields import Rational, Rounded
+from ephs.semantics.meaning.fields import ROUNDED, Rational, Rounded
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.relation import Instant
 from ephs.semantics.meaning.variables import Variable
@@ -31,7 +31,12 @@ def rounded(relation: LinearRelation) -> LinearRelation:
     return LinearRelation.of(field, relation.variables, rows)
 
 
-@settings(suppress_health_check=list(HealthCheck), max_examples=25)
+# Systems of three levels are large to draw, and are meant here.
+@settings(
+    max_examples=settings().max_examples // 2,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    deadline=None,
+)
 @given(systems(), st.integers(0, 2**16))
 def test_floats_find_the_relation_that_rational_numbers_find(system, seed):
     probe = random_probe(system, seed)
@@ -43,12 +48,13 @@ def test_floats_find_the_relation_that_rational_numbers_find(system, seed):
 
 
 def test_a_number_within_its_bound_keeps_it():
-    """x + y + δz = 0 and x + y = 0, where δ is rounding: z is free, and z = 0 in ℚ."""
+    """(0.1 + 0.2) x + y + z less 0.3 x + y + z is rounding: the terms stay, with bounds, and none is certain."""
     field = Rounded()
     row = field.rounded({X: 0.1 + 0.2, Y: 1.0, Z: 1.0})
     field.subtract(row, field.one, field.rounded({X: 0.3, Y: 1.0, Z: 1.0}))
     assert set(row) == {X, Y, Z} and field.support(row) == []
-    assert row[X][1] > 8 * abs(0.1 + 0.2 - 0.3)
+    assert row[X][1] >= 2.0 * ROUNDED * 0.3 > abs(0.1 + 0.2 - 0.3)
+    assert LinearRelation.of(field, [X, Y, Z], [row]).equations == ()
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])

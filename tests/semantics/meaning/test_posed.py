@@ -62,9 +62,7 @@ def test_a_state_without_motion_is_empty_and_says_by_which_equations(case):
 @pytest.mark.parametrize("case", OPEN)
 def test_no_method_runs_from_a_state_without_motion(case, method):
     system, state, junction = OPEN[case]
-    with pytest.raises(
-        ephs.SimulationError, match=f"no motion exists from there: .*flow balance of junction {junction} "
-    ):
+    with pytest.raises(ephs.SimulationError, match=f"no motion exists: .*flow balance of junction {junction} "):
         ephs.simulate(system, 0.05, initial={state: 1.0}, step=0.01, method=method)
 
 
@@ -79,7 +77,7 @@ def test_check_names_the_junction(case):
         equations = system.with_initial({state: 1.0}).equations(form)
         words = f"at the start no motion exists: .*junction {junction} "
         assert re.search(words, str(equations)) and re.search(words, equations.latex().replace("\\", ""))
-        assert not system.equations(form).doubt
+        assert "no motion exists" in equations._repr_latex_() and not system.equations(form).doubt
 
 
 def quadratic(p, s):

@@ -70,6 +70,7 @@ def test_each_program_is_there_for_each_target(folder, name, target):
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_what_is_compiled_again_is_the_same(folder, name):
+    """For one target: all are emitted by the same compiler from the same text."""
     target = next(iter(FITTING))
     assert shipped(PROGRAMS[name].text(), [target], folder) == objects.emitted(PROGRAMS[name].text(), target)
 
