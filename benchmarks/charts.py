@@ -17,7 +17,7 @@ from benchmarks.report import Report, table_of
 from ephs.show.charts import draw_work_precision, tight_reference
 from ephs.show.charts.measure import Point, work_precision
 from ephs.show.charts.reference import shipped_reference
-from ephs.show.charts.runs import Ending
+from ephs.show.charts.runs import RunEnding
 
 __all__ = ["SCENES", "report"]
 
@@ -54,7 +54,7 @@ def rows_of(name: str, points: Sequence[Point]) -> list[dict[str, Any]]:
     """A row a method: the quickest run to the target all finer ones of which meet it too, its time and its defect."""
     rows: list[dict[str, Any]] = []
     for method in dict.fromkeys(point.method for point in points):
-        own = [point for point in points if point.method == method and point.outcome is Ending.DONE]
+        own = [point for point in points if point.method == method and point.outcome is RunEnding.DONE]
         good = [
             point
             for point in own

@@ -16,7 +16,7 @@ from benchmarks.report import Report
 from ephs.mechanics.methods.registry import AUTO, METHODS, Method
 from ephs.mechanics.scene.errors import SceneWarning
 from ephs.show.charts.outcomes import right
-from ephs.show.charts.runs import Ending, Run, Setting, attempt
+from ephs.show.charts.runs import ChartRun, RunEnding, RunSetting, attempt
 
 __all__ = ["FILE", "Cell", "Kind", "cells", "judged", "known", "methods", "report", "settings", "table"]
 
@@ -68,18 +68,22 @@ def methods() -> dict[str, Method]:
     return {AUTO.name: AUTO, **METHODS}
 
 
-def settings(case: Case, method: Method) -> Iterator[Setting]:
+def settings(case: Case, method: Method) -> Iterator[RunSetting]:
     """The settings of a case that a method takes."""
     for kind, values, takes in (("step", case.steps, method.fixed), ("tolerance", case.tolerances, method.adaptive)):
-        yield from (Setting(kind, value) for value in values if takes)
+        yield from (RunSetting(kind, value) for value in values if takes)
 
 
-def judged(case: Case, setting: Setting, run: Run) -> tuple[Kind, float | None, str]:
+def judged(case: Case, setting: RunSetting, run: ChartRun) -> tuple[Kind, float | None, str]:
     """Kind, error and message of a run."""
     sol = run.solution
     if sol is None:
-        silent = run.ending is Ending.LEAKED or not run.message
-        return (Kind.SLOW if run.ending is Ending.SLOW else Kind.SILENT if silent else Kind.REFUSED), None, run.message
+        silent = run.ending is RunEnding.LEAKED or not run.message
+        return (
+            (Kind.SLOW if run.ending is RunEnding.SLOW else Kind.SILENT if silent else Kind.REFUSED),
+            None,
+            run.message,
+        )
     with np.errstate(all="ignore"):
         error = float(np.nan_to_num(case.error(sol), nan=np.inf))
     allowed = right(setting, 1.0, int(sol.stats["steps"])) if case.exact is None else case.exact

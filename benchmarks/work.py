@@ -19,7 +19,7 @@ from benchmarks import families
 from benchmarks.report import Report, table_of
 from ephs.show.charts.measure import Point, work_precision
 from ephs.show.charts.reference import shipped_reference
-from ephs.show.charts.runs import Ending
+from ephs.show.charts.runs import RunEnding
 
 __all__ = ["CELLS", "OWN", "TARGETS", "best", "cell", "collect", "report"]
 
@@ -90,7 +90,7 @@ def best(runs: Iterable[Run], target: float) -> Run | None:
             for other in everything
             if (other.scene, other.method, other.kind) == (run.scene, run.method, run.kind) and other.value < run.value
         ]
-        return any(not other.error <= LUCK * target for other in finer if other.message != Ending.SLOW)
+        return any(not other.error <= LUCK * target for other in finer if other.message != RunEnding.SLOW)
 
     able = [run for run in everything if run.error <= target and not lucky(run)]
     return min(able, key=lambda run: run.seconds, default=None)
@@ -103,8 +103,8 @@ def measure(name: str, method: str, rivals: list[Run], targets: Sequence[float] 
     found: list[Run] = []
 
     def enough(point: Point) -> bool:
-        message = str(point.outcome) if point.outcome is Ending.SLOW else point.message
-        error = point.error if point.outcome is Ending.DONE else np.nan
+        message = str(point.outcome) if point.outcome is RunEnding.SLOW else point.message
+        error = point.error if point.outcome is RunEnding.DONE else np.nan
         kind, value = point.setting.kind, point.setting.value
         found.append(Run(name, method, kind, value, float(error), point.seconds, point.steps, message))
         open_targets = [target for target in targets if not error <= target]

@@ -15,7 +15,7 @@ import pytest
 import ephs
 from ephs import Outcome
 from ephs.cli import commands as cli
-from ephs.cli.input import Loading, Stepping
+from ephs.cli.input import LoadOptions, Stepping
 from ephs.cli.linear import linearize
 from ephs.cli.run import run
 from ephs.cli.sweep import sweep
@@ -345,7 +345,7 @@ def test_help_needs_neither_numpy_nor_the_rooms_below(command):
     assert done.stderr == "0\n"
 
 
-@pytest.mark.parametrize("command", [run, cli.check, cli.draw, cli.convert, sweep, linearize, Loading, Stepping])
+@pytest.mark.parametrize("command", [run, cli.check, cli.draw, cli.convert, sweep, linearize, LoadOptions, Stepping])
 def test_every_option_is_explained(command):
     documented = re.findall(r"^(\w+)$", inspect.getdoc(command), flags=re.MULTILINE)
     groups = ("loading", "stepping")  # explained by themselves

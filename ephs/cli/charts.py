@@ -119,9 +119,9 @@ def stability(
     chosen = _named({name: _family(name, until) for name in families or _all()})
     with addressed(str(output), output):
         output.mkdir(parents=True, exist_ok=True)
-        from ephs.show.charts.keeping import Kept
+        from ephs.show.charts.keeping import KeptCells
 
-        kept = Kept(output / "stability.jsonl", resume=resume)
+        kept = KeptCells(output / "stability.jsonl", resume=resume)
     from ephs.show.charts import SILENT, draw_stability, write_cells
     from ephs.show.charts import stability as measured
 

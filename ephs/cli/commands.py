@@ -20,7 +20,7 @@ from ephs.cli.input import (
     AS_GIVEN,
     TEXTS,
     BadInput,
-    Loading,
+    LoadOptions,
     addressed,
     complain,
     heard,
@@ -81,7 +81,7 @@ def _welcome() -> int:
 
 
 @app.command
-def check(scene: str, /, *, initial: list[str] | None = None, loading: Loading = AS_GIVEN) -> int:
+def check(scene: str, /, *, initial: list[str] | None = None, loading: LoadOptions = AS_GIVEN) -> int:
     """Check the laws of a model in its initial state; exit code 1 if one fails.
 
     Parameters
@@ -115,7 +115,7 @@ def equations(
     *,
     form: Literal["relation", "descriptor", "reduced"] = "reduced",
     latex: bool = False,
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Print the equations, with the names of junctions.
 
@@ -140,7 +140,7 @@ def equations(
 
 
 @app.command
-def reduce(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
+def reduce(scene: str, /, *, loading: LoadOptions = AS_GIVEN) -> int:
     """List the eliminated variables, the justification, and the unknowns that remain.
 
     Parameters
@@ -165,7 +165,7 @@ def draw(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     flat: bool = False,
     opened: bool = False,
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Draw the interconnection pattern.
 
@@ -210,7 +210,7 @@ def convert(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Write a model in another format as a scene file.
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from cyclopts import App
 
-from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
+from ephs.cli.input import AS_GIVEN, BadInput, LoadOptions, addressed, load_model, naming, say
 
 _TEXTS = {"system": "{found}: expected a scene; ephs.equilibrium takes systems in Python"}
 
@@ -14,7 +14,7 @@ resting = App(name="equilibrium", help="Find the shape of a scene at rest under 
 
 
 @resting.default
-def equilibrium(scene: str, /, *, out: Path | None = None, loading: Loading = AS_GIVEN) -> int:
+def equilibrium(scene: str, /, *, out: Path | None = None, loading: LoadOptions = AS_GIVEN) -> int:
     """Find the static equilibrium by continuation of the loads; prints positions of bodies and buckling loads.
 
     Parameters

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
+from ephs.cli.input import AS_GIVEN, BadInput, LoadOptions, addressed, load_model, naming, say
 
 exports = App(name="export", help="Write a mechanism as a program without Python: C, object code, WebAssembly.")
 units = App(name="fmu", help="Write a mechanism as a unit of FMI 3.0 for co-simulation.")
@@ -26,7 +26,7 @@ def export(
     step: float | None = None,
     until: float = 10.0,
     target: str | None = None,
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Write a mechanism as a program without Python; prints its inputs and outputs.
 
@@ -77,7 +77,7 @@ def fmu(
     step: float | None = None,
     until: float = 10.0,
     platforms: str = "",
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Write a mechanism as a unit of FMI 3.0 for co-simulation; prints its variables.
 
@@ -122,7 +122,7 @@ def _listed(names: str) -> list[str]:
 
 
 def _written(
-    write: Callable[[Any, dict[str, Any]], Any], scene: str, out: Path, loading: Loading,
+    write: Callable[[Any, dict[str, Any]], Any], scene: str, out: Path, loading: LoadOptions,
     options: tuple[str, str, float | None, float | None],
 ) -> int:  # fmt: skip
     """Write a model, and print its variables."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ephs.cli.input import AS_GIVEN, Loading, addressed, load_model, say
+from ephs.cli.input import AS_GIVEN, LoadOptions, addressed, load_model, say
 
 if TYPE_CHECKING:
     from ephs import Scene, System
@@ -15,7 +15,7 @@ DIGITS = 12
 """Decimals of positions in m."""
 
 
-def info(scene: str, /, *, loading: Loading = AS_GIVEN) -> int:
+def info(scene: str, /, *, loading: LoadOptions = AS_GIVEN) -> int:
     """List bodies, joints, degrees of freedom, inputs and outputs of a model.
 
     Parameters

@@ -50,7 +50,7 @@ class BadInput(Exception):
 @Parameter(name="*")
 @final
 @dataclass(frozen=True, slots=True)
-class Loading:
+class LoadOptions:
     """Options for reading files as scenes.
 
     Parameters
@@ -72,7 +72,7 @@ class Loading:
     contact: bool = False
 
 
-AS_GIVEN = Loading()
+AS_GIVEN = LoadOptions()
 
 
 def positive(_type: object, value: float | None) -> None:
@@ -141,7 +141,7 @@ class Stepping:
 AS_CHOSEN = Stepping()
 
 
-def load_drawable(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System | Pattern":
+def load_drawable(scene: str, loading: LoadOptions = AS_GIVEN) -> "Scene | System | Pattern":
     """As `load_model`; NAME may be that of a Pattern, too."""
     from ephs import Pattern
 
@@ -151,7 +151,7 @@ def load_drawable(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System | 
     return _from_python(Path(scene), "", Pattern) if scene.endswith(".py") else load_model(scene, loading)
 
 
-def load_model(scene: str, loading: Loading = AS_GIVEN) -> "Scene | System":
+def load_model(scene: str, loading: LoadOptions = AS_GIVEN) -> "Scene | System":
     """A scene file, a model in another format, or FILE.py:NAME, as a model.
 
     Raises

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from ephs.cli.input import AS_GIVEN, BadInput, Loading, addressed, load_model, naming, say
+from ephs.cli.input import AS_GIVEN, BadInput, LoadOptions, addressed, load_model, naming, say
 
 if TYPE_CHECKING:
     from ephs import Scene, System
@@ -29,7 +29,7 @@ def linearize(
     output_of: Annotated[list[str] | None, Parameter(name=["--output-of"])] = None,
     form: Literal["reduced", "paper"] = "reduced",
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Linearise a model about a state; prints eigenvalues with frequency, damping ratio and mode shape.
 

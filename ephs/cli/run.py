@@ -14,7 +14,7 @@ from ephs.cli.input import (
     AS_GIVEN,
     TEXTS,
     BadInput,
-    Loading,
+    LoadOptions,
     Positive,
     Stepping,
     addressed,
@@ -70,7 +70,7 @@ def run(
     resume: bool = False,
     replace: bool = False,
     audit: Literal["fail", "warn", "off"] = "fail",
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Simulate a scene and write its result folder.
 

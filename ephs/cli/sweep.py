@@ -12,7 +12,7 @@ from ephs.cli.input import (
     AS_CHOSEN,
     AS_GIVEN,
     BadInput,
-    Loading,
+    LoadOptions,
     Stepping,
     addressed,
     complain,
@@ -50,7 +50,7 @@ def sweep(
     stepping: Stepping = AS_CHOSEN,
     workers: int | None = None,
     dask: str | None = None,
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Simulate a model over a grid of parameter values; writes sweep.nc into a folder.
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ephs.cli.input import AS_GIVEN, TEXTS, BadInput, Loading, addressed, load_model, say
+from ephs.cli.input import AS_GIVEN, TEXTS, BadInput, LoadOptions, addressed, load_model, say
 
 
 def view(
@@ -13,7 +13,7 @@ def view(
     *,
     port: int = 0,
     browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
-    loading: Loading = AS_GIVEN,
+    loading: LoadOptions = AS_GIVEN,
 ) -> int:
     """Show a mechanism in the browser with a slider for each joint; other models can be dropped on the page.
 

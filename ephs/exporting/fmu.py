@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ephs.exporting.errors import ExportError
-from ephs.exporting.image import Variable, image_of
+from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import tool
 from ephs.exporting.module import Exported, exported
 from ephs.mechanics.scene.model import Scene
@@ -100,7 +100,7 @@ def _within(name: str, beginning: str) -> bool:
     return name == beginning or name.startswith(f"{beginning}.")
 
 
-def _description(made: Exported, shown: Sequence[Variable], token: str, experiment: tuple[float, float]) -> bytes:
+def _description(made: Exported, shown: Sequence[ImageNumber], token: str, experiment: tuple[float, float]) -> bytes:
     root = ElementTree.Element(
         "fmiModelDescription", fmiVersion="3.0", modelName=made.name, instantiationToken=token,
         generationTool=f"ephs {version('ephs')}", variableNamingConvention="flat",

@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.exporting.errors import ExportError
 from ephs.exporting.outputs import outputs_program
-from ephs.exporting.parameters import Dependence, dependence
+from ephs.exporting.parameters import ParameterPolynomial, dependence
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
 from ephs.mechanics.scene.attached import Actuator
@@ -45,7 +45,7 @@ class Share:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Variable:
+class ImageNumber:
     """An input or output number.
 
     Attributes
@@ -102,11 +102,11 @@ class Image:
     supply: Array
     out: Array
     acceleration: tuple[Array, int, int]
-    inputs: tuple[Variable, ...]
-    outputs: tuple[Variable, ...]
-    parameters: tuple[Variable, ...]
+    inputs: tuple[ImageNumber, ...]
+    outputs: tuple[ImageNumber, ...]
+    parameters: tuple[ImageNumber, ...]
     numbers: tuple[Array, ...]
-    dependences: tuple[Dependence, ...]
+    dependences: tuple[ParameterPolynomial, ...]
 
 
 def image_of(
@@ -150,7 +150,7 @@ def image_of(
         return found
     start = {path: read(model, path) for path in parameters}
     dependences = dependence(start, lambda values: made(values).numbers)
-    variables = tuple(Variable(path, "", k, value) for k, (path, value) in enumerate(start.items()))
+    variables = tuple(ImageNumber(path, "", k, value) for k, (path, value) in enumerate(start.items()))
     return replace(found, parameters=variables, dependences=tuple(dependences))
 
 
@@ -182,7 +182,7 @@ def _started(
     return _image(problem, equations, leg, _inputs(equations, model, inputs))
 
 
-def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[Variable]) -> Image:
+def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[ImageNumber]) -> Image:
     memory, control = leg.memory, leg.steering
     reduced = eq.reduced
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
@@ -223,8 +223,8 @@ def _actuators(scene: Scene) -> dict[str, Actuator]:
     return {name: each for name, each in found.items() if isinstance(each, Actuator)}
 
 
-def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[Variable]:
-    t, out = eq.reduced.tables, list[Variable]()
+def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[ImageNumber]:
+    t, out = eq.reduced.tables, list[ImageNumber]()
     actuators = _actuators(scene) if isinstance(scene, Scene) else {}
 
     def driven(path: str) -> tuple[int, int]:
@@ -239,11 +239,11 @@ def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[
         for k in range(size):
             whole = name if size == 1 else f"{name}.{k}"
             share = Share(supplied=False, place=first + k, ratio=1.0)
-            out.append(Variable(whole, "", first + k, float(eq.drive[first + k]), (share,)))
+            out.append(ImageNumber(whole, "", first + k, float(eq.drive[first + k]), (share,)))
     return out
 
 
-def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tuple[int, int]]) -> Variable:
+def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tuple[int, int]]) -> ImageNumber:
     """The control of an actuator, with its forces on joints, or on the length of its tendon."""
     shares: list[Share] = []
     if of.tendon is None:
@@ -256,10 +256,10 @@ def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tup
                 rows = enumerate(one.row.tolist(), len(net.inputs))
                 shares += [Share(True, place, ratio * row) for place, row in rows if row]
     limits = (-math.inf, math.inf) if of.limits is None else (float(of.limits[0]), float(of.limits[1]))
-    return Variable(name, "", 0, 0.0, tuple(shares), limits)
+    return ImageNumber(name, "", 0, 0.0, tuple(shares), limits)
 
 
-def _outputs(eq: Equations, values: Array) -> list[Variable]:
+def _outputs(eq: Equations, values: Array) -> list[ImageNumber]:
     t, names = eq.reduced.tables, [""] * values.size
 
     def put(first: int, size: int, name: str) -> None:
@@ -281,6 +281,6 @@ def _outputs(eq: Equations, values: Array) -> list[Variable]:
             names[first + 7 * i + 4 + k] = f"{body}.position.{part}"
     names[-1] = "energy"
     return [
-        Variable(name, "J" if name == "energy" else "m" if ".position." in name else "", k, float(values[k]))
+        ImageNumber(name, "J" if name == "energy" else "m" if ".position." in name else "", k, float(values[k]))
         for k, name in enumerate(names)
     ]

@@ -12,7 +12,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.exporting.errors import ExportError
-from ephs.exporting.image import Image, Variable
+from ephs.exporting.image import Image, ImageNumber
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.programs import located
@@ -42,16 +42,16 @@ class Exported:
     name: str
     text: str
     bytes: int
-    inputs: tuple[Variable, ...]
-    outputs: tuple[Variable, ...]
-    parameters: tuple[Variable, ...]
+    inputs: tuple[ImageNumber, ...]
+    outputs: tuple[ImageNumber, ...]
+    parameters: tuple[ImageNumber, ...]
     accelerations: int
     functions: tuple[int, ...]
 
     def header(self) -> str:
         """Return declarations in C."""
 
-        def table(kind: str, variables: tuple[Variable, ...]) -> str:
+        def table(kind: str, variables: tuple[ImageNumber, ...]) -> str:
             rows = "".join(
                 f"\n * {k:4} {each.name}{each.unit and f' [{each.unit}]'}" for k, each in enumerate(variables)
             )
@@ -76,12 +76,12 @@ def exported(image: Image, name: str) -> Exported:
     """
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         raise ExportError("name", found=name)
-    writer = _Writer(name)
+    writer = _ModuleText(name)
     return writer.write(image)
 
 
 @final
-class _Writer:
+class _ModuleText:
     """The text under construction."""
 
     def __init__(self, name: str) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from ephs.exporting.errors import ExportError
-from ephs.exporting.image import Variable, image_of
+from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import webassembly
 from ephs.exporting.module import exported
 from ephs.mechanics.runs.simulate import simulate
@@ -115,11 +115,11 @@ def _candidates(scene: Scene) -> list[str]:
     return kept
 
 
-def _span(variable: Variable) -> float:
+def _span(variable: ImageNumber) -> float:
     return 0.8 * abs(variable.start) if variable.start else 1.0
 
 
-def _slider(variable: Variable, span: float) -> dict[str, Any]:
+def _slider(variable: ImageNumber, span: float) -> dict[str, Any]:
     start = variable.start
     high = 3.0 * start if start > 0.0 and variable.unit == "" and span < start else start + span
     return {"name": variable.name, "unit": variable.unit, "low": start - span, "high": high, "start": start}

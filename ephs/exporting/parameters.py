@@ -19,7 +19,7 @@ Key = tuple[int, ...]
 
 @final
 @dataclass(frozen=True, slots=True)
-class Dependence:
+class ParameterPolynomial:
     """A number of an array as a polynomial in the parameters' changes d, or as its reciprocal.
 
     Attributes
@@ -43,7 +43,7 @@ class Dependence:
 
 def dependence(
     start: Mapping[str, float], arrays: Callable[[Mapping[str, float]], Sequence[Array]]
-) -> list[Dependence]:
+) -> list[ParameterPolynomial]:
     """Return the numbers that depend on parameters.
 
     Parameters
@@ -76,7 +76,7 @@ def dependence(
     seen, tried = np.array([at(shares) for shares in fitted]), np.array([at(shares) for shares in held])
     scale = np.repeat([np.abs(each).max(initial=0.0) for each in np.split(base, np.cumsum(sizes)[:-1])], sizes)
     moving = np.flatnonzero(np.abs(np.vstack([seen, tried]) - base).max(axis=0) > EXACT * scale)
-    out: list[Dependence] = []
+    out: list[ParameterPolynomial] = []
     of_array = np.repeat(np.arange(len(sizes)), sizes)
     inside = np.concatenate([np.zeros(0, dtype=int), *(np.arange(size) for size in sizes)])
     for place in moving.tolist():
@@ -89,7 +89,7 @@ def dependence(
             changed = np.abs(seen[: len(names), place] - base[place])
             raise ExportError("polynomial", found=names[int(np.argmax(changed))])
         own = {key: float(value / np.prod(moves[list(key)])) for key, value in terms.items() if value}
-        out.append(Dependence(int(of_array[place]), int(inside[place]), constant, own, reciprocal))
+        out.append(ParameterPolynomial(int(of_array[place]), int(inside[place]), constant, own, reciprocal))
     return out
 
 

@@ -45,7 +45,7 @@ def derivative(symbol: Symbol) -> Symbol:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Reader:
+class ExpressionReader:
     """Expressions of a flat component.
 
     Parameters

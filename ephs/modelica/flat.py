@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, final
 
 from ephs.modelica.errors import ModelicaError
-from ephs.modelica.expressions import Expr, Reader, Symbol, said, sp
+from ephs.modelica.expressions import Expr, ExpressionReader, Symbol, said, sp
 from ephs.operad import Quantity, quantity
 from ephs.solve.errors import nearest_of
 
@@ -41,7 +41,7 @@ DOMAINS = (
 
 @final
 @dataclass(frozen=True, slots=True)
-class Port:
+class Connector:
     """A connector: symbols of its potential and of its flow, which is positive into the component."""
 
     name: str
@@ -57,7 +57,7 @@ class Port:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Equation:
+class ZeroResidual:
     """0 = residual, and the equation's text."""
 
     residual: Expr
@@ -73,8 +73,8 @@ class Flat:
     """
 
     name: str
-    ports: tuple[Port, ...]
-    equations: tuple[Equation, ...]
+    ports: tuple[Connector, ...]
+    equations: tuple[ZeroResidual, ...]
     units: Mapping[Symbol, str]
     starts: Mapping[Symbol, float]
 
@@ -135,7 +135,7 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
     real = {key: sp.Symbol(key, real=True) for key, symbol in free.items() if str(symbol.type.name) == "Real"}
     real |= {key: sp.Symbol(key, real=True) for key in sorted(readings)}
     kinds = {key: str(symbol.type.name) for key, symbol in free.items() if key not in real}
-    reader = Reader(name, real, parameters, lambda parts, scope: _constant(tree, parts, scope), kinds)
+    reader = ExpressionReader(name, real, parameters, lambda parts, scope: _constant(tree, parts, scope), kinds)
     units = {real[key]: str(free[key].unit.value or "") if key in free else "" for key in real}
     ports = _ports(name, real, free, units)
     try:
@@ -207,9 +207,9 @@ def _constant(tree: Any, parts: tuple[str, ...], scope: Any) -> tuple[Any, Any]:
 
 def _ports(
     where: str, real: Mapping[str, Symbol], free: Mapping[str, Any], units: Mapping[Symbol, str]
-) -> tuple[Port, ...]:
+) -> tuple[Connector, ...]:
     """Connectors of the component itself: a flow variable and a potential under one name."""
-    out: list[Port] = []
+    out: list[Connector] = []
     for key, symbol in free.items():
         if "flow" not in symbol.prefixes or key.count(".") != 1:
             continue
@@ -220,15 +220,15 @@ def _ports(
         if domain is None:
             expected = "; ".join(f"{each.potential}, {each.flow}" for each in DOMAINS)
             raise ModelicaError("connector", where=where, port=name, found=", ".join(found), expected=expected)
-        out.append(Port(name, domain, real[beside[0]], real[key]))
+        out.append(Connector(name, domain, real[beside[0]], real[key]))
     if not out:
         raise ModelicaError("ports", where=where)
     return tuple(out)
 
 
-def _equations(reader: Reader, nodes: Any, own: set[str]) -> list[Equation]:
+def _equations(reader: ExpressionReader, nodes: Any, own: set[str]) -> list[ZeroResidual]:
     """Equations of the active branches, without those for unconnected connectors of the component."""
-    out: list[Equation] = []
+    out: list[ZeroResidual] = []
     for node in nodes:
         kind = type(node).__name__
         if kind == "Function" or (kind == "Expression" and str(node.operator) in ("assert", "terminate")):
@@ -251,8 +251,8 @@ def _equations(reader: Reader, nodes: Any, own: set[str]) -> list[Equation]:
             raise ModelicaError("expression", where=reader.where, found=f"{kind} {said(node)}")
         elif type(node.left).__name__ in ("Symbol", "InstanceSymbol"):  # of an open connector
             if node.left.name not in own:
-                out.append(Equation(reader.variables[node.left.name], f"{node.left.name} = 0"))
+                out.append(ZeroResidual(reader.variables[node.left.name], f"{node.left.name} = 0"))
         else:
             left, right = reader.value(node.left), reader.value(node.right)
-            out.append(Equation(sp.expand(left - right), said(node)))
+            out.append(ZeroResidual(sp.expand(left - right), said(node)))
     return out

@@ -10,8 +10,8 @@ import numpy as np
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Matrix, Symbol, derivative, sp
 from ephs.modelica.flat import Flat
-from ephs.modelica.relation import Relation, needed, relation_of
-from ephs.modelica.structure import Structure, power_of, stored_energy, structure_of
+from ephs.modelica.relation import PortRelation, needed, relation_of
+from ephs.modelica.structure import PortStructure, power_of, stored_energy, structure_of
 from ephs.modelica.thermal import heated, require_heat, warm_of
 from ephs.operad import Directory, Path, Pattern, PortType, Quantity, junction, quantity
 from ephs.semantics import library
@@ -51,7 +51,7 @@ class ModelicaComponent:
 
 
 @dataclass(slots=True)
-class _Parts:
+class _AssembledBoxes:
     """Boxes of the system that is put together: ports by junction, and fillings."""
 
     ports: dict[str, Quantity]
@@ -84,7 +84,7 @@ def component_of(flat: Flat) -> ModelicaComponent:
         except StructureError as error:
             raise ModelicaError("structure", where=flat.name, found=error) from error
         box = {"storage": "stored", "reversible": "dirac"}.get(primitive.kind, "loss")
-        parts = _Parts({port.name: quantity.entropy for port in flat.ports}, {}, {})
+        parts = _AssembledBoxes({port.name: quantity.entropy for port in flat.ports}, {}, {})
         parts.boxes[box] = ({inner: outer for outer, inner in names.items()}, primitive)
         start = {f"{box}.{key}": x for key, x in initial.items()}
         return ModelicaComponent(flat.name, parts.system().with_initial(start), start)
@@ -98,13 +98,13 @@ def component_of(flat: Flat) -> ModelicaComponent:
         raise ModelicaError("structure", where=flat.name, found=error) from error
 
 
-def _built(flat: Flat, relation: Relation, hessian: Matrix, found: Structure) -> ModelicaComponent:
+def _built(flat: Flat, relation: PortRelation, hessian: Matrix, found: PortStructure) -> ModelicaComponent:
     """The boxes of the structure."""
     heat = next((port.name for port in flat.ports if port.heat), "heat")
     states = {each.symbol.name.replace(".", "_"): each.quantity for each in relation.states}
     outer = {port.name: port.domain.quantity for port in relation.ports}
     stores = {name if name not in outer else f"{name}_": of for name, of in states.items()}
-    parts = _Parts(dict(outer), dict(stores), {})
+    parts = _AssembledBoxes(dict(outer), dict(stores), {})
     ports = {**outer, **stores}
     same = {name: name for name in ports}
     initial: dict[str, float] = {}
@@ -148,7 +148,7 @@ def _numbers(matrix: Matrix) -> np.ndarray:
     return np.array(matrix.tolist(), dtype=float).reshape(matrix.shape)
 
 
-def _dual(relation: Relation, hessian: Matrix) -> np.ndarray:
+def _dual(relation: PortRelation, hessian: Matrix) -> np.ndarray:
     """The energy's second derivative by the stored amounts: H⁻¹ among states that are efforts, else H."""
     out = sp.zeros(*hessian.shape)
     for effort in (True, False):

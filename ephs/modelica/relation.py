@@ -9,7 +9,7 @@ from typing import Any, final
 
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, derivative, sp
-from ephs.modelica.flat import Equation, Flat, Port
+from ephs.modelica.flat import Connector, Flat, ZeroResidual
 from ephs.operad import Quantity, quantity
 
 LENGTHS = ("rad", "m")
@@ -29,7 +29,7 @@ STATES: dict[str, tuple[Quantity, bool]] = {
 
 @final
 @dataclass(frozen=True, slots=True)
-class State:
+class DifferentiatedVariable:
     """A variable that is differentiated, or a position that forces depend on."""
 
     symbol: Symbol
@@ -40,7 +40,7 @@ class State:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Relation:
+class PortRelation:
     """Possible joint values of the variables of n ports and k states: columns of matrices with n + k columns.
 
     Parameters
@@ -57,18 +57,18 @@ class Relation:
         The relation as equations, for errors.
     """
 
-    ports: tuple[Port, ...]
-    states: tuple[State, ...]
+    ports: tuple[Connector, ...]
+    states: tuple[DifferentiatedVariable, ...]
     efforts: Matrix
     flows: Matrix
     values: Matrix
     rates: Matrix
     every: dict[Symbol, Matrix]
-    powers: tuple[Equation, ...]
+    powers: tuple[ZeroResidual, ...]
     laws: str
 
 
-def needed(flat: Flat) -> tuple[Equation, ...]:
+def needed(flat: Flat) -> tuple[ZeroResidual, ...]:
     """The equations without definitions of otherwise unused variables."""
     kept = {symbol for port in flat.ports for symbol in (port.potential, port.flow, derivative(port.potential))}
     equations = list(flat.equations)
@@ -93,7 +93,7 @@ def _defines(residual: Expr, symbol: Symbol) -> bool:
     return slope.is_number and slope != 0
 
 
-def relation_of(flat: Flat, equations: tuple[Equation, ...]) -> Relation:
+def relation_of(flat: Flat, equations: tuple[ZeroResidual, ...]) -> PortRelation:
     """The relation between the ports that carry no heat.
 
     Raises
@@ -129,14 +129,16 @@ def relation_of(flat: Flat, equations: tuple[Equation, ...]) -> Relation:
     def rows(chosen: list[Symbol]) -> Matrix:
         return sp.Matrix.vstack(sp.zeros(0, count), *(every[symbol] for symbol in chosen))
 
-    states = tuple(State(s, *STATES[flat.units[s]], rest.get(s, sp.Integer(0))) for s in symbols)
+    states = tuple(DifferentiatedVariable(s, *STATES[flat.units[s]], rest.get(s, sp.Integer(0))) for s in symbols)
     laws = _laws(matrix, constant, columns, shown)
-    return Relation(ports, states, rows(efforts), rows(flows), rows(list(symbols)), rows(rates), every, powers, laws)
+    return PortRelation(
+        ports, states, rows(efforts), rows(flows), rows(list(symbols)), rows(rates), every, powers, laws
+    )
 
 
-def _differentiated(flat: Flat, equations: tuple[Equation, ...]) -> tuple[tuple[Equation, ...], set[Symbol]]:
+def _differentiated(flat: Flat, equations: tuple[ZeroResidual, ...]) -> tuple[tuple[ZeroResidual, ...], set[Symbol]]:
     """Equations between positions only, differentiated; and the positions in other equations."""
-    out: list[Equation] = []
+    out: list[ZeroResidual] = []
     moving: set[Symbol] = set()
     for equation in equations:
         symbols = equation.residual.free_symbols
@@ -145,14 +147,14 @@ def _differentiated(flat: Flat, equations: tuple[Equation, ...]) -> tuple[tuple[
             if any(slope.free_symbols for slope in slopes.values()):
                 raise ModelicaError("constraint", where=flat.name, equation=equation.text)
             rate = sum((slope * derivative(symbol) for symbol, slope in slopes.items()), sp.Integer(0))
-            out.append(Equation(rate, equation.text))
+            out.append(ZeroResidual(rate, equation.text))
         else:
             out.append(equation)
             moving |= {symbol for symbol in symbols if flat.units.get(symbol) in LENGTHS}
     return tuple(out), moving
 
 
-def _warmed(flat: Flat, equations: tuple[Equation, ...], hot: set[Symbol]) -> tuple[Equation, ...]:
+def _warmed(flat: Flat, equations: tuple[ZeroResidual, ...], hot: set[Symbol]) -> tuple[ZeroResidual, ...]:
     """Substitute known numbers and the temperatures of heat ports, such as in resistances."""
     shown = {port.potential for port in flat.ports} | {port.flow for port in flat.ports}
     left = list(equations)
@@ -169,7 +171,7 @@ def _warmed(flat: Flat, equations: tuple[Equation, ...], hot: set[Symbol]) -> tu
                 continue
             value = sp.cancel(-equation.residual.subs(symbol, 0) / slope)
             del left[place]
-            left = [Equation(sp.expand(each.residual.subs(symbol, value)), each.text) for each in left]
+            left = [ZeroResidual(sp.expand(each.residual.subs(symbol, value)), each.text) for each in left]
             break
         else:
             return tuple(left)
@@ -189,7 +191,7 @@ def _states(flat: Flat, seen: set[Symbol], moving: set[Symbol]) -> list[Symbol]:
     return out
 
 
-def _linear(flat: Flat, equations: list[Equation], columns: list[Symbol]) -> tuple[Matrix, Matrix]:
+def _linear(flat: Flat, equations: list[ZeroResidual], columns: list[Symbol]) -> tuple[Matrix, Matrix]:
     """The coefficients of equations, and their constants on the right."""
     rows: list[list[Any]] = []
     constants: list[Any] = []

@@ -14,13 +14,13 @@ from typing import final
 
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, sp
-from ephs.modelica.relation import Relation
+from ephs.modelica.relation import PortRelation
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class Structure:
+class PortStructure:
     """S (N, N) symmetric and non-negative, A (N, N) skew, C (r, N), of N ports and storages."""
 
     loss: Matrix
@@ -28,13 +28,13 @@ class Structure:
     constraint: Matrix
 
 
-def power_of(relation: Relation, hessian: Matrix) -> Matrix:
+def power_of(relation: PortRelation, hessian: Matrix) -> Matrix:
     """The quadratic form of the dissipated power e·f − xᵀH ẋ."""
     form = relation.efforts.T * relation.flows - relation.values.T * hessian * relation.rates
     return ((form + form.T) / 2).applyfunc(sp.cancel)
 
 
-def stored_energy(name: str, relation: Relation, warm: dict[Symbol, Expr]) -> Matrix:
+def stored_energy(name: str, relation: PortRelation, warm: dict[Symbol, Expr]) -> Matrix:
     """H (k, k) of the energy ½ xᵀHx for which the remaining power has one sign.
 
     Where states rest, or are zero, the power does not depend on H; what is zero there for every value of another
@@ -74,7 +74,7 @@ def stored_energy(name: str, relation: Relation, warm: dict[Symbol, Expr]) -> Ma
     return hessian
 
 
-def structure_of(name: str, relation: Relation, hessian: Matrix, warm: dict[Symbol, Expr]) -> Structure:
+def structure_of(name: str, relation: PortRelation, hessian: Matrix, warm: dict[Symbol, Expr]) -> PortStructure:
     """S, A and C over the ports, then the storages.
 
     Raises
@@ -99,7 +99,7 @@ def structure_of(name: str, relation: Relation, hessian: Matrix, warm: dict[Symb
     form = (inverse * (span.T * beside) * inverse.T).applyfunc(sp.cancel)
     constraint = _kernel(span.T).T if pivots else sp.eye(size)
     loss = ((form + form.T) / 2).applyfunc(sp.cancel)
-    return Structure(loss, ((form - form.T) / 2).applyfunc(sp.cancel), constraint)
+    return PortStructure(loss, ((form - form.T) / 2).applyfunc(sp.cancel), constraint)
 
 
 def _kernel(matrix: Matrix) -> Matrix:
@@ -108,7 +108,7 @@ def _kernel(matrix: Matrix) -> Matrix:
     return sp.Matrix.hstack(sp.zeros(matrix.cols, 0), *found)
 
 
-def _witness(relation: Relation, form: Matrix) -> dict[str, object]:
+def _witness(relation: PortRelation, form: Matrix) -> dict[str, object]:
     """A positive power, and a point (values of ports and states) at which it occurs."""
     import numpy as np
 

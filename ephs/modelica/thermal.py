@@ -7,8 +7,8 @@ import numpy as np
 
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, Matrix, Symbol, derivative, sp
-from ephs.modelica.flat import Equation, Flat, Port
-from ephs.modelica.relation import Relation
+from ephs.modelica.flat import Connector, Flat, ZeroResidual
+from ephs.modelica.relation import PortRelation
 from ephs.operad import quantity
 from ephs.semantics import library
 from ephs.semantics.constructors import irreversible
@@ -23,7 +23,7 @@ def warm_of(flat: Flat) -> dict[Symbol, Expr]:
     }
 
 
-def require_heat(flat: Flat, relation: Relation, form: Matrix) -> None:
+def require_heat(flat: Flat, relation: PortRelation, form: Matrix) -> None:
     """Refuse a component whose heat port does not receive the power dissipated at the other ports.
 
     Parameters
@@ -48,7 +48,7 @@ def require_heat(flat: Flat, relation: Relation, form: Matrix) -> None:
         raise ModelicaError("heat", where=flat.name, equation=texts or "there are none of powers")
 
 
-def heated(flat: Flat, equations: tuple[Equation, ...]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
+def heated(flat: Flat, equations: tuple[ZeroResidual, ...]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
     """A component with heat ports only: the primitive, its ports by those of the component, and states at the start.
 
     Raises
@@ -88,7 +88,7 @@ def _ideal(flat: Flat, residuals: list[Expr]) -> Primitive | None:
     return None
 
 
-def _reduced(flat: Flat, equations: tuple[Equation, ...]) -> list[Expr]:
+def _reduced(flat: Flat, equations: tuple[ZeroResidual, ...]) -> list[Expr]:
     """The equations with temperatures renamed to their ports'."""
     potentials = {port.potential for port in flat.ports}
     same: dict[Symbol, Symbol] = {}
@@ -103,7 +103,7 @@ def _reduced(flat: Flat, equations: tuple[Equation, ...]) -> list[Expr]:
     return [each for each in residuals if each != 0]
 
 
-def _solved(flat: Flat, residuals: list[Expr], equations: tuple[Equation, ...]) -> dict[Port, Expr]:
+def _solved(flat: Flat, residuals: list[Expr], equations: tuple[ZeroResidual, ...]) -> dict[Connector, Expr]:
     """Heat flows as functions of temperatures and their derivatives."""
     potentials = {port.potential for port in flat.ports}
     given = potentials | {derivative(symbol) for symbol in potentials}
@@ -117,7 +117,7 @@ def _solved(flat: Flat, residuals: list[Expr], equations: tuple[Equation, ...]) 
     return flows
 
 
-def _capacity(flat: Flat, flows: dict[Port, Expr]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
+def _capacity(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
     """C θ̇ = Q: E = C θ, s = C log(θ/θ₁) with the start temperature θ₁."""
     (port,) = flat.ports
     rate = derivative(port.potential)
@@ -132,7 +132,7 @@ def _capacity(flat: Flat, flows: dict[Port, Expr]) -> tuple[Primitive, dict[str,
     return library.thermal_capacity(c1=c * start, c2=c), {port.name: "s"}, {"s": 0.0}
 
 
-def _conductor(flat: Flat, flows: dict[Port, Expr]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
+def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict[str, str], dict[str, float]]:
     """Q₁ = −Q₂ = h(θ₁, θ₂) (θ₁ − θ₂) with h ≥ 0."""
     first, second = flat.ports
     if sp.expand(flows[first] + flows[second]) != 0:
@@ -158,10 +158,10 @@ def _conductor(flat: Flat, flows: dict[Port, Expr]) -> tuple[Primitive, dict[str
     return irreversible(ports, matrix, name="heat_transfer"), names, {}
 
 
-def _said(flows: dict[Port, Expr]) -> str:
+def _said(flows: dict[Connector, Expr]) -> str:
     return ", ".join(f"{port.flow} = {flow}" for port, flow in flows.items() if flow != port.flow)
 
 
-def _refused(flat: Flat, flows: dict[Port, Expr], equations: tuple[Equation, ...] = ()) -> ModelicaError:
+def _refused(flat: Flat, flows: dict[Connector, Expr], equations: tuple[ZeroResidual, ...] = ()) -> ModelicaError:
     said = _said(flows) or ", ".join(each.text for each in equations)
     return ModelicaError("thermal", where=flat.name, equation=said)

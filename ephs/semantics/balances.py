@@ -164,10 +164,12 @@ def _balance(probe: Probe, solved: Solved, terms: list[float], sizes: list[float
 
 def naturality(probe: Probe) -> Verdict:
     """Discretise, then compose = flatten, then discretise."""
-    behaviour = Natural(probe.reference, probe.h)
     nested = _solved(probe)
+    if nested.residual > UNSOLVED:
+        return VACUOUS
+    behaviour = Natural(probe.reference, probe.h)
     flat = solved(probe.system.flatten(), probe.state, behaviour, probe.inputs, probe.ports)
-    if max(flat.residual, nested.residual) > UNSOLVED:
+    if flat.residual > UNSOLVED:
         return VACUOUS
     scale = max([1.0, *(float(np.abs(w).max(initial=0.0)) for w in flat.rates.values())])
     worst = max(

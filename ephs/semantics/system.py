@@ -250,7 +250,8 @@ class System:
         Parameters
         ----------
         state
-            Where the laws are measured, missing values at the start; at random states where None.
+            Where the laws are measured, missing values at the start; where None at random states, the first of which is
+            the start of a system that carries one.
         """
         from ephs.semantics.report import check_system
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ephs.show.flows import Band, exergy_bands
+from ephs.show.flows import ExergyBand, exergy_bands
 from ephs.show.palette import BLUE, GREEN, GREY, ORANGE, RED, SKY
 from ephs.show.panels import entropy_panels
 
@@ -44,7 +44,7 @@ def number(value: float) -> str:
     return f"{value:.4g}".replace("e-0", "e-").replace("-", "−")
 
 
-def _flow(bands: list[Band]) -> str:
+def _flow(bands: list[ExergyBand]) -> str:
     total = sum(band.amount for band in bands if band.source)
     if not total > 0.0:
         return ""
@@ -52,7 +52,7 @@ def _flow(bands: list[Band]) -> str:
     return f'<p>Sources and sinks of exergy, {number(total)} J in all:</p><div class="flow">{"".join(rows)}</div>'
 
 
-def _bar(band: Band, total: float) -> str:
+def _bar(band: ExergyBand, total: float) -> str:
     share = band.amount / total
     colour = _COLOURS.get(band.kind, (GREY, GREY))[0 if band.source else 1]
     verb = _VERBS.get((band.kind, band.source), "")

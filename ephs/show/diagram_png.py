@@ -3,7 +3,7 @@
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from ephs.show.geometry import Placement, Text
+from ephs.show.geometry import Lettering, Placement
 from ephs.show.palette import FILLS, GREY, INK, PAPER, RIMS
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def draw_placement(axes: "Axes", placement: Placement, scale: float = 1.0) -> No
         _write(axes, word, GREY, scale, halo=PAPER)
 
 
-def _write(axes: "Axes", text: Text, colour: str, scale: float, *, halo: str) -> None:
+def _write(axes: "Axes", text: Lettering, colour: str, scale: float, *, halo: str) -> None:
     from matplotlib.patheffects import withStroke
 
     plain = text.base.replace("$", r"\$")

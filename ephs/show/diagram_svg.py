@@ -1,6 +1,6 @@
 """A placed picture as SVG."""
 
-from ephs.show.geometry import Placement, Point, Text
+from ephs.show.geometry import Lettering, Placement, Point
 from ephs.show.legend import title
 from ephs.show.palette import FILLS, GREY, INK, PAPER, RIMS
 
@@ -88,7 +88,7 @@ def _path(points: tuple[Point, ...]) -> str:
     return "M" + " L".join(f"{x:.2f},{y:.2f}" for x, y in points)
 
 
-def _text(text: Text, colour: str, *, halo: str = ""):  # type: ignore[no-untyped-def]
+def _text(text: Lettering, colour: str, *, halo: str = ""):  # type: ignore[no-untyped-def]
     import drawsvg as svg
 
     x, y = text.at

@@ -1,6 +1,6 @@
 """A placed picture as TikZ, to be compiled by plain LaTeX with the article class."""
 
-from ephs.show.geometry import KINDS, Placement, Point, Text
+from ephs.show.geometry import KINDS, Lettering, Placement, Point
 from ephs.show.palette import FILLS, RIMS
 
 _ESCAPES = {
@@ -76,7 +76,7 @@ def _at(point: Point) -> str:
     return f"({point[0]:.2f},{point[1]:.2f})"
 
 
-def _node(text: Text, style: str) -> str:
+def _node(text: Lettering, style: str) -> str:
     words = _escape(text.base) + (rf"\textsubscript{{{_escape(text.sub)}}}" if text.sub else "")
     size = rf"\fontsize{{{text.size:.1f}}}{{{1.2 * text.size:.1f}}}\selectfont"
     return rf"\node[{style}font=\sffamily{size}] at {_at(text.at)} {{{words}}};"

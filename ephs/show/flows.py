@@ -18,7 +18,7 @@ GAP, SLOT = 0.02, 0.05
 """Between bands at the edge, and the least room that a band and its name get there, of the height of all."""
 
 
-class Band(NamedTuple):
+class ExergyBand(NamedTuple):
     """A source (from the left) or a sink (to the right) of exergy, in J."""
 
     name: str
@@ -27,14 +27,14 @@ class Band(NamedTuple):
     kind: str
 
 
-def exergy_bands(sol: Any, path: Any = ".") -> list[Band]:
+def exergy_bands(sol: Any, path: Any = ".") -> list[ExergyBand]:
     """The sources and sinks of a system or subsystem over the run; both sides add up to the same.
 
     Sources are storages that gave exergy, and supply; sinks are storages that took it, delivery, and destruction. What
     steps made or lost of the whole is the defect, on the side where it counts.
     """
     entry = sol.ledger(path)
-    bands: list[Band] = []
+    bands: list[ExergyBand] = []
 
     def change(values: Any) -> float:
         return float(values[-1] - values[0])
@@ -43,15 +43,17 @@ def exergy_bands(sol: Any, path: Any = ".") -> list[Band]:
         name = str(leaf.path.relative_to(entry.path)) if leaf.path != entry.path else str(leaf.path)
         stored, destroyed = change(leaf.exergy), change(leaf.destroyed)
         if stored:
-            bands.append(Band(name, abs(stored), stored < 0.0, "storage"))
+            bands.append(ExergyBand(name, abs(stored), stored < 0.0, "storage"))
         if destroyed:
-            bands.append(Band(name, abs(destroyed), destroyed < 0.0, "destroyed"))
+            bands.append(ExergyBand(name, abs(destroyed), destroyed < 0.0, "destroyed"))
     supplied = change(entry.exergy_supplied)
     if supplied:
-        bands.append(Band("supplied" if supplied > 0.0 else "delivered", abs(supplied), supplied > 0.0, "boundary"))
+        bands.append(
+            ExergyBand("supplied" if supplied > 0.0 else "delivered", abs(supplied), supplied > 0.0, "boundary")
+        )
     defect = change(entry.exergy_defect)
     if defect:
-        bands.append(Band("defect of the steps", abs(defect), defect > 0.0, "defect"))
+        bands.append(ExergyBand("defect of the steps", abs(defect), defect > 0.0, "defect"))
     return _merged(bands)
 
 
@@ -83,9 +85,9 @@ def _leaves(entry: Any) -> list[Any]:
     return [leaf for part in entry.parts.values() for leaf in _leaves(part)] if entry.parts else [entry]
 
 
-def _merged(bands: list[Band]) -> list[Band]:
+def _merged(bands: list[ExergyBand]) -> list[ExergyBand]:
     """Largest first, and the smallest ones together."""
-    out: list[Band] = []
+    out: list[ExergyBand] = []
     total = max((sum(b.amount for b in bands if b.source == side) for side in (True, False)), default=0.0)
     for side in (True, False):
         mine = sorted((b for b in bands if b.source == side), key=lambda band: -band.amount)
@@ -94,11 +96,11 @@ def _merged(bands: list[Band]) -> list[Band]:
         if len(small) == 1:
             out += small
         elif small:
-            out.append(Band(f"{len(small)} others", sum(b.amount for b in small), side, "others"))
+            out.append(ExergyBand(f"{len(small)} others", sum(b.amount for b in small), side, "others"))
     return out
 
 
-def _side(axes: "Axes", bands: list[Band], total: float, *, left: bool) -> None:
+def _side(axes: "Axes", bands: list[ExergyBand], total: float, *, left: bool) -> None:
     """Bands from the edge to the middle; at the edge they stand apart."""
     colours = {
         "storage": BLUE if left else SKY,

@@ -26,7 +26,7 @@ KINDS = ("storage", "environment", "reversible", "irreversible", "composite", "u
 
 @final
 @dataclass(frozen=True, slots=True)
-class Text:
+class Lettering:
     """A short name at a place: `base` with `sub` set as a subscript.
 
     `at` is the centre of the lettering, `size` the height of its type, `width` what it is reckoned to take. `anchor`,
@@ -62,7 +62,7 @@ class PlacedBox:
     kind: str
     at: Point
     radius: float
-    lines: tuple[Text, ...]
+    lines: tuple[Lettering, ...]
     hatching: tuple[tuple[Point, Point], ...]
 
 
@@ -74,7 +74,7 @@ class PlacedJunction:
     path: str
     at: Point
     radius: float
-    label: Text
+    label: Lettering
 
 
 @final
@@ -85,7 +85,7 @@ class PlacedRegion:
     path: str
     at: Point
     radius: float
-    label: Text
+    label: Lettering
     members: frozenset[str]
 
 
@@ -113,7 +113,7 @@ class Wire:
     role: str
     power: bool
     points: tuple[Point, ...]
-    label: Text | None
+    label: Lettering | None
 
 
 @final
@@ -130,7 +130,7 @@ class Placement:
     rectangle: tuple[float, float, float, float]
     corner: float
     regions: tuple[PlacedRegion, ...] = ()
-    legend: tuple[tuple[PlacedBox, Text], ...] = ()
+    legend: tuple[tuple[PlacedBox, Lettering], ...] = ()
 
     @property
     def size(self) -> tuple[float, float]:

@@ -33,7 +33,7 @@ class Disc:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Edge:
+class UnplacedWire:
     """A line before placement: `ends` are node paths; an outer port has one."""
 
     title: str
@@ -50,7 +50,7 @@ class Graph:
 
     discs: tuple[Disc, ...]
     dots: tuple[tuple[str, tuple[str, str]], ...]
-    edges: tuple[Edge, ...]
+    edges: tuple[UnplacedWire, ...]
 
     def radii(self) -> dict[str, float]:
         """Radius of every node, by path."""
@@ -121,19 +121,19 @@ def read(
 
     boxes = _names([str(path) for path in pattern.boxes], tuple(inside))
     dots = _names([str(path) for path in pattern.junctions], tuple(inside))
-    edges: list[Edge] = []
+    edges: list[UnplacedWire] = []
     for box, content in pattern.boxes.items():
         for name, port in content.ports.items():
             here, there = str(name), str(port.junction)
             said = here.rpartition(".")[2] == there.rpartition(".")[2]
             title = f"port {_joined(str(box), here)} on junction {there}"
-            edges.append(Edge(title, (str(box), there), "port", port.power, "" if said else here))
+            edges.append(UnplacedWire(title, (str(box), there), "port", port.power, "" if said else here))
     for name, junction in pattern.junctions.items():
         if junction.exposed:
-            edges.append(Edge(f"outer port {name}", (str(name),), "outer", junction.power, ""))
+            edges.append(UnplacedWire(f"outer port {name}", (str(name),), "outer", junction.power, ""))
     for group in sorted(sorted(str(path) for path in members) for members in pattern.links):
         for first, second in itertools.pairwise(group):
-            edges.append(Edge(f"{first} and {second} share their state", (first, second), "link", False, ""))
+            edges.append(UnplacedWire(f"{first} and {second} share their state", (first, second), "link", False, ""))
     return Graph(
         _alike(_disc(path, name, found.get(path, "unknown")) for path, name in boxes.items()),
         tuple((path, subscripted(name)) for path, name in dots.items()),

@@ -18,19 +18,19 @@ from ephs.show import opening
 from ephs.show import positions as places
 from ephs.show.geometry import (
     BETTER,
+    Lettering,
     PlacedBox,
     PlacedJunction,
     PlacedRegion,
     Placement,
     Point,
     Points,
-    Text,
     Wire,
     crossings,
     faults,
     hatching,
 )
-from ephs.show.graph import DOT, TYPE, Disc, Edge, Graph, read, width_of
+from ephs.show.graph import DOT, TYPE, Disc, Graph, UnplacedWire, read, width_of
 from ephs.show.legend import legend
 from ephs.show.lettering import Sheet, around, beside
 from ephs.show.routing import bulged, route, straight, trimmed
@@ -74,7 +74,7 @@ def place(
         source = source.flatten()
     parts = opening.opened(source, kinds) if opened and not isinstance(source, Pattern) else None
     graph = read(source, kinds) if parts is None else parts.graph
-    page = _Page(graph, {} if parts is None else parts.members)
+    page = _DrawnGraph(graph, {} if parts is None else parts.members)
     if positions is not None:
         return _roomy(page, places.given(graph, positions))
     best: tuple[float, Points, Placement] | None = None
@@ -92,14 +92,14 @@ def place(
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Page:
+class _DrawnGraph:
     """Graph to be drawn, and the opened composite of each node."""
 
     graph: Graph
     members: Mapping[str, frozenset[str]]
 
 
-def _roomy(page: _Page, points: Points, first: Placement | None = None) -> Placement:
+def _roomy(page: _DrawnGraph, points: Points, first: Placement | None = None) -> Placement:
     """The picture, expanded until every name and wire has room; the best one if none has."""
     best = _picture(page, points) if first is None else first
     count = len(faults(best))
@@ -112,11 +112,11 @@ def _roomy(page: _Page, points: Points, first: Placement | None = None) -> Place
     return best
 
 
-def _picture(page: _Page, points: Points, room: float = 1.0) -> Placement:
+def _picture(page: _DrawnGraph, points: Points, room: float = 1.0) -> Placement:
     graph, radii = page.graph, page.graph.radii()
     at = {path: (float(x), float(y)) for path, (x, y) in zip(radii, points, strict=True)}
     regions = opening.regions(page.members, at, radii)
-    field = _Field(at, radii, regions)
+    field = _PlacedNodes(at, radii, regions)
     wires = [_wire(edge, line, None) for edge, line in _inner_lines(graph, field, 16.0 * room)]
     # Once without the outer ports, to learn how large the rectangle must be, and once with them.
     sheet = _sheet(field, wires, None)
@@ -149,7 +149,7 @@ def _kinds(graph: Graph, regions: tuple[PlacedRegion, ...]) -> set[str]:
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Field:
+class _PlacedNodes:
     """Positions of nodes and opened composites, before the outer rectangle."""
 
     at: Mapping[str, Point]
@@ -163,12 +163,12 @@ class _Field:
         return np.array(rows, dtype=float).reshape(-1, 3)
 
 
-def _inner_lines(graph: Graph, field: _Field, apart: float) -> list[tuple[Edge, tuple[Point, ...]]]:
-    groups: dict[tuple[str, ...], list[Edge]] = {}
+def _inner_lines(graph: Graph, field: _PlacedNodes, apart: float) -> list[tuple[UnplacedWire, tuple[Point, ...]]]:
+    groups: dict[tuple[str, ...], list[UnplacedWire]] = {}
     for edge in graph.edges:
         if edge.role != "outer":
             groups.setdefault(edge.ends, []).append(edge)
-    lines: list[tuple[Edge, tuple[Point, ...]]] = []
+    lines: list[tuple[UnplacedWire, tuple[Point, ...]]] = []
     for ends, edges in groups.items():
         start, end = field.at[ends[0]], field.at[ends[1]]
         obstacles = field.obstacles(ends)
@@ -181,7 +181,7 @@ def _inner_lines(graph: Graph, field: _Field, apart: float) -> list[tuple[Edge, 
     return lines
 
 
-def _outer_wires(graph: Graph, field: _Field, wires: list[Wire], rectangle: Rectangle) -> list[Wire]:
+def _outer_wires(graph: Graph, field: _PlacedNodes, wires: list[Wire], rectangle: Rectangle) -> list[Wire]:
     found: list[Wire] = []
     left, top, right, bottom = rectangle
     taken: list[Point] = []
@@ -222,19 +222,19 @@ def _meet(first: Wire, second: Wire) -> int:
     return crossings(Placement((), (), (first, second), (0.0, 0.0, 0.0, 0.0), 0.0))
 
 
-def _sheet(field: _Field, wires: list[Wire], bounds: Rectangle | None) -> Sheet:
+def _sheet(field: _PlacedNodes, wires: list[Wire], bounds: Rectangle | None) -> Sheet:
     pieces = [piece for wire in wires for piece in zip(wire.points, wire.points[1:], strict=False)]
     nodes = np.array([(*field.at[path], field.radii[path]) for path in field.at], dtype=float).reshape(-1, 3)
     titles = [region.label.bounds for region in field.regions]
     return Sheet(nodes, np.array(pieces, dtype=float).reshape(-1, 2, 2), bounds, titles)
 
 
-def _label(path: str, name: tuple[str, str], at: Mapping[str, Point], sheet: Sheet) -> Text:
+def _label(path: str, name: tuple[str, str], at: Mapping[str, Point], sheet: Sheet) -> Lettering:
     size = TYPE if "." not in name[0] else 0.86 * TYPE
     return sheet.write(name, size, around(at[path], DOT, name, size))
 
 
-def _bounds(field: _Field, wires: list[Wire], labels: list[Rectangle]) -> Rectangle:
+def _bounds(field: _PlacedNodes, wires: list[Wire], labels: list[Rectangle]) -> Rectangle:
     air = 18.0
     discs = [(point, field.radii[path]) for path, point in field.at.items()]
     discs += [(region.at, region.radius) for region in field.regions]
@@ -249,7 +249,7 @@ def _bounds(field: _Field, wires: list[Wire], labels: list[Rectangle]) -> Rectan
     )
 
 
-def _wire(edge: Edge, line: tuple[Point, ...], label: Text | None) -> Wire:
+def _wire(edge: UnplacedWire, line: tuple[Point, ...], label: Lettering | None) -> Wire:
     return Wire(edge.title, edge.ends, edge.role, edge.power, line, label)
 
 
@@ -264,8 +264,8 @@ def _moved(point: Point, shift: Point) -> Point:
     return (point[0] + shift[0], point[1] + shift[1])
 
 
-def _shifted(text: Text, shift: Point) -> Text:
-    return Text(text.base, text.sub, _moved(text.at, shift), text.size, text.width)
+def _shifted(text: Lettering, shift: Point) -> Lettering:
+    return Lettering(text.base, text.sub, _moved(text.at, shift), text.size, text.width)
 
 
 def _moved_wire(wire: Wire, shift: Point) -> Wire:
@@ -284,7 +284,7 @@ def _box(disc: Disc, centre: Point) -> PlacedBox:
     pitch = 1.15 * disc.type_size
     first = centre[1] - pitch * (len(disc.lines) - 1) / 2
     lines = tuple(
-        Text(base, sub, (centre[0], first + pitch * row), disc.type_size, width_of(base, sub, disc.type_size))
+        Lettering(base, sub, (centre[0], first + pitch * row), disc.type_size, width_of(base, sub, disc.type_size))
         for row, (base, sub) in enumerate(disc.lines)
     )
     marks = hatching(centre, disc.radius) if disc.kind == "environment" else ()

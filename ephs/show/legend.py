@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from ephs.show.geometry import PlacedBox, Point, Text, hatching
+from ephs.show.geometry import Lettering, PlacedBox, Point, hatching
 from ephs.show.graph import width_of
 
 WORDS: Mapping[str, str] = MappingProxyType(
@@ -39,7 +39,7 @@ TYPE, RADIUS, PITCH, GAP = 7.5, 4.5, 14.0, 10.0
 """Size of the type, radius of a disc, distance of rows and of entries, in points."""
 
 
-def legend(kinds: Iterable[str], start: Point, width: float) -> tuple[tuple[PlacedBox, Text], ...]:
+def legend(kinds: Iterable[str], start: Point, width: float) -> tuple[tuple[PlacedBox, Lettering], ...]:
     """Discs and words of the occurring kinds, in rows from `start` downwards, at most `width` wide where words fit."""
     found, entries = frozenset(kinds), []
     x, y = start[0], start[1] + PITCH / 2
@@ -52,7 +52,7 @@ def legend(kinds: Iterable[str], start: Point, width: float) -> tuple[tuple[Plac
         centre = (x + RADIUS, y)
         marks = hatching(centre, RADIUS, 2.5) if kind == "environment" else ()
         middle = x + 2 * RADIUS + 3.0 + wide / 2
-        entries.append((PlacedBox("", kind, centre, RADIUS, (), marks), Text(word, "", (middle, y), TYPE, wide)))
+        entries.append((PlacedBox("", kind, centre, RADIUS, (), marks), Lettering(word, "", (middle, y), TYPE, wide)))
         x += 2 * RADIUS + 3.0 + wide + GAP
     return tuple(entries)
 

@@ -8,7 +8,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.show.geometry import POINT, Point, Points, Text, inside
+from ephs.show.geometry import POINT, Lettering, Point, Points, inside
 from ephs.show.graph import width_of
 
 LESS = 1e-9
@@ -32,21 +32,21 @@ class Sheet:
     bounds: tuple[float, float, float, float] | None = None
     written: list[tuple[float, float, float, float]] = field(default_factory=list)
 
-    def write(self, name: tuple[str, str], size: float, places: Iterable[Place]) -> Text:
+    def write(self, name: tuple[str, str], size: float, places: Iterable[Place]) -> Lettering:
         """Set a name at the best of some places, (centre, anchor, cost), and record it."""
         width = width_of(*name, size)
-        best, cost = Text(*name, (0.0, 0.0), size, width), math.inf
+        best, cost = Lettering(*name, (0.0, 0.0), size, width), math.inf
         for centre, anchor, dislike in places:
             if dislike >= cost:
                 continue
-            text = Text(*name, centre, size, width, anchor)
+            text = Lettering(*name, centre, size, width, anchor)
             now = dislike + self._trouble(text)
             if now < cost - LESS:
                 best, cost = text, now
         self.written.append(best.bounds)
         return best
 
-    def _trouble(self, text: Text) -> float:
+    def _trouble(self, text: Lettering) -> float:
         left, top, right, bottom = text.bounds
         left, top, right, bottom = left - _AIR, top - _AIR, right + _AIR, bottom + _AIR
         trouble = 0.0

@@ -9,7 +9,7 @@ from ephs.show.motion import Array
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class BodyLine:
     """From a point (3,) of one body to one of another, each in its body's frame; drawn as a coil, or straight."""
 
     body1: str
@@ -20,11 +20,11 @@ class Line:
     coiled: bool
 
 
-def lines_of(scene: Any) -> dict[str, Line]:
+def lines_of(scene: Any) -> dict[str, BodyLine]:
     """The springs of a scene, and the segments NAME-1, NAME-2, … of its tendons."""
-    found = {name: Line(s.body1, s.body2, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
+    found = {name: BodyLine(s.body1, s.body2, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
     for name, tendon in scene.all_tendons():
         ends = pairwise(zip(tendon.bodies, tendon.points, strict=True))
         for k, ((one, here), (two, there)) in enumerate(ends, 1):
-            found[f"{name}-{k}"] = Line(one, two, here, there, tendon.heat, coiled=False)
+            found[f"{name}-{k}"] = BodyLine(one, two, here, there, tendon.heat, coiled=False)
     return found

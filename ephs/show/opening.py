@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.operad import Nesting, Pattern
 from ephs.show import positions as places
-from ephs.show.geometry import BETTER, PlacedRegion, Point, Points, Text
+from ephs.show.geometry import BETTER, Lettering, PlacedRegion, Point, Points
 from ephs.show.graph import TYPE, Graph, read, width_of
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def regions(
         if not paths:
             continue
         (x, y), radius = _circle({path: at[path] for path in sorted(paths)}, radii, box)
-        label = Text(box, "", (x, y - radius + 0.85 * _TITLE), TYPE, width_of(box, "", TYPE))
+        label = Lettering(box, "", (x, y - radius + 0.85 * _TITLE), TYPE, width_of(box, "", TYPE))
         found.append(PlacedRegion(box, (x, y), radius, label, paths))
     return tuple(found)
 

@@ -21,7 +21,7 @@ MOST = 6
 """Largest number of portraits drawn by default."""
 
 
-class _Curve(NamedTuple):
+class _PhaseCurve(NamedTuple):
     across: str
     up: str
     x: Array
@@ -63,19 +63,19 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
     return figure
 
 
-def _freedoms(sol: Any) -> dict[str, _Curve]:
+def _freedoms(sol: Any) -> dict[str, _PhaseCurve]:
     def place(name: str) -> Any:
         return sol.joint(name).coordinate
 
     places = freedom_lines(sol.freedoms, place, place)
     rates = freedom_lines(sol.freedoms, place, lambda name: sol.joint(name).rate)
     return {
-        name: _Curve(f"{name} [{unit}]", f"rate [{unit}/s]", x, y)
+        name: _PhaseCurve(f"{name} [{unit}]", f"rate [{unit}/s]", x, y)
         for (name, unit, x), (_, _, y) in zip(places, rates, strict=True)
     }
 
 
-def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _Curve]) -> _Curve:
+def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _PhaseCurve]) -> _PhaseCurve:
     if isinstance(which, str):
         if which not in known:
             hint = did_you_mean(which, known, f"there are {listing(known)}")
@@ -90,10 +90,10 @@ def _curve(sol: Any, which: str | tuple[str, str], known: dict[str, _Curve]) -> 
             raise ShowError("nothing", path=str(sol.name), found=f"scalar state {name!r}", expected=f"a path: {hint}")
     units = [sol.labels[names[name]].unit for name in which]
     x, y = (np.asarray(sol.states[names[name]], dtype=float) for name in which)
-    return _Curve(f"{across} [{units[0]}]", f"{up} [{units[1]}]", x, y)
+    return _PhaseCurve(f"{across} [{units[0]}]", f"{up} [{units[1]}]", x, y)
 
 
-def _default(sol: Any, known: dict[str, _Curve]) -> list[_Curve]:
+def _default(sol: Any, known: dict[str, _PhaseCurve]) -> list[_PhaseCurve]:
     if known:
         moving = [curve for curve in known.values() if float(np.nanmax(curve.x) - np.nanmin(curve.x)) > STILL]
         if moving:
@@ -109,7 +109,7 @@ def _default(sol: Any, known: dict[str, _Curve]) -> list[_Curve]:
     return [_curve(sol, found[0], {})]
 
 
-def _draw(axes: "Axes", curve: _Curve) -> None:
+def _draw(axes: "Axes", curve: _PhaseCurve) -> None:
     axes.plot(curve.x, curve.y, color=BLUE, linewidth=1.1)
     if len(curve.x) > 2:
         _direction(axes, curve)
@@ -120,7 +120,7 @@ def _draw(axes: "Axes", curve: _Curve) -> None:
     axes.margins(0.08)
 
 
-def _direction(axes: "Axes", curve: _Curve) -> None:
+def _direction(axes: "Axes", curve: _PhaseCurve) -> None:
     """An arrow head where the curve has run a fifth of its way over the picture."""
     wide, high = (float(np.nanmax(values) - np.nanmin(values)) or 1.0 for values in (curve.x, curve.y))
     way = np.cumsum(np.nan_to_num(np.hypot(np.diff(curve.x) / wide, np.diff(curve.y) / high)))

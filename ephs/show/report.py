@@ -12,7 +12,7 @@ from ephs.show.balances import balances
 from ephs.show.kept import pattern_svg
 from ephs.show.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
 from ephs.show.player import player
-from ephs.show.signals import Group, packed
+from ephs.show.signals import PanelGroup, packed
 from ephs.show.stage import stage_of
 from ephs.show.still import still_svg
 from ephs.show.touching import contact_panels, contact_table
@@ -195,12 +195,12 @@ def _animation(sol: Any) -> str:
 
 def _plots(sol: Any) -> str:
     groups = [
-        Group("Motion" if sol.outline is not None else "States", motion_panels(sol), shown=True),
-        Group("Energy", energy_panels(sol), shown=True),
-        Group("Exergy", exergy_panels(sol), shown=False),
-        Group("Entropy", entropy_panels(sol), shown=False),
-        Group("Contacts", contact_panels(sol), shown=False),
-        Group("Constraints", constraint_panels(sol), shown=False),
+        PanelGroup("Motion" if sol.outline is not None else "States", motion_panels(sol), shown=True),
+        PanelGroup("Energy", energy_panels(sol), shown=True),
+        PanelGroup("Exergy", exergy_panels(sol), shown=False),
+        PanelGroup("Entropy", entropy_panels(sol), shown=False),
+        PanelGroup("Contacts", contact_panels(sol), shown=False),
+        PanelGroup("Constraints", constraint_panels(sol), shown=False),
     ]
     data = packed(np.asarray(sol.t, dtype=float), groups)
     return (

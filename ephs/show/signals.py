@@ -18,7 +18,7 @@ FEW = 6
 
 @final
 @dataclass(frozen=True, slots=True)
-class Group:
+class PanelGroup:
     """Panels under one heading of the list of signals; ``shown``: drawn at first."""
 
     name: str
@@ -26,7 +26,7 @@ class Group:
     shown: bool
 
 
-def packed(t: Array, groups: list[Group]) -> str:
+def packed(t: Array, groups: list[PanelGroup]) -> str:
     """JSON of the groups, times as 64-bit and values as 32-bit floats in base64.
 
     Parameters

@@ -51,7 +51,7 @@ class Mark:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Words:
+class SketchLabel:
     """A name at a point (2,) in m, its letters' height in points, its colour; `fixed` names stay at their point."""
 
     at: Array
@@ -67,7 +67,7 @@ class Sketch:
     """Marks in drawing order, names, and points to keep free of names."""
 
     marks: list[Mark] = field(default_factory=list)
-    words: list[Words] = field(default_factory=list)
+    words: list[SketchLabel] = field(default_factory=list)
     taken: list[Array] = field(default_factory=list)
 
     def line(self, points: Any, width: float, stroke: Any = INK, dashes: tuple[float, ...] = ()) -> None:
@@ -233,8 +233,8 @@ def _names(out: Sketch, bodies: dict[str, Array], joints: dict[str, Array], size
         else:
             near.append(name)
     out.taken.extend(at for at, _ in groups)
-    out.words.extend(Words(at[:2], name, 8.0, INK) for name, at in bodies.items())
-    out.words.extend(Words(at, ", ".join(names), 7.0, GREY) for at, names in groups)
+    out.words.extend(SketchLabel(at[:2], name, 8.0, INK) for name, at in bodies.items())
+    out.words.extend(SketchLabel(at, ", ".join(names), 7.0, GREY) for at, names in groups)
 
 
 def _bar(out: Sketch, cloud: Array, size: float) -> None:
@@ -244,4 +244,4 @@ def _bar(out: Sketch, cloud: Array, size: float) -> None:
     left, low = float(cloud[:, 0].min()), float(cloud[:, 1].min()) - 0.16 * size
     out.line([[left, low], [left + length, low]], 1.6)
     text = f"{length:g} m" if length >= 0.5 else f"{1000.0 * length:g} mm"
-    out.words.append(Words(np.array([left + 0.5 * length, low - 0.035 * size]), text, 7.5, INK, fixed=True))
+    out.words.append(SketchLabel(np.array([left + 0.5 * length, low - 0.035 * size]), text, 7.5, INK, fixed=True))

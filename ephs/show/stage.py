@@ -6,7 +6,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.errors import ShowError
-from ephs.show.lines import Line, lines_of
+from ephs.show.lines import BodyLine, lines_of
 from ephs.show.motion import Array, Film, film, point_of
 from ephs.show.overlays import GROUND, Heat, Loads, heat_of, loads_of, strain_of
 from ephs.show.solids import Solid, solids_of
@@ -32,7 +32,7 @@ class Stage:
     """
 
     joints: dict[str, Any]
-    springs: dict[str, Line]
+    springs: dict[str, BodyLine]
     bodies: dict[str, Any]
     solids: dict[str, Solid]
     frames: Film

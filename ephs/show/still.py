@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.show.motion import Array
 from ephs.show.palette import PAPER
-from ephs.show.sketch import Sketch, Words, sketch
+from ephs.show.sketch import Sketch, SketchLabel, sketch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,12 +116,14 @@ def _colour(value: Any) -> str:
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
-def _settled(made: Sketch, points: Callable[[Array], Array], page: Array) -> list[tuple[Words, tuple[float, float]]]:
+def _settled(
+    made: Sketch, points: Callable[[Array], Array], page: Array
+) -> list[tuple[SketchLabel, tuple[float, float]]]:
     """Each name with its shift in points: beside its object where there is room.
 
     ``points`` gives a place (2,) in m in points of the page, y upwards; ``page`` is (4,), its corners.
     """
-    out: list[tuple[Words, tuple[float, float]]] = []
+    out: list[tuple[SketchLabel, tuple[float, float]]] = []
     taken = [_room(points(at), 0.0, 0.0, 11.0, 11.0) for at in made.taken]
     for words in made.words:
         wide, high = 0.58 * words.letter * len(words.text), 1.15 * words.letter

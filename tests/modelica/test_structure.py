@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ephs import ModelicaError
-from ephs.modelica.flat import DOMAINS, Equation, Flat, Port
+from ephs.modelica.flat import DOMAINS, Connector, Flat, ZeroResidual
 from ephs.modelica.relation import relation_of
 from ephs.modelica.structure import stored_energy, structure_of
 
@@ -16,7 +16,7 @@ NUMBERS = st.integers(-3, 3)
 def flat_of(loss, skew, constraint, mix):
     """Equations f = (S + A) e + Cᵀλ, 0 = C e of pins, each replaced by a sum of all."""
     n, k = loss.rows, constraint.rows
-    ports = tuple(Port(f"p{j}", DOMAINS[0], *sympy.symbols(f"p{j}.v p{j}.i", real=True)) for j in range(n))
+    ports = tuple(Connector(f"p{j}", DOMAINS[0], *sympy.symbols(f"p{j}.v p{j}.i", real=True)) for j in range(n))
     e, f = (sympy.Matrix([getattr(port, of) for port in ports]) for of in ("potential", "flow"))
     multipliers = sympy.Matrix(sympy.symbols(f"m:{k}", real=True))
     rows = [f - (loss + skew) * e, sympy.zeros(0, 1)]
@@ -26,7 +26,7 @@ def flat_of(loss, skew, constraint, mix):
     units = (
         {port.potential: "V" for port in ports} | {port.flow: "A" for port in ports} | dict.fromkeys(multipliers, "")
     )
-    return Flat("any", ports, tuple(Equation(sympy.expand(each), str(each)) for each in residuals), units, {})
+    return Flat("any", ports, tuple(ZeroResidual(sympy.expand(each), str(each)) for each in residuals), units, {})
 
 
 def numbers(draw, rows, columns):
@@ -77,7 +77,7 @@ def test_power_that_is_given_is_refused(of, amount):
 @pytest.mark.parametrize("extra", [True, False])
 def test_too_many_or_too_few_equations_are_no_relation(extra):
     flat = flat_of(sympy.eye(2), sympy.zeros(2), sympy.zeros(0, 2), sympy.eye(2))
-    more = (*flat.equations, Equation(flat.ports[0].flow, "p0.i = 0")) if extra else flat.equations[:1]
+    more = (*flat.equations, ZeroResidual(flat.ports[0].flow, "p0.i = 0")) if extra else flat.equations[:1]
     with pytest.raises(ModelicaError) as caught:
         relation_of(flat, more)
     assert caught.value.fault == "count"

@@ -25,8 +25,8 @@ from ephs.show.charts.families import scene_family
 from ephs.show.charts.outcomes import BOUND, ENERGY, RIGHT, horizon, judge
 from ephs.show.charts.peers import PEERS, PeerError
 from ephs.show.charts.reasons import letter_of, reason_of, reasons, reasons_table
-from ephs.show.charts.reference import Motion
-from ephs.show.charts.runs import Ending, Setting, attempt
+from ephs.show.charts.reference import PosesInTime
+from ephs.show.charts.runs import RunEnding, RunSetting, attempt
 from ephs.show.charts.specimens import SPECIMENS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,7 +39,7 @@ def swing(amplitude=1.0, phase=0.0, decay=0.0, drift=0.0):
     x = amplitude * np.exp(-decay * T) * np.cos(T + phase)
     position = np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)[:, None, :]
     rotation = np.tile(np.eye(3), (len(T), 1, 1, 1))
-    return Motion(T, position, rotation, drift * T / T[-1], np.zeros((len(T), 2)), 1.0)
+    return PosesInTime(T, position, rotation, drift * T / T[-1], np.zeros((len(T), 2)), 1.0)
 
 
 def spoilt(motion, value):
@@ -71,7 +71,9 @@ def test_outcomes_are_told_apart(found, outcome):
 
 
 def test_an_unmoved_body_is_judged_by_its_balance():
-    rest = Motion(T, np.zeros((101, 1, 3)), np.tile(np.eye(3), (101, 1, 1, 1)), np.zeros(101), np.zeros((101, 2)), 0.0)
+    rest = PosesInTime(
+        T, np.zeros((101, 1, 3)), np.tile(np.eye(3), (101, 1, 1, 1)), np.zeros(101), np.zeros((101, 2)), 0.0
+    )
     assert judge(rest, rest) == (Outcome.RIGHT, 0.0)
     assert judge(replace(rest, turnover=1.0), rest)[0] is Outcome.DIVERGED
 
@@ -88,7 +90,7 @@ def test_errors_fall_with_tolerances_and_are_written(tmp_path):
     points = work_precision(scene, 0.1, ["rk54"], tolerances=(1e-4, 1e-8), steps=(20, 80), repeats=1)
     by_tolerance = [p for p in points if p.setting.kind == "tolerance"]
     by_step = [p for p in points if p.setting.kind == "step"]
-    assert [p.outcome for p in points] == [Ending.DONE] * 4
+    assert [p.outcome for p in points] == [RunEnding.DONE] * 4
     for loose, tight in (by_tolerance, by_step):
         assert tight.error < 1e-2 * loose.error
         assert tight.evaluations > loose.evaluations > 0
@@ -130,13 +132,13 @@ def test_every_method_gives_a_motion_or_says_why_not(method, tmp_path):
     points = work_precision(scene, 0.01, [method], tolerances=(1e-4,), steps=(20,), repeats=1)
     assert len(points) == METHODS[method].adaptive + METHODS[method].fixed
     for point in points:
-        assert np.isfinite(point.error) if point.outcome is Ending.DONE else point.message
+        assert np.isfinite(point.error) if point.outcome is RunEnding.DONE else point.message
     assert draw_work_precision(points, method, tmp_path, "wp")[0].is_file()
 
 
 def test_a_run_that_takes_too_long_is_stopped():
-    run = attempt(ephs.load(TOP), 1e4, "rk54", Setting("step", 1e-3), limit=0.1, max_steps=10**8)
-    assert (run.solution, run.ending) == (None, Ending.SLOW)
+    run = attempt(ephs.load(TOP), 1e4, "rk54", RunSetting("step", 1e-3), limit=0.1, max_steps=10**8)
+    assert (run.solution, run.ending) == (None, RunEnding.SLOW)
     assert "took too long" in run.message
 
 
@@ -154,7 +156,7 @@ def test_peers_compute_the_same_motion(file, peer):
     truth = tight_reference(scene, 0.5)
     setting = {"tolerances": (1e-12,), "steps": (2000,)}
     (point,) = work_precision(scene, 0.5, [peer], reference=truth, repeats=1, **setting)
-    assert point.outcome is Ending.DONE
+    assert point.outcome is RunEnding.DONE
     assert point.error < 1e-9
 
 
@@ -173,7 +175,7 @@ def test_peers_close_loops_pull_springs_and_drive(name, peer, until, bound):
     scene = ephs.load(ROOT / f"benchmarks/scenes/{name}.toml")
     setting = {"tolerances": (1e-10,), "steps": (4000,)}
     (point,) = work_precision(scene, until, [peer], reference=tight_reference(scene, until), repeats=1, **setting)
-    assert point.outcome is Ending.DONE, point.message
+    assert point.outcome is RunEnding.DONE, point.message
     assert point.error < bound
 
 
@@ -191,7 +193,7 @@ def test_peers_refuse_what_they_cannot_do(file, peer):
     scene = ephs.load(ROOT / f"scenes/{file}.toml")
     with pytest.raises(PeerError, match="expected"):
         PEERS[peer].prepare(scene, 1.0)
-    assert work_precision(scene, 1.0, [peer], reference=tight_reference(scene, 0.01))[0].outcome is Ending.REFUSED
+    assert work_precision(scene, 1.0, [peer], reference=tight_reference(scene, 0.01))[0].outcome is RunEnding.REFUSED
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -245,10 +247,13 @@ def test_causes_have_no_places_numbers_and_advice(message, cause):
 
 def test_runs_that_differ_in_place_and_numbers_alone_share_a_reason(tmp_path):
     message = "t = {} s at joints.{}: no solution near by ({} rows); take a shorter step"
-    blank = Point("rk54", Setting("step", 0.1), np.nan, np.nan, 0, 0, Ending.FAILED)
+    blank = Point("rk54", RunSetting("step", 0.1), np.nan, np.nan, 0, 0, RunEnding.FAILED)
     points = [replace(blank, message=message.format(k, "ab"[k % 2], k)) for k in range(4)]
-    points += [replace(blank, method="alpha", message="its scenes have no loops", outcome=Ending.REFUSED)]
-    points += [replace(blank, message="took too long: 1 s", outcome=Ending.SLOW), replace(blank, outcome=Ending.DONE)]
+    points += [replace(blank, method="alpha", message="its scenes have no loops", outcome=RunEnding.REFUSED)]
+    points += [
+        replace(blank, message="took too long: 1 s", outcome=RunEnding.SLOW),
+        replace(blank, outcome=RunEnding.DONE),
+    ]
     found = reasons(points)
     assert [(each.letter, each.text, dict(each.runs)) for each in found.values()] == [
         ("a", "no solution near by", {"rk54": 4}),
@@ -262,7 +267,8 @@ def test_runs_that_differ_in_place_and_numbers_alone_share_a_reason(tmp_path):
 
 def test_letters_of_reasons_are_different():
     points = [
-        Point("rk54", Setting("step", 0.1), np.nan, np.nan, 0, 0, Ending.FAILED, "no " + "x" * k) for k in range(1, 800)
+        Point("rk54", RunSetting("step", 0.1), np.nan, np.nan, 0, 0, RunEnding.FAILED, "no " + "x" * k)
+        for k in range(1, 800)
     ]
     letters = [each.letter for each in reasons(points).values()]
     assert len({*letters}) == len(points) and letters[:1] + letters[25:28] == ["a", "z", "aa", "ab"]

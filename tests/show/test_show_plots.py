@@ -21,7 +21,7 @@ from ephs.show import (
 )
 from ephs.show.panels import Curve, Panel
 from ephs.show.series import thinned
-from ephs.show.signals import MOST, Group, packed
+from ephs.show.signals import MOST, PanelGroup, packed
 
 PLOTS = (plot_motion, plot_energy, plot_exergy, plot_entropy, plot_constraints)
 
@@ -101,7 +101,7 @@ def test_packed_signals_are_the_solution(length, seed, shorter, count):
     t = np.cumsum(rng.random(length))
     n = max(1, length - shorter)
     curves = tuple(Curve(f"</script>{k}", rng.normal(size=n), "#000000") for k in range(count))
-    text = packed(t, [Group("g", [Panel("x [m]", curves)], shown=True)])
+    text = packed(t, [PanelGroup("g", [Panel("x [m]", curves)], shown=True)])
     assert "<" not in text
     (panel,) = json.loads(text)[0]["panels"]
     times = np.frombuffer(base64.b64decode(panel["times"]), "<f8")
@@ -117,7 +117,7 @@ def test_residuals_of_rounding_are_not_drawn():
     t = np.linspace(0.0, 1.0, 5)
     for size, drawn in ((1e-15, 0), (1e-9, 1)):
         panel = Panel("gap [m]", (Curve("gap", size * t, "#000000"),), residual=True)
-        assert len(json.loads(packed(t, [Group("g", [panel], shown=False)]))) == drawn
+        assert len(json.loads(packed(t, [PanelGroup("g", [panel], shown=False)]))) == drawn
 
 
 def outside_frames(page: str) -> str:

@@ -30,7 +30,8 @@ from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.semantics.system import Filling, System, as_system, fold
 
-ITERATIONS = 30
+ITERATIONS, STUCK = 30, 4
+"""Iterations at most, and in how many the least remainder must have halved: else there is no solution near by."""
 NEAR = 1e-9
 """Error beside the unknowns below which whole steps are taken: Newton's method converges there."""
 SOLVED = 1e-12
@@ -121,8 +122,11 @@ def newton(tangents: Callable[[Guess, bool], LinearRelation]) -> tuple[Guess, fl
     """
     guess: Guess = {}
     before, best = np.inf, _error(tangents, guess, fresh=True)
-    for _ in range(ITERATIONS):
-        if best in (0.0, np.inf) or (best < SOLVED and best > 0.5 * before):
+    least, halved = best, 0
+    for iteration in range(ITERATIONS):
+        if best < 0.5 * least:
+            least, halved = best, iteration
+        if best in (0.0, np.inf) or (best < SOLVED and best > 0.5 * before) or iteration - halved > STUCK:
             break
         for target in _targets(tangents(guess, False), guess):
             new, error = _halved(tangents, guess, target, best)

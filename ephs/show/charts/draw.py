@@ -17,7 +17,7 @@ from ephs.show.charts.measure import Point
 from ephs.show.charts.outcomes import SILENT, Outcome
 from ephs.show.charts.peers import PEERS
 from ephs.show.charts.reasons import Key, Reason, letter_of, reasons, reasons_table
-from ephs.show.charts.runs import Ending, Setting
+from ephs.show.charts.runs import RunEnding, RunSetting
 from ephs.show.charts.stability import Cell
 from ephs.show.figures import new_figure, plain
 from ephs.show.palette import BLACK, BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY
@@ -232,10 +232,10 @@ def _flat(record: Point | Cell) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for field in fields(record):
         value = getattr(record, field.name)
-        if isinstance(value, Setting):
+        if isinstance(value, RunSetting):
             row |= {"control": value.kind, "setting": value.value}
         else:
-            row[field.name] = str(value) if isinstance(value, Outcome | Ending) else value
+            row[field.name] = str(value) if isinstance(value, Outcome | RunEnding) else value
     return row
 
 
@@ -249,7 +249,7 @@ def _look(method: str) -> tuple[str, str]:
 
 
 def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: str) -> None:
-    done = [p for p in points if p.outcome is Ending.DONE and getattr(p, key) > 0 and p.error > 0.0]
+    done = [p for p in points if p.outcome is RunEnding.DONE and getattr(p, key) > 0 and p.error > 0.0]
     if not done:
         return
     colour, marker = _look(method)
@@ -278,7 +278,7 @@ def _defects(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) ->
 
     shade: Any = ScalarMappable(LogNorm(*_DEFECTS, clip=True), "viridis_r")
     for (method, _), found in series.items():
-        done = [p for p in found if p.outcome is Ending.DONE and p.error > 0.0]
+        done = [p for p in found if p.outcome is RunEnding.DONE and p.error > 0.0]
         fills = [shade.to_rgba(max(p.defect, _DEFECTS[0])) if math.isfinite(p.defect) else _UNKNOWN for p in done]
         x, y = [p.seconds for p in done], [p.error for p in done]
         axes.plot(x, y, color=GREY, linewidth=0.5, zorder=1.0)
@@ -297,7 +297,7 @@ def _both(method: str) -> bool:
 
 def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]], found: _Reasons) -> None:
     """At the right edge, one row a series: the number of its failed runs, with the letters of the reasons."""
-    failed = {key: [p for p in points if p.outcome is not Ending.DONE] for key, points in series.items()}
+    failed = {key: [p for p in points if p.outcome is not RunEnding.DONE] for key, points in series.items()}
     failed = {key: points for key, points in failed.items() if points}
     if not failed:
         return

@@ -9,12 +9,12 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.charts.outcomes import Outcome
-from ephs.show.charts.runs import Setting
+from ephs.show.charts.runs import RunSetting
 from ephs.show.charts.stability import Cell
 
 
 @final
-class Kept:
+class KeptCells:
     """A file with one cell per line, written when measured.
 
     Parameters
@@ -27,14 +27,14 @@ class Kept:
 
     def __init__(self, file: Path, *, resume: bool) -> None:
         self._file = file
-        self._cells: dict[tuple[str, float, str, Setting], Cell] = {}
+        self._cells: dict[tuple[str, float, str, RunSetting], Cell] = {}
         if resume and file.is_file():
             for cell in _read(file):
                 self._cells[_key(cell)] = cell
         else:
             file.write_text("", encoding="utf-8")
 
-    def get(self, family: str, value: float, method: str, setting: Setting) -> Cell | None:
+    def get(self, family: str, value: float, method: str, setting: RunSetting) -> Cell | None:
         """A measured cell."""
         return self._cells.get((family, value, method, setting))
 
@@ -47,7 +47,7 @@ class Kept:
             stream.write(json.dumps(row) + "\n")
 
 
-def _key(cell: Cell) -> tuple[str, float, str, Setting]:
+def _key(cell: Cell) -> tuple[str, float, str, RunSetting]:
     return cell.family, cell.value, cell.method, cell.setting
 
 
@@ -58,6 +58,6 @@ def _read(file: Path) -> Iterator[Cell]:
             row: dict[str, Any] = json.loads(line)
         except json.JSONDecodeError:
             continue
-        row |= {"setting": Setting(*row["setting"]), "outcome": Outcome(row["outcome"])}
+        row |= {"setting": RunSetting(*row["setting"]), "outcome": Outcome(row["outcome"])}
         found: dict[str, Any] = {key: np.nan if value is None else value for key, value in row.items()}
         yield Cell(**found)

@@ -9,8 +9,8 @@ import numpy as np
 from ephs.mechanics.methods.registry import AUTO, METHODS
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.peers import PEERS, PeerError, PeerRun
-from ephs.show.charts.reference import Motion, Reference, tight_reference
-from ephs.show.charts.runs import Array, Ending, Setting, attempt
+from ephs.show.charts.reference import PosesInTime, Reference, tight_reference
+from ephs.show.charts.runs import Array, RunEnding, RunSetting, attempt
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 STEPS = tuple(20 * 2**k for k in range(11))
@@ -47,12 +47,12 @@ class Point:
     """
 
     method: str
-    setting: Setting
+    setting: RunSetting
     error: float
     seconds: float
     evaluations: int
     steps: int
-    outcome: Ending
+    outcome: RunEnding
     message: str = ""
     defect: float = np.nan
     floor: bool = False
@@ -116,25 +116,25 @@ def work_precision(
     return points
 
 
-def _settings(name: str, until: float, tolerances: Sequence[float], steps: Sequence[int]) -> list[list[Setting]]:
+def _settings(name: str, until: float, tolerances: Sequence[float], steps: Sequence[int]) -> list[list[RunSetting]]:
     method = AUTO if name == "auto" else METHODS.get(name) or PEERS[name]
-    found: list[list[Setting]] = []
+    found: list[list[RunSetting]] = []
     if method.adaptive:
-        found.append([Setting("tolerance", value) for value in tolerances])
+        found.append([RunSetting("tolerance", value) for value in tolerances])
     if method.fixed:
-        found.append([Setting("step", until / count) for count in steps])
+        found.append([RunSetting("step", until / count) for count in steps])
     return found
 
 
 def _own(
-    scene: Scene, until: float, name: str, settings: list[Setting], truth: Reference, repeats: int, limit: float
+    scene: Scene, until: float, name: str, settings: list[RunSetting], truth: Reference, repeats: int, limit: float
 ) -> Iterator[Point]:
     both = np.array([0.0, until])
     for setting in settings:
         first = attempt(scene, until, name, setting, limit=limit, save_at=both)
         if first.solution is None:
             yield Point(name, setting, np.nan, np.nan, 0, 0, first.ending, first.message)
-            if first.ending is not Ending.FAILED:  # a finer setting changes nothing, or takes even longer
+            if first.ending is not RunEnding.FAILED:  # a finer setting changes nothing, or takes even longer
                 return
             continue
         if setting is settings[0] and first.wall > limit / 4.0:  # kernels may have been compiled
@@ -146,7 +146,7 @@ def _own(
             for _ in range(_more(repeats, first.wall, limit))
         ]
         runs = [run.solution.stats["integrate_s"] for run in [*rest, first] if run.solution is not None]
-        stats, error = first.solution.stats, float(Motion.of(first.solution).off(truth.motion)[-1])
+        stats, error = first.solution.stats, float(PosesInTime.of(first.solution).off(truth.motion)[-1])
         count = int(stats.get("evaluations", stats.get("iterations", 0)))
         defect = float(first.solution.energy_error[-1])
         point = _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)
@@ -160,7 +160,7 @@ def _foreign(
     scene: Scene,
     until: float,
     name: str,
-    settings: list[Setting],
+    settings: list[RunSetting],
     truth: Reference,
     repeats: int,
     limit: float,
@@ -171,7 +171,7 @@ def _foreign(
         run = PEERS[name].prepare(scene, until)
     except PeerError as error:  # of all programs those that can are shown; of the one that was asked for, why not
         if told:
-            yield Point(name, settings[0], np.nan, np.nan, 0, 0, Ending.REFUSED, str(error))
+            yield Point(name, settings[0], np.nan, np.nan, 0, 0, RunEnding.REFUSED, str(error))
         return
     for setting in settings:
         try:
@@ -179,24 +179,24 @@ def _foreign(
             rest = [run(setting, limit) for _ in range(_more(repeats, first.seconds, limit))]
         except PeerError as error:
             yield Point(name, setting, np.nan, np.nan, 0, 0, error.ending, str(error))
-            if error.ending is not Ending.FAILED:
+            if error.ending is not RunEnding.FAILED:
                 return
             continue
         seconds = float(np.median([each.seconds for each in [*rest, first]]))
         still: Array = np.zeros(1)
-        end = Motion(truth.motion.t[-1:], first.position[None], first.rotation[None], still, np.zeros((1, 2)), 0.0)
+        end = PosesInTime(truth.motion.t[-1:], first.position[None], first.rotation[None], still, np.zeros((1, 2)), 0.0)
         error = float(end.off(_end(truth.motion))[0])
         yield _point(name, setting, error, seconds, first.evaluations, first.steps, first.defect, truth)
         if first.seconds > limit / 4.0:
             return
 
 
-def _end(motion: Motion) -> Motion:
+def _end(motion: PosesInTime) -> PosesInTime:
     last = slice(-1, None)
     t, position, rotation, balance, totals = (
         each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.totals)
     )
-    return Motion(t, position, rotation, balance, totals, motion.turnover, motion.size)
+    return PosesInTime(t, position, rotation, balance, totals, motion.turnover, motion.size)
 
 
 def _more(repeats: int, wall: float, limit: float) -> int:
@@ -206,7 +206,7 @@ def _more(repeats: int, wall: float, limit: float) -> int:
 
 def _point(
     name: str,
-    setting: Setting,
+    setting: RunSetting,
     error: float,
     seconds: float,
     evaluations: int,
@@ -216,5 +216,5 @@ def _point(
 ) -> Point:
     floor = error < FLOOR * truth.cross_check
     if not np.isfinite(error):
-        return Point(name, setting, np.nan, seconds, evaluations, steps, Ending.FAILED, "the result is not finite")
-    return Point(name, setting, error, seconds, evaluations, steps, Ending.DONE, defect=defect, floor=floor)
+        return Point(name, setting, np.nan, seconds, evaluations, steps, RunEnding.FAILED, "the result is not finite")
+    return Point(name, setting, error, seconds, evaluations, steps, RunEnding.DONE, defect=defect, floor=floor)

@@ -4,8 +4,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from ephs.show.charts.reference import Motion
-from ephs.show.charts.runs import Array, Setting
+from ephs.show.charts.reference import PosesInTime
+from ephs.show.charts.runs import Array, RunSetting
 from ephs.solve.auditing.audit import MANY_TIMES, MOTION
 
 ACCURATE = 1e-2
@@ -62,14 +62,14 @@ SILENT = frozenset({Outcome.WRONG_BUT_BOUNDED, Outcome.ENERGY_DRIFT, Outcome.DAM
 """Silent failures: the run succeeded, its audit found nothing, and the result is wrong."""
 
 
-def right(setting: Setting, condition: float, steps: int) -> float:
+def right(setting: RunSetting, condition: float, steps: int) -> float:
     """The largest error of a right run of so many steps at a setting, where the motion has this condition."""
     if setting.kind == "step":
         return RIGHT
     return min(RIGHT, setting.value * max(TIMES, steps, AMPLIFIED * condition))
 
 
-def judge(found: Motion, true: Motion, allowed: float = RIGHT) -> tuple[Outcome, float]:
+def judge(found: PosesInTime, true: PosesInTime, allowed: float = RIGHT) -> tuple[Outcome, float]:
     """The outcome of a complete motion, and its error at the end; both motions at the same times.
 
     The error is that of positions and rotations, or of heat and work, whichever is larger.
@@ -89,7 +89,7 @@ def judge(found: Motion, true: Motion, allowed: float = RIGHT) -> tuple[Outcome,
     return Outcome.WRONG_BUT_BOUNDED, error
 
 
-def horizon(found: Motion, true: Motion) -> float:
+def horizon(found: PosesInTime, true: PosesInTime) -> float:
     """The last time in s up to which the error stayed below `ACCURATE`."""
     wrong = np.flatnonzero(~(found.off(true, true.length) <= ACCURATE))
     if not wrong.size:
@@ -97,7 +97,7 @@ def horizon(found: Motion, true: Motion) -> float:
     return float(found.t[wrong[0] - 1]) if wrong[0] else 0.0
 
 
-def _lost(found: Motion, true: Motion) -> bool:
+def _lost(found: PosesInTime, true: PosesInTime) -> bool:
     finite = np.isfinite(found.position).all() and np.isfinite(found.rotation).all() and np.isfinite(found.turnover)
     if not finite:
         return True
@@ -105,7 +105,7 @@ def _lost(found: Motion, true: Motion) -> bool:
     return away > BOUND * true.length or found.turnover > BLOWN * max(true.turnover, _NO_ENERGY)
 
 
-def _extent(motion: Motion) -> float:
+def _extent(motion: PosesInTime) -> float:
     """Extent of positions and rotations in the second half of the time."""
     half = slice(len(motion.t) // 2, None)
     spread: Array = np.ptp(motion.position[half], axis=0) / motion.length

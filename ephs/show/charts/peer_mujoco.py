@@ -12,7 +12,7 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
 from ephs.show.charts.peer_scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
-from ephs.show.charts.runs import Array, Ending, Setting
+from ephs.show.charts.runs import Array, RunEnding, RunSetting
 
 REACHED = 1e-6
 """Allowed missing fraction of the time at the end: sums of steps round."""
@@ -29,24 +29,24 @@ def integrator(method: str) -> Callable[[Scene, float], Go]:
         names = [name for name, _ in scene.all_bodies()]
         stages = 4 if method == "RK4" else 1
 
-        def go(setting: Setting, limit: float) -> PeerRun:
+        def go(setting: RunSetting, limit: float) -> PeerRun:
             mujoco.set_mju_user_warning(silent)  # otherwise it writes a log file to the working folder
             try:
                 return run(setting, limit)
             finally:
                 mujoco.set_mju_user_warning(None)
 
-        def run(setting: Setting, limit: float) -> PeerRun:
+        def run(setting: RunSetting, limit: float) -> PeerRun:
             model, data = mujoco_model(given, method, setting.value)
             before = _energies(mujoco, model, data)
             steps, begin = round(until / setting.value), time.perf_counter()
             for done in range(0, steps, 1000):
                 mujoco.mj_step(model, data, min(1000, steps - done))
                 if time.perf_counter() - begin > limit:
-                    raise PeerError(f"{limit:g} s of wall time were over", Ending.SLOW)
+                    raise PeerError(f"{limit:g} s of wall time were over", RunEnding.SLOW)
             seconds = time.perf_counter() - begin
             if data.time < until * (1.0 - REACHED):  # it restarts from zero when its state is not finite
-                raise PeerError("the state was not finite", Ending.FAILED)
+                raise PeerError("the state was not finite", RunEnding.FAILED)
             after = _energies(mujoco, model, data)
             numbers = [model.body(name).id for name in names]
             position, rotation = data.xpos[numbers].copy(), data.xmat[numbers].reshape(-1, 3, 3).copy()

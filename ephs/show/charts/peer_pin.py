@@ -11,7 +11,7 @@ from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.peer_scene import Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
-from ephs.show.charts.runs import Array, Ending, Setting
+from ephs.show.charts.runs import Array, RunEnding, RunSetting
 
 SOLVED = 1e-13
 """Accuracy to which Pinocchio solves for constraint forces."""
@@ -36,12 +36,12 @@ def integrator(method: str, *, proximal: float = TIGHT) -> Callable[[Scene, floa
             raise PeerError("expected closed loops, which alone it softens")
         model = PinModel(given, proximal)
 
-        def go(setting: Setting, limit: float) -> PeerRun:
+        def go(setting: RunSetting, limit: float) -> PeerRun:
             begin = time.perf_counter()
 
             def rates(_t: float, y: Array) -> Array:
                 if time.perf_counter() - begin > limit:
-                    raise PeerError(f"{limit:g} s of wall time were over", Ending.SLOW)
+                    raise PeerError(f"{limit:g} s of wall time were over", RunEnding.SLOW)
                 return model.rates(y)
 
             # SciPy warns below 100 ε and then uses that; the tolerance is passed nevertheless
@@ -49,7 +49,7 @@ def integrator(method: str, *, proximal: float = TIGHT) -> Callable[[Scene, floa
             done = solve_ivp(rates, (0.0, until), model.start, method=method, rtol=relative, atol=setting.value)
             seconds = time.perf_counter() - begin
             if done.status != 0:
-                raise PeerError(str(done.message), Ending.FAILED)
+                raise PeerError(str(done.message), RunEnding.FAILED)
             end = done.y[:, -1]
             defect = given.defect(model.energies(model.start), model.energies(end))
             return PeerRun(*model.bodies(end), seconds, int(done.nfev), len(done.t) - 1, defect)

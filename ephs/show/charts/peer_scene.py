@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.scene.model import GROUND, Joint, Scene, Spring
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.show.charts.runs import Array, Ending, Setting
+from ephs.show.charts.runs import Array, RunEnding, RunSetting
 
 PARALLEL = 1e-9
 """Tolerance of the cosine of parallel axes."""
@@ -22,7 +22,7 @@ ARM = 0.5
 class PeerError(Exception):
     """A scene that another program does not support, or its failed run."""
 
-    def __init__(self, text: str, ending: Ending = Ending.REFUSED) -> None:
+    def __init__(self, text: str, ending: RunEnding = RunEnding.REFUSED) -> None:
         super().__init__(text)
         self.ending = ending
 
@@ -43,7 +43,7 @@ class PeerRun:
     defect: float
 
 
-Go = Callable[[Setting, float], PeerRun]
+Go = Callable[[RunSetting, float], PeerRun]
 Energies = tuple[float, float]
 """Kinetic and potential, in J."""
 

@@ -8,14 +8,14 @@ from typing import final
 
 from ephs.show.charts.measure import Point
 from ephs.show.charts.outcomes import Outcome
-from ephs.show.charts.runs import Ending
+from ephs.show.charts.runs import RunEnding
 from ephs.show.charts.stability import Cell
 
 Key = tuple[str, str]
 """Outcome and cause."""
 LISTED = 5
 """Largest number of reasons printed by the command line."""
-_FINE = {str(Ending.DONE), str(Outcome.RIGHT), str(Ending.SLOW)}
+_FINE = {str(RunEnding.DONE), str(Outcome.RIGHT), str(RunEnding.SLOW)}
 _PLACE = re.compile(r"^t = [^:;]*: ")
 _LIMIT = re.compile(r" where \S+ is allowed.*")
 _REMARK = re.compile(r" ?\([^()]*\)")

@@ -12,7 +12,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.show.charts.runs import Array, Ending, Setting, attempt
+from ephs.show.charts.runs import Array, RunEnding, RunSetting, attempt
 from ephs.show.errors import ShowError
 from ephs.solve.result.solution import Solution
 
@@ -27,7 +27,7 @@ TRUSTED = 1e-4
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class PosesInTime:
     """Poses of the b bodies of a scene at n times.
 
     Parameters
@@ -55,14 +55,14 @@ class Motion:
     size: float = 0.0
 
     @staticmethod
-    def of(solution: Solution) -> "Motion":
+    def of(solution: Solution) -> "PosesInTime":
         """The motion of a solution, at its times."""
         names = [name for name, _ in solution.scene.all_bodies()]
         bodies = [solution.body(name) for name in names]
         kinetic, potential, heat, work = solution.kinetic, solution.potential, solution.heat, solution.work
         total = kinetic + potential + heat - work
         turnover = kinetic + np.abs(potential - potential[0]) + np.abs(heat) + np.abs(work)
-        return Motion(
+        return PosesInTime(
             solution.t,
             np.stack([body.position for body in bodies], axis=1),
             np.stack([body.rotation for body in bodies], axis=1),
@@ -72,22 +72,22 @@ class Motion:
             _length(solution.scene),
         )
 
-    def off(self, other: "Motion", length: float = 1.0) -> Array:
+    def off(self, other: "PosesInTime", length: float = 1.0) -> Array:
         """(n,) largest deviation of any component of a position, in units of ``length``, or of a rotation matrix."""
         moved = np.abs(self.position - other.position).max(axis=(1, 2)) / length
         return np.maximum(moved, np.abs(self.rotation - other.rotation).max(axis=(1, 2, 3)))
 
-    def misbooked(self, other: "Motion") -> Array:
+    def misbooked(self, other: "PosesInTime") -> Array:
         """(n,) largest deviation of heat and work, relative to what the other motion turns over; 0 where that is 0."""
         off = np.abs(self.totals - other.totals).max(axis=1)
         return off / other.turnover if other.turnover > 0.0 else np.zeros_like(off)
 
-    def until(self, count: int) -> "Motion":
+    def until(self, count: int) -> "PosesInTime":
         """The motion at its first instants."""
         t, position, rotation, balance, totals = (
             each[:count] for each in (self.t, self.position, self.rotation, self.balance, self.totals)
         )
-        return Motion(t, position, rotation, balance, totals, self.turnover, self.size)
+        return PosesInTime(t, position, rotation, balance, totals, self.turnover, self.size)
 
     @property
     def length(self) -> float:
@@ -116,10 +116,10 @@ class Reference:
         The method and the setting of the run that it is, None of others.
     """
 
-    motion: Motion
+    motion: PosesInTime
     cross_check: float
     source: str
-    run: tuple[str, Setting] | None = None
+    run: tuple[str, RunSetting] | None = None
 
 
 def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None, limit: float = 60.0) -> Reference:
@@ -142,13 +142,13 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
         runs = [attempt(scene, until, method, tight, limit=limit, save_at=save_at)]
         if runs[0].solution is not None:
             runs.append(attempt(scene, until, method, loose, limit=limit, save_at=save_at))
-        if runs[0].ending in (Ending.REFUSED, Ending.SLOW):  # of looser tolerances only the last is tried
+        if runs[0].ending in (RunEnding.REFUSED, RunEnding.SLOW):  # of looser tolerances only the last is tried
             slow.add(method)
         solutions = [run.solution for run in runs if run.solution is not None]
         if len(solutions) < 2:
             said = said or runs[-1].message
             continue
-        motion, check = map(Motion.of, solutions)
+        motion, check = map(PosesInTime.of, solutions)
         if not (np.isfinite(motion.position).all() and np.isfinite(check.position).all()):
             continue
         found = Reference(motion, float(motion.off(check)[-1]), f"{method}, {tight}", (method, tight))
@@ -179,7 +179,7 @@ def condition(scene: Scene, truth: Reference, limit: float = 60.0) -> Array:
     run = attempt(changed, float(motion.t[-1]), *truth.run, limit=limit, save_at=motion.t)
     if run.solution is None:
         return np.ones(len(motion.t))
-    return np.maximum.accumulate(Motion.of(run.solution).off(motion, motion.length)) / CHANGE
+    return np.maximum.accumulate(PosesInTime.of(run.solution).off(motion, motion.length)) / CHANGE
 
 
 def resting_reference(scene: Scene, save_at: Array) -> Reference:
@@ -188,7 +188,7 @@ def resting_reference(scene: Scene, save_at: Array) -> Reference:
     poses = np.array([body.pose for _, body in scene.all_bodies()])
     rotations = np.array([quaternion_to_matrix(pose[:4]) for pose in poses])
     position, rotation = np.tile(poses[:, 4:], (n, 1, 1)), np.tile(rotations, (n, 1, 1, 1))
-    motion = Motion(save_at, position, rotation, np.zeros(n), np.zeros((n, 2)), 0.0, _length(scene))
+    motion = PosesInTime(save_at, position, rotation, np.zeros(n), np.zeros((n, 2)), 0.0, _length(scene))
     return Reference(motion, 0.0, "it cannot move")
 
 
@@ -218,7 +218,7 @@ def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> t
         if isinstance(error, ShowError):
             raise
         raise ShowError("reference-file", path=str(file), found=f"{type(error).__name__}: {error}") from error
-    motion = Motion(np.array([found]), position, rotation, np.zeros(1), np.zeros((1, 2)), 0.0, _length(scene))
+    motion = PosesInTime(np.array([found]), position, rotation, np.zeros(1), np.zeros((1, 2)), 0.0, _length(scene))
     return Reference(motion, check, how), found
 
 
@@ -226,11 +226,11 @@ def _length(scene: Scene) -> float:
     return Snapshot.of(scene).scale(scene.world.gravity).length
 
 
-def _candidates(until: float) -> Iterator[tuple[str, Setting, Setting]]:
+def _candidates(until: float) -> Iterator[tuple[str, RunSetting, RunSetting]]:
     """Method, tight and loose setting: adaptive ones of high order first, then constant steps, robust methods first."""
     adaptive = [m for m in METHODS.values() if m.scenes and m.adaptive and m.order >= LEAST_ORDER]
     for tight, loose in TIGHT:
         for method in sorted(adaptive, key=lambda m: -m.order):
-            yield method.name, Setting("tolerance", tight), Setting("tolerance", loose)
+            yield method.name, RunSetting("tolerance", tight), RunSetting("tolerance", loose)
     for method in sorted((m for m in METHODS.values() if m.scenes and m.fixed), key=lambda m: m.order):
-        yield method.name, Setting("step", until / 8000), Setting("step", until / 4000)
+        yield method.name, RunSetting("step", until / 8000), RunSetting("step", until / 4000)

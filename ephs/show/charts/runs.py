@@ -26,7 +26,7 @@ MOST_STEPS = 500_000
 _REFUSALS = (Failure.INCONSISTENT, Failure.UNDETERMINED, Failure.PYTHON)
 
 
-class Ending(StrEnum):
+class RunEnding(StrEnum):
     """End of a run."""
 
     DONE = "done"
@@ -38,7 +38,7 @@ class Ending(StrEnum):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Setting:
+class RunSetting:
     """Setting of a run: a tolerance, rtol = atol, or a constant step in s."""
 
     kind: str
@@ -54,11 +54,11 @@ class Setting:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Run:
+class ChartRun:
     """A solution, or None; how the run ended, its message, and the wall time in s of everything."""
 
     solution: Solution | None
-    ending: Ending
+    ending: RunEnding
     message: str
     wall: float
 
@@ -67,7 +67,7 @@ class _TooLong(Exception):
     """Raised from inside a run to stop it."""
 
 
-class _Watch:
+class _TimeLimit:
     """Stops a run at its limit of processor time, which other programs do not shorten. It starts with the first
     progress report: kernels are compiled before that."""
 
@@ -86,20 +86,21 @@ class _Watch:
             self.alive = now
         elif now - self.alive > self.limit:
             self.fired = True
-            raise _TooLong(f"{Ending.SLOW}: {self.limit:g} s of processor time were over at t = {t:.3g} of {until:g} s")
+            when = f"{self.limit:g} s of processor time were over at t = {t:.3g} of {until:g} s"
+            raise _TooLong(f"{RunEnding.SLOW}: {when}")
 
 
 def attempt(
     model: Scene | System,
     until: float,
     method: str | Method,
-    setting: Setting,
+    setting: RunSetting,
     *,
     limit: float,
     save_at: Array | None = None,
     max_steps: int = MOST_STEPS,
     options: Mapping[str, Any] | None = None,
-) -> Run:
+) -> ChartRun:
     """Run a model once; failures are returned as values.
 
     Parameters
@@ -111,7 +112,7 @@ def attempt(
     options
         Further options of `ephs.simulate`.
     """
-    watch, told = _Watch(limit), list[warnings.WarningMessage]()
+    watch, told = _TimeLimit(limit), list[warnings.WarningMessage]()
     times = np.array([until]) if save_at is None else save_at
     try:
         with warnings.catch_warnings(record=True) as told, np.errstate(all="ignore"):
@@ -128,22 +129,22 @@ def attempt(
                 **setting.options(),
                 **(options or {}),
             )
-        return Run(solution, Ending.DONE, "", watch.spent)
+        return ChartRun(solution, RunEnding.DONE, "", watch.spent)
     except Interrupted as error:
         if not watch.fired:
             raise KeyboardInterrupt from error
-        ending, message = Ending.FAILED, str(error)
+        ending, message = RunEnding.FAILED, str(error)
     except SimulationError as error:
         if isinstance(error.__cause__, _TooLong):
-            ending, message = Ending.SLOW, str(error.__cause__)
+            ending, message = RunEnding.SLOW, str(error.__cause__)
         else:
-            ending, message = (Ending.REFUSED if error.outcome in _REFUSALS else Ending.FAILED), str(error)
+            ending, message = (RunEnding.REFUSED if error.outcome in _REFUSALS else RunEnding.FAILED), str(error)
     except Exception as error:  # a chart of failures survives all exceptions, internal ones included
         spoken = type(error).__module__.startswith("ephs.")
-        ending = Ending.REFUSED if spoken else Ending.LEAKED
+        ending = RunEnding.REFUSED if spoken else RunEnding.LEAKED
         message = str(error) if spoken else f"{type(error).__name__}: {error}"
-    if watch.fired and ending is not Ending.SLOW:  # a method that converted it to a failure of its own
-        ending, message = Ending.SLOW, f"{Ending.SLOW}: {message}"
-    if ending is Ending.SLOW:
+    if watch.fired and ending is not RunEnding.SLOW:  # a method that converted it to a failure of its own
+        ending, message = RunEnding.SLOW, f"{RunEnding.SLOW}: {message}"
+    if ending is RunEnding.SLOW:
         message = "; ".join([message, *(str(each.message) for each in told)])
-    return Run(None, ending, message, watch.spent)
+    return ChartRun(None, ending, message, watch.spent)

@@ -10,13 +10,13 @@ from ephs.mechanics.methods.registry import METHODS, Method
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import CONDITION, SILENT, Outcome, horizon, judge, right
-from ephs.show.charts.reference import Motion, Reference, condition, resting_reference, tight_reference
-from ephs.show.charts.runs import Array, Ending, Run, Setting, attempt
+from ephs.show.charts.reference import PosesInTime, Reference, condition, resting_reference, tight_reference
+from ephs.show.charts.runs import Array, ChartRun, RunEnding, RunSetting, attempt
 from ephs.show.charts.specimens import SPECIMENS
 from ephs.show.errors import ShowError
 
 if TYPE_CHECKING:
-    from ephs.show.charts.keeping import Kept
+    from ephs.show.charts.keeping import KeptCells
 
 INSTANTS = 41
 MOST_STEPS = 100_000
@@ -54,7 +54,7 @@ class Cell:
     family: str
     value: float
     method: str
-    setting: Setting
+    setting: RunSetting
     outcome: Outcome
     error: float
     horizon: float
@@ -66,11 +66,11 @@ class Cell:
     condition: float
 
 
-def settings_of(family: Family, value: float, method: Method, *, quick: bool = False) -> list[Setting]:
+def settings_of(family: Family, value: float, method: Method, *, quick: bool = False) -> list[RunSetting]:
     """A method's settings for a value: constant steps, the coarse ones first, then tolerances."""
     steps = family.steps_at(value)[:1] if quick else family.steps_at(value)
-    found = [Setting("step", step) for step in steps] if method.fixed else []
-    return found + [Setting("tolerance", each) for each in (TOLERANCES[method.fixed] if method.adaptive else ())]
+    found = [RunSetting("step", step) for step in steps] if method.fixed else []
+    return found + [RunSetting("tolerance", each) for each in (TOLERANCES[method.fixed] if method.adaptive else ())]
 
 
 def stability(
@@ -80,7 +80,7 @@ def stability(
     quick: bool = False,
     limit: float = LIMIT,
     note: Callable[[str], None] | None = None,
-    kept: "Kept | None" = None,
+    kept: "KeptCells | None" = None,
 ) -> list[Cell]:
     """Run every method for scenes over the family's values and its settings.
 
@@ -102,15 +102,15 @@ def stability(
     values = (family.values[0], family.values[-1]) if quick else family.values
     cells: list[Cell] = []
     for value in values:
-        trial: _Trial | None = None
+        trial: _ValueTrial | None = None
         for method in chosen:
-            slow: dict[str, Setting] = {}
+            slow: dict[str, RunSetting] = {}
             for setting in settings_of(family, value, method, quick=quick):
                 cell = None if kept is None else kept.get(family.name, value, method.name, setting)
                 if cell is None:
                     if note is not None:
                         note(f"{family.name} {family.label(value)}: {method.name}, {setting}")
-                    trial = trial or _Trial.of(family, value, limit)
+                    trial = trial or _ValueTrial.of(family, value, limit)
                     cell = trial.cell(method, setting, limit, slow.get(setting.kind))
                     if kept is not None:
                         kept.add(cell)
@@ -122,7 +122,7 @@ def stability(
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Trial:
+class _ValueTrial:
     """A value's scene with its reference motion up to the horizon of judgement."""
 
     family: Family
@@ -134,7 +134,7 @@ class _Trial:
     why: str
 
     @classmethod
-    def of(cls, family: Family, value: float, limit: float) -> "_Trial":
+    def of(cls, family: Family, value: float, limit: float) -> "_ValueTrial":
         """Reference for a value of a family's parameter."""
         times = np.linspace(0.0, family.end(value), INSTANTS)
         truth, why = _truth(family, value, times, limit)
@@ -146,21 +146,21 @@ class _Trial:
         truth = replace(truth, motion=truth.motion.until(count))
         return cls(family, value, family.make(value), times, truth, float(conditions[count - 1]), why)
 
-    def cell(self, method: Method, setting: Setting, limit: float, slow: Setting | None) -> Cell:
+    def cell(self, method: Method, setting: RunSetting, limit: float, slow: RunSetting | None) -> Cell:
         """One run, omitted if a coarser one took too long."""
         if slow is None:
             until = float(self.times[-1])
             run = attempt(self.scene, until, method, setting, limit=limit, save_at=self.times, max_steps=MOST_STEPS)
         else:
-            run = Run(None, Ending.SLOW, f"{Ending.SLOW}: already at {slow}", 0.0)
-        found = None if run.solution is None else Motion.of(run.solution)
+            run = ChartRun(None, RunEnding.SLOW, f"{RunEnding.SLOW}: already at {slow}", 0.0)
+        found = None if run.solution is None else PosesInTime.of(run.solution)
         steps = 0 if run.solution is None else int(run.solution.stats["steps"])
         outcome, error, held = _outcome(found, self.truth, right(setting, self.condition, steps))
         said = run.message or self.why
         if run.solution is not None:
             if outcome in SILENT | {Outcome.UNKNOWN} and not run.solution.audit.passed:
                 outcome, said = Outcome.FLAGGED, str(run.solution.audit)
-        elif run.ending is Ending.SLOW:
+        elif run.ending is RunEnding.SLOW:
             outcome = Outcome.SLOW
         return Cell(
             self.family.name,
@@ -193,7 +193,7 @@ def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Re
     return found, ""
 
 
-def _outcome(found: Motion | None, truth: Reference | None, allowed: float) -> tuple[Outcome, float, float]:
+def _outcome(found: PosesInTime | None, truth: Reference | None, allowed: float) -> tuple[Outcome, float, float]:
     """Outcome, error and horizon; without a reference as far as the motion alone shows them."""
     if found is None:
         return Outcome.REFUSED, np.nan, np.nan
