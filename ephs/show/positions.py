@@ -22,6 +22,8 @@ GRID = 80.0
 ITERATIONS = 20000
 """Time limit of Graphviz, which reports when the layout of a large pattern exceeds it."""
 _OUTER = "\0"
+FARTHEST = 1e6
+"""Largest coordinate of a point: far beyond it, nodes beside each other are at one point by rounding."""
 
 
 def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
@@ -32,7 +34,7 @@ def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
     Raises
     ------
     ShowError
-        If a name is unknown, a box has no point, or two nodes share one.
+        If a name is unknown, a box has no point, a point is far away, or two nodes share one.
     """
     known = {str(name): (float(x), float(y)) for name, (x, y) in positions.items()}
     placed = set(known)
@@ -40,6 +42,8 @@ def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
     for name in known:
         if name not in paths:
             raise ShowError("stranger", found=name, expected=", ".join(sorted(paths)))
+        if not all(abs(x) <= FARTHEST for x in known[name]):
+            raise ShowError("far", path=name, found=known[name], expected=FARTHEST)
     for disc in graph.discs:
         if disc.path not in known:
             raise ShowError("unplaced", path=disc.path)

@@ -268,6 +268,8 @@ def test_wires_between_given_positions_are_led_round_what_is_in_the_way():
             {"positions": {"pe": (0, 0), "pkc": (0, 0), "ke": (1, 1), "lp": (2, 2), "q": (5, 5)}},
             "pe and pkc are at the same",
         ),
+        ({"positions": {"pe": (1e17, 0)}}, r"pe is at \(1e\+17, 0.0\), expected finite numbers up to"),
+        ({"positions": {"pe": (0, float("nan"))}}, "pe is at"),
         ({"kinds": {"pe": "motor"}}, "found kind 'motor'"),
     ],
 )
