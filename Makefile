@@ -5,7 +5,8 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SCENE ?= slider-crank
 UNTIL ?= 5
-PYTEST := $(BIN)/python -m pytest
+# What a group of tests makes once is made by one worker.
+PYTEST := $(BIN)/python -m pytest --dist loadgroup
 CORES ?= 2
 COUNT ?= 100000
 SEED ?= 0

@@ -1,6 +1,7 @@
 """Exported mechanisms in the memory of this process."""
 
 import ctypes
+from functools import lru_cache
 
 import numpy as np
 
@@ -9,11 +10,17 @@ from ephs.semantics.stage.llvm import compile_text, load
 POINTER = ctypes.c_void_p
 
 
+@lru_cache(maxsize=4)
+def library_of(text):
+    """The machine code of a module, which keeps no state of its own: runs of one text share it."""
+    return load(compile_text(text))
+
+
 class Run:
     """An exported mechanism in the memory of this process."""
 
     def __init__(self, made) -> None:
-        self.made, self.library = made, load(compile_text(made.text))
+        self.made, self.library = made, library_of(made.text)
         self.memory = np.zeros(made.bytes // 8)
         self.call("start", None)
 

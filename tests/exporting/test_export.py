@@ -102,9 +102,8 @@ MASSES = {"bodies.rod.mass": 0.2, "bodies.slider.mass": 0.2, "joints.bearing.fri
 def test_parameters_make_the_program_of_the_changed_model(values, near, step):
     """Chosen steps differ where numbers do by rounding, or by the gravity that limits them: within the tolerance."""
     model = ephs.load(ROOT / "scenes/slider-crank.toml")
-    run, plain = (
-        Run(exported(image_of(model, parameters=list(values), until=0.3, step=step), "made")) for _ in range(2)
-    )
+    made = exported(image_of(model, parameters=list(values), until=0.3, step=step), "made")
+    run, plain = Run(made), Run(made)
     run.call("parameters", None, np.array(list(values.values())))
     other = Run(exported(image_of(varied(model, values), until=0.3, step=step), "other"))
     for each in (run, other, plain):

@@ -1,6 +1,7 @@
 """Ideal mixtures and mass action, against closed forms."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,11 +31,22 @@ def at(mixture, **values):
     return {port: np.array([values[str(port)]]) for port in mixture.bundle.ports}
 
 
+@cache
+def mixture_of(phase):
+    return lib.ideal_mixture(species=GASES, phase=phase)
+
+
+@cache
+def reaction_of(equation, phase, **constants):
+    """Of the gases: its structure is searched for counterexamples once, not once an example."""
+    return lib.reaction(equation, species=GASES, phase=phase, **constants)
+
+
 @PHASES
 @given(st.floats(250.0, 600.0), st.floats(1e-2, 2.0), st.tuples(AMOUNTS, AMOUNTS, AMOUNTS))
 def test_a_mixture_is_that_of_its_equations_of_state(phase, temperature, volume, amounts):
     """θ as the entropy was made for, π v = n R θ, μ = μ°(θ) + R θ ln a, and Euler's relation."""
-    mixture = lib.ideal_mixture(species=GASES, phase=phase)
+    mixture = mixture_of(phase)
     n = dict(zip("ABC", amounts, strict=True))
     s = chemistry.mixture_entropy(GASES, temperature=temperature, volume=volume, amounts=n, phase=phase)
     x = at(mixture, s=s, v=volume, **n)
@@ -63,10 +75,10 @@ def test_a_rate_is_that_of_mass_action(phase, temperature, amounts):
     """Of 2 A + C = B + C, at a mixture's potentials: atoms to rounding, entropy not destroyed."""
     volume, k, activation = 0.3, 2e-3, 1e3
     equation = "2 A + C = B + C"
-    process = lib.reaction(equation, species=GASES, k=k, activation=activation, phase=phase)
+    process = reaction_of(equation, phase, k=k, activation=activation)
     n = dict(zip("ABC", amounts, strict=True))
     s = chemistry.mixture_entropy(GASES, temperature=temperature, volume=volume, amounts=n, phase=phase)
-    mixture = lib.ideal_mixture(species=GASES, phase=phase)
+    mixture = mixture_of(phase)
     efforts = dict(
         zip(map(str, mixture.bundle.ports), mixture.energy_gradient(at(mixture, s=s, v=volume, **n)), strict=True)
     )
