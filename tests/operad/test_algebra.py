@@ -149,3 +149,10 @@ def test_a_path_moves_with_its_shortest_known_prefix():
     names = {Path.parse("a"): Path.parse("x.y"), Path.parse("a.b"): Path.parse("no"), Path.parse("c"): Path()}
     moved = {str(Path.parse(path).moved(names)) for path in ("a.b.c", "a", "c.d", "b")}
     assert moved == {"x.y.b.c", "x.y", "d", "b"}
+
+
+@pytest.mark.parametrize("name", ["box0", "box0.q"])
+def test_ports_may_be_called_as_the_box_that_renames_them(name):
+    """Its name is no beginning of theirs."""
+    box, names = Path.parse("l"), {Path.parse("p"): Path.parse(name)}
+    assert law("equivariance in names of ports")(BOXES, PAIR, box, names, {box: ONE, Path.parse("r"): ONE}).holds

@@ -3,7 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ephs.operad import Path
 from ephs.operad.disjoint import DisjointSets
+from ephs.operad.links import closure
 
 PAIRS = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)))
 
@@ -34,3 +36,8 @@ def test_the_leader_of_the_first_leads(pairs, first, second):
     expected = sets.leader(first)
     sets.join(first, second)
     assert sets.leaders((first, second)) == [expected, expected]
+
+
+def test_classes_of_a_closure_have_two_members_or_more():
+    a, b, c, d = map(Path.parse, "abcd")
+    assert closure([[a, b], [c], [c, c], [b, d]]) == dict.fromkeys([a, b, d], frozenset([a, b, d]))

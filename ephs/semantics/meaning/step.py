@@ -142,16 +142,16 @@ def _halved(
     tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, target: Guess, best: float
 ) -> tuple[Guess, float]:
     """The target, or a point on the way there whose remainder is below the best one, and that."""
-    new, share, error = target, 1.0, _error(tangents, target)
+    new, share, error = target, 1.0, _error(tangents, target, fresh=False)
     # far from the solution a full step may increase the remainder; near it only rounding remains
     while not error < best and best > NEAR and share > 1e-3:
         share *= 0.5
         new = {v: (1.0 - share) * guess.get(v, 0.0) + share * value for v, value in target.items()}
-        error = _error(tangents, new)
+        error = _error(tangents, new, fresh=False)
     return new, error
 
 
-def _error(tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, *, fresh: bool = False) -> float:
+def _error(tangents: Callable[[Guess, bool], LinearRelation], guess: Guess, *, fresh: bool) -> float:
     """The remainder at a guess, infinite outside the domain of a component."""
     try:
         return tangents(guess, fresh).remainder(guess)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from ephs.operad import ROOT, Path
 from ephs.semantics.meaning.fields import ROUNDED, Rational, Rounded
 from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.posed import Answer
 from ephs.semantics.meaning.relation import Instant
-from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.meaning.variables import ONE, Variable
 from ephs.semantics.probe import random_probe
 from ephs.testing import systems
 
@@ -67,3 +68,26 @@ def test_a_bound_is_handed_on(scale):
     held = LinearRelation.of(field, [X, Y, Z], [{X: field.one, Z: field.number(0.5e-16 * scale)}, rows[1]])
     apart = LinearRelation.of(field, [X, Y, Z], [{X: field.one, Z: field.number(1e-15 * scale)}, rows[1]])
     assert held.within(found) and not apart.within(found)
+
+
+def test_equations_among_variables_that_come_last_are_solved_too():
+    """x = y: one of both follows from the other, whichever may stay free."""
+    field = Rational()
+    found = LinearRelation.of(field, [X, Y], [field.exact({X: 1.0, Y: -1.0})]).solved([X, Y])
+    assert sorted(map(len, found.values())) == [1, 1] and found[X] == found[Y]
+
+
+def test_the_constant_is_no_pivot_of_a_canonical_form():
+    field = Rational()
+    (row,) = LinearRelation.of(field, [X, ONE], [field.exact({X: 2.0, ONE: -6.0})]).canonical
+    assert row == {X: 1, ONE: -3}
+
+
+def test_answers_are_read_as_they_are_meant():
+    assert str(Answer(True)) == "yes" and str(Answer(False, ("a", "b"))) == "no; a; b"
+
+
+def test_the_pivot_is_a_row_in_which_the_variable_is_large():
+    small, large = {X: (1e-8, 0.0), Y: (1.0, 0.0)}, {X: (1.0, 0.0), Y: (1.0, 0.0)}
+    assert Rounded().pivot([small, large], X) == 1
+    assert Rounded().pivot([large, small], X) == 0
