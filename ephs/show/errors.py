@@ -12,7 +12,7 @@ _TEXTS = {
         "positions: found {found!r}, expected a box or junction of the pattern ({expected}); correct the name"
     ),
     "unplaced": "positions: box {path} has none; expected a point (x, y) for every box; add it, or give no positions",
-    "far": "positions: {path} is at {found}, expected finite numbers up to {expected}; give points in units of the grid",
+    "far": "positions: {path} is at {found}, expected finite numbers up to {expected}; give units of the grid",
     "coincide": (
         "positions: {path} and {found} are at the same point; expected different points for all boxes and junctions; "
         "move one of them"
