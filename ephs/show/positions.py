@@ -43,7 +43,7 @@ def given(graph: Graph, positions: Mapping[str, tuple[float, float]]) -> Points:
         if name not in paths:
             raise ShowError("stranger", found=name, expected=", ".join(sorted(paths)))
         if not all(abs(x) <= FARTHEST for x in known[name]):
-            raise ShowError("far", path=name, found=known[name], expected=FARTHEST)
+            raise ShowError("far", path=name, found=str(known[name]), expected=f"{FARTHEST:g}")
     for disc in graph.discs:
         if disc.path not in known:
             raise ShowError("unplaced", path=disc.path)
