@@ -23,7 +23,7 @@ FILE: Final = Path(__file__).with_name("long.txt")
 LONG: Final = 1.5
 """Processor time in s from which on a test is long."""
 ALLOWED: Final = 8 * LONG
-"""Processor time in s at which a session fails: other machines are slower, and what tests share falls on the first."""
+"""Processor time in s from which a session names a short test: what tests share falls on the first."""
 
 
 def function_of(nodeid: str) -> str:
@@ -38,7 +38,10 @@ def long_tests() -> frozenset[str]:
 
 @final
 class Durations:
-    """Adds up the processor time of tests, also where workers run them, and fails a session of slow short tests."""
+    """Adds up the processor time of tests, also where workers run them, and names the short ones that are slow.
+
+    It fails none: what is measured hangs on the machine, and on what else runs there.
+    """
 
     def __init__(self, allowed: float = ALLOWED) -> None:
         self.allowed = allowed
@@ -68,19 +71,13 @@ class Durations:
         long = long_tests()
         return {name: time for name, time in sorted(self.seconds.items()) if time > limit and name not in long}
 
-    @pytest.hookimpl(trylast=True)
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        """Fail where a short test is slow."""
-        if self.slow(self.allowed) and session.exitstatus == pytest.ExitCode.OK:
-            session.exitstatus = pytest.ExitCode.TESTS_FAILED
-
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         """Name the slow ones."""
         for name, time in self.slow(self.allowed).items():
             terminalreporter.line(
-                f"{name} took {time:.1f} s of processor time, at most {self.allowed} s are allowed: "
+                f"{name} took {time:.1f} s of processor time, more than {self.allowed}: "
                 "make it cheaper, or measure anew by python -m tests.durations",
-                red=True,
+                yellow=True,
             )
 
 

@@ -104,21 +104,16 @@ def irreversibles(draw: st.DrawFn, interface: Interface, *, reads: tuple[Path, .
     """Random Onsager structures: M = Σ s n nᵀ over pairs of coordinates, n = eⱼ uᵢ − eᵢ uⱼ with energy efforts e."""
     rng = draw(generators())
     bundle = Bundle.of(interface)
-    strength = np.abs(rng.standard_normal((bundle.size, bundle.size)))
+    strength = np.triu(np.abs(rng.standard_normal((bundle.size, bundle.size))), 1)
     fixed = sum((np.abs(bundle.indicator(name)) for name in bundle.charges if name != ENTROPY), np.zeros(bundle.size))
-    moving = np.flatnonzero(fixed == 0.0)
+    strength[fixed != 0.0] = strength[:, fixed != 0.0] = 0.0
+    strength += strength.T
     used = reads if reads and draw(READING) else ()
 
     def matrix(x: Point, e: Array, reference: Reference) -> Array:
         energy = e + bundle.intensive(reference)
-        scale = _scale(x)
-        out = np.zeros((bundle.size, bundle.size))
-        for i in moving:
-            for j in moving[moving > i]:
-                normal = np.zeros(bundle.size)
-                normal[i], normal[j] = energy[j], -energy[i]
-                out += scale * strength[i, j] / (1.0 + abs(energy[i]) + abs(energy[j])) * np.outer(normal, normal)
-        return out
+        weight = _scale(x) * strength / (1.0 + np.abs(energy)[:, None] + np.abs(energy))
+        return np.diag(weight @ energy**2) - weight * np.outer(energy, energy)
 
     return Irreversible("random Onsager structure", interface, matrix, used, trusted=True)
 
