@@ -9,9 +9,9 @@ from ephs.mechanics.elements import components
 from ephs.operad import Interface, Path
 from ephs.operad import quantity as quantities
 from ephs.operad.charges import ENTROPY
-from ephs.semantics import Irreversible, Reference, Reversible, Storage, constructors, library, structures
+from ephs.semantics import Irreversible, Reference, Reversible, Storage, forms, library, structures
 from ephs.semantics.bundle import Array, Bundle
-from ephs.semantics.primitives import Point
+from ephs.semantics.primitives import Formula, Point
 from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.decompositions import pseudoinverse
 
@@ -129,7 +129,11 @@ def _quartic(interface: Interface, stiffness: float, hardening: float) -> Storag
     def energy(**states: Any) -> Any:
         return sum(0.5 * stiffness * x**2 + 0.25 * hardening * x**4 for x in states.values())
 
-    return constructors.storage({str(port): kind.quantity for port, kind in interface.items()}, energy, name="quartic")
+    form = forms.storage_form(interface, energy, ())
+    return Storage(
+        "quartic", interface, form.energy, form.gradient, form.discrete_gradient, kernel=form.kernel,
+        parameters=(("stiffness", stiffness), ("hardening", hardening)), formula=Formula(energy), trusted=True,
+    )  # fmt: skip
 
 
 def _turning(interface: Interface, stiffness: float) -> Storage:

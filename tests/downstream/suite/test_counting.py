@@ -1,5 +1,5 @@
 import counting
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ephs.testing import (
@@ -18,6 +18,9 @@ from ephs.testing import (
     systems,
 )
 
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
+
 
 @given(nestings(max_depth=2))
 def test_power_ports_are_those_of_the_boxes_that_are_left(nesting):
@@ -35,13 +38,12 @@ def test_bounds_are_kept(pattern):
     assert 1 <= counting.boxes(pattern) <= 2
 
 
-@settings(deadline=None)
 @given(systems())
 def test_flattening_keeps_the_dissipators(system):
     assert counting.dissipators(system.flatten()) == counting.dissipators(system)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(mechanisms(max_bodies=2))
 def test_mechanisms_have_mass(scene):
     assert counting.mass(scene) >= 0.0
@@ -65,7 +67,7 @@ def test_registered_types(data):
         assert isinstance(data.draw(st.from_type(kind)), kind)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(systems())
 def test_the_laws_of_systems(system):
     check_functoriality(system)
@@ -73,7 +75,7 @@ def test_the_laws_of_systems(system):
     check_entropy_production(system)
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @given(systems(max_depth=1))
 def test_the_discrete_functor(system):
     check_natural(system)
