@@ -13,7 +13,7 @@ import numpy as np
 import ephs
 from benchmarks.hard import CASES, Case
 from benchmarks.report import Report
-from ephs.mechanics.methods.registry import AUTO, METHODS, Method
+from ephs.mechanics.methods.registry import AUTO, METHODS, MethodEntry
 from ephs.mechanics.scene.errors import SceneWarning
 from ephs.show.charts.outcomes import right
 from ephs.show.charts.runs import ChartRun, RunEnding, RunSetting, attempt
@@ -63,12 +63,12 @@ class Cell:
     said: str
 
 
-def methods() -> dict[str, Method]:
+def methods() -> dict[str, MethodEntry]:
     """Methods by name, ``auto`` first."""
     return {AUTO.name: AUTO, **METHODS}
 
 
-def settings(case: Case, method: Method) -> Iterator[RunSetting]:
+def settings(case: Case, method: MethodEntry) -> Iterator[RunSetting]:
     """The settings of a case that a method takes."""
     for kind, values, takes in (("step", case.steps, method.fixed), ("tolerance", case.tolerances, method.adaptive)):
         yield from (RunSetting(kind, value) for value in values if takes)
@@ -92,7 +92,7 @@ def judged(case: Case, setting: RunSetting, run: ChartRun) -> tuple[Kind, float 
     return kind, min(error, float(np.finfo(float).max)), found
 
 
-def cells(case: Case, names: Mapping[str, Method] | None = None, limit: float = LIMIT) -> list[Cell]:
+def cells(case: Case, names: Mapping[str, MethodEntry] | None = None, limit: float = LIMIT) -> list[Cell]:
     """All results of a case."""
     found: list[Cell] = []
     times = np.linspace(0.0, case.until, case.instants + 1)

@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from ephs.solve.exchange.coupling import Bond as Bond
     from ephs.solve.exchange.errors import ExchangeError as ExchangeError
     from ephs.solve.exchange.exchange import Exchange as Exchange
+    from ephs.solve.methods.own import Method as Method
     from ephs.solve.motion_law import HarmonicMotion as HarmonicMotion
     from ephs.solve.motion_law import PolynomialMotion as PolynomialMotion
     from ephs.solve.motion_law import TabulatedMotion as TabulatedMotion
@@ -106,6 +107,7 @@ _HOMES = {
     "ephs.solve.exchange.coupling": ("Bond",),
     "ephs.solve.exchange.errors": ("ExchangeError",),
     "ephs.solve.exchange.exchange": ("Exchange",),
+    "ephs.solve.methods.own": ("Method",),
     "ephs.solve.motion_law": ("HarmonicMotion", "PolynomialMotion", "TabulatedMotion"),
     "ephs.solve.sampled": ("Sampled",),
     "ephs.modelica.errors": ("ModelicaError",),

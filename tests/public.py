@@ -21,7 +21,7 @@ CLASSES = (
     "ephs.mechanics.linear.Mode",
     "ephs.mechanics.linear.PortHamiltonian",
     "ephs.mechanics.linear.StateSpace",
-    "ephs.mechanics.methods.registry.Method",
+    "ephs.mechanics.methods.registry.MethodEntry",
     "ephs.mechanics.motion.motion.BodyMotion",
     "ephs.mechanics.motion.motion.JointMotion",
     "ephs.mechanics.sensitivity.Fit",

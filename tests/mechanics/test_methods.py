@@ -14,7 +14,7 @@ from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.methods import registry
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.registry import METHODS, Method, on_joints, register_method
+from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.solve.stepping import Attempt
 from tests.mechanics.momenta import momenta
 
@@ -366,7 +366,9 @@ class Midpoint(ReducedMethod):
 
 def test_a_method_of_ones_own(monkeypatch):
     monkeypatch.setattr(registry, "METHODS", dict(METHODS))
-    own = Method("explicit-midpoint", 2, False, True, False, True, "the explicit midpoint rule", on_joints(Midpoint))
+    own = MethodEntry(
+        "explicit-midpoint", 2, False, True, False, True, "the explicit midpoint rule", on_joints(Midpoint)
+    )
     register_method(own)
     with pytest.raises(ephs.OptionError, match="a name that is not taken"):
         register_method(own)

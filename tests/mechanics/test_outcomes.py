@@ -11,7 +11,7 @@ import ephs
 from ephs import Outcome
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.registry import METHODS, Method, on_joints
+from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints
 from ephs.solve import loop
 from ephs.solve.errors import SolveError
 from ephs.solve.methods import factors
@@ -181,7 +181,7 @@ def test_arithmetic_of_a_method_of_ones_own_fails_by_name():
         return Wrong(equations, control)
 
     mine: object = None
-    method = Method("wrong", 5, False, True, False, True, "", on_joints(make))
+    method = MethodEntry("wrong", 5, False, True, False, True, "", on_joints(make))
     with pytest.raises(ephs.SimulationError) as caught:
         ephs.simulate(pendulum(), 1.0, step=0.01, method=method)
     assert caught.value.outcome is Outcome.SINGULAR and caught.value.equation == "Singular matrix"

@@ -183,9 +183,9 @@ class Restless(ReducedMethod):
 
 
 def test_a_method_that_cannot_say_where_it_stands_begins_anew(copies, tmp_path):
-    from ephs.mechanics.methods.registry import Method, on_joints
+    from ephs.mechanics.methods.registry import MethodEntry, on_joints
 
-    method = Method("restless", 5, False, True, False, True, "one's own", on_joints(Restless))
+    method = MethodEntry("restless", 5, False, True, False, True, "one's own", on_joints(Restless))
     options = {"method": method, "step": 0.02}
     whole = simulate(SCENE, options)
     simulate(SCENE, options, journal=tmp_path / "run.journal")

@@ -31,7 +31,8 @@ from ephs.solve.problem import State as States
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
-    from ephs.mechanics.methods.registry import Method
+    from ephs.mechanics.methods.registry import MethodEntry
+    from ephs.solve.methods.own import Method
 
 
 @final
@@ -334,7 +335,9 @@ class Dynamics:
         """Exact derivatives by the configuration of velocities: constraints' rows, cut joints, bodies."""
         return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
 
-    def step(self, state: State, h: float, method: "str | Method" = "rk54", *, forces: ByJoint | None = None) -> State:
+    def step(
+        self, state: State, h: float, method: "str | Method | MethodEntry" = "rk54", *, forces: ByJoint | None = None
+    ) -> State:
         """The state h seconds later, by one step of a method with constant steps.
 
         Each step is a start of its own: what a method remembers from step to step (alpha: accelerations) begins anew.

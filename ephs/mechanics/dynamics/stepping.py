@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics.placing import ByJoint
-from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.methods.explicit import Tableau, tableau
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import Setting, chosen
 from ephs.mechanics.runs.pushes import sum_of
@@ -19,10 +19,11 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.errors import OptionError, number_of
+from ephs.solve.methods.own import Method
 from ephs.solve.problem import Problem, Signal
 
 if TYPE_CHECKING:
-    from ephs.mechanics.methods.registry import Method
+    from ephs.mechanics.methods.registry import MethodEntry
 
 RTOL, ATOL = 1e-10, 1e-12
 """Tolerances of the equations of one implicit step: near rounding; its error depends on its length."""
@@ -37,7 +38,7 @@ class Steps:
         self._problem, self._equations = problem, equations
 
     def step(
-        self, state: ReducedState, h: float, method: "str | Method", forces: ByJoint | None
+        self, state: ReducedState, h: float, method: "str | Method | MethodEntry", forces: ByJoint | None
     ) -> ReducedState | Mapping[Path, Array]:
         """The state of the reduced form, or all states of the system where the method is not of that form.
 
@@ -53,8 +54,8 @@ class Steps:
         h = number_of("h", h)
         if not (np.isfinite(h) and h != 0.0):
             raise OptionError("h", h, "a number of seconds other than 0")
-        if method in EXPLICIT:
-            return self._explicit(state, h, str(method))
+        if method in EXPLICIT or isinstance(method, Method):
+            return self._explicit(state, h, tableau(method, chosen=False))
         of, _ = chosen(method, self._problem, step=abs(h))
         tolerance = Tolerance.of("rtol", RTOL, RTOL), Tolerance.of("atol", ATOL, ATOL)
         control = Control(*tolerance, abs(h), 0.0, np.inf, None)
@@ -91,10 +92,9 @@ class Steps:
                 signals[edge.port] = sum_of(signals[edge.port], Signal(values[edge.freedoms]))
         return replace(self._problem, signals=signals)
 
-    def _explicit(self, state: ReducedState, h: float, method: str) -> ReducedState:
+    def _explicit(self, state: ReducedState, h: float, of: Tableau) -> ReducedState:
         """A step without error estimate."""
         eq = self._equations
-        of = tableau(method)
         y0, y1, k = eq.vector(state), np.empty(eq.size), np.zeros((len(of.arrays["a"]), eq.size))
         k[0] = eq.rates(state.t, state.q, y0)
         eq.stages(state, of.arrays, of.c, h, y0, k, y1)

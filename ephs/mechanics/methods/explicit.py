@@ -3,7 +3,7 @@
 Steps of a mechanism on which nothing but given constants acts are taken many in one compiled call.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, final
@@ -19,6 +19,7 @@ from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.march import STEPS
 from ephs.solve.march.account import WHOLE, WORTH
+from ephs.solve.methods.own import Method, coefficients_of
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
@@ -56,9 +57,17 @@ class Tableau:
         return tuple(self.arrays[name] for name in ("error", "coarse")[: 1 + min(1, int(self.arrays["eighth"][0]))])
 
 
+def tableau(method: str | Method, *, chosen: bool = True) -> Tableau:
+    """The method rk54 or rk87, or one of a user's own; ``chosen``: its steps are, by an estimate of their error."""
+    if isinstance(method, str):
+        return _named(method)
+    of = coefficients_of(method, chosen=chosen)
+    arrays = {"a": np.ascontiguousarray(of.extended[:, :-1]), "error": of.error, "coarse": np.zeros(of.error.size)}
+    return Tableau(method.name, of.order, arrays | _explicit(of.b, two=False), of.a.sum(axis=1), float(of.power))
+
+
 @cache
-def tableau(name: str) -> Tableau:
-    """The method rk54 or rk87."""
+def _named(name: str) -> Tableau:
     if name == "rk87":
         arrays = {"a": _steps(t.A8, t.B8), "error": np.array(t.E8_5), "coarse": np.array(t.E8_3)}
         return Tableau(name, 8, arrays | _explicit(t.B8, two=True), np.array(t.C8), 8.0)
@@ -66,7 +75,7 @@ def tableau(name: str) -> Tableau:
     return Tableau(name, 5, arrays | _explicit(t.B5, two=False), np.array(t.C5), 5.0)
 
 
-def _explicit(b: tuple[float, ...], *, two: bool) -> dict[str, Any]:
+def _explicit(b: Sequence[float] | Array, *, two: bool) -> dict[str, Any]:
     """Scheme of stages without iteration, with one estimate or two that are combined."""
     return {"guess": np.zeros((0, len(b))), "eighth": np.array([int(two)], dtype=np.int64)}
 

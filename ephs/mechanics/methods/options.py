@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ephs.mechanics.methods.registry import Method
+from ephs.mechanics.methods.registry import MethodEntry
 from ephs.mechanics.tree.equations.accounts import KEEP
 from ephs.mechanics.tree.finding.roles import strikes
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.problem import Problem
 
 
-def options_of(method: Method, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:
+def options_of(method: MethodEntry, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:
     """The options of a run.
 
     Raises

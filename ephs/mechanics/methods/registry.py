@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, final
+from warnings import warn
 
 from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.roles import strikes
@@ -10,6 +11,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.control import Control, Policy, Proportional, Symmetric
 from ephs.solve.errors import OptionError, nearest_of
+from ephs.solve.methods import own
 from ephs.solve.methods.driven import ComponentMethod
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model
@@ -46,7 +48,7 @@ class Setting:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Method:
+class MethodEntry:
     """Properties of a method for its choice, and its constructor.
 
     Parameters
@@ -126,13 +128,28 @@ def _corrected(make: Callable[[Any, Control], Any]) -> Callable[..., Any]:
     return made
 
 
-def _tableau(name: str) -> Callable[..., Any]:
+def _tableau(of: str | own.Method) -> Callable[..., Any]:
     def make(equations: Any, control: Control) -> Any:
         from ephs.mechanics.methods.explicit import Explicit, tableau
 
-        return Explicit(equations, control, tableau(name))
+        return Explicit(equations, control, tableau(of, chosen=control.step is None))
 
     return make
+
+
+def entry_of(method: own.Method) -> MethodEntry:
+    """The properties of an explicit method of one's own.
+
+    Raises
+    ------
+    OptionError
+        Its stages or its estimate are none.
+    """
+    order = own.coefficients_of(method).order
+    make = on_joints(_corrected(_tableau(method)))
+    return MethodEntry(
+        method.name, order, True, True, False, True, f"{method.name}, explicit", make, ("keep",), impacts=True
+    )
 
 
 def _alpha(equations: Any, control: Control, **options: Any) -> Any:
@@ -216,27 +233,28 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     )
 
 
-METHODS: dict[str, Method] = {}
+METHODS: dict[str, MethodEntry] = {}
 """The registered methods."""
 
 
-def register_method(method: Method) -> None:
-    """Register a method for `simulate` by name.
+def register_method(method: own.Method | MethodEntry) -> None:
+    """Register a method for `simulate` by name: one of one's own, or the properties of one.
 
     Raises
     ------
     OptionError
         The name is in use, or the method supports neither chosen nor constant steps.
     """
-    if method.name in METHODS or method.name == "auto":
-        raise OptionError("method", method.name, "a name that is not taken")
-    if not (method.adaptive or method.fixed) or not (method.systems or method.scenes):
-        raise OptionError("method", method.name, "steps chosen or constant, systems or scenes")
-    METHODS[method.name] = method
+    entry = entry_of(method) if isinstance(method, own.Method) else method
+    if entry.name in METHODS or entry.name == "auto":
+        raise OptionError("method", entry.name, "a name that is not taken")
+    if not (entry.adaptive or entry.fixed) or not (entry.systems or entry.scenes):
+        raise OptionError("method", entry.name, "steps chosen or constant, systems or scenes")
+    METHODS[entry.name] = entry
 
 
 for _method in (
-    Method(
+    MethodEntry(
         "natural",
         2,
         True,
@@ -249,7 +267,7 @@ for _method in (
         lawful=True,
         undamped=Natural,
     ),
-    Method(
+    MethodEntry(
         "natural4",
         4,
         True,
@@ -262,7 +280,7 @@ for _method in (
         lawful=True,
         undamped=_of_order_4,
     ),
-    Method(
+    MethodEntry(
         "variational",
         2,
         False,
@@ -274,12 +292,12 @@ for _method in (
         ("keep",),
         undamped=Natural,
     ),
-    Method("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau, ("keep",), impacts=True),
-    Method(
+    MethodEntry("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau, ("keep",), impacts=True),
+    MethodEntry(
         "alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho", "keep")
     ),
     *(
-        Method(
+        MethodEntry(
             name,
             order,
             True,
@@ -294,7 +312,7 @@ for _method in (
         for name, order, more in (("rk54", 5, ""), ("rk87", 8, ", many digits"))
     ),
     *(
-        Method(
+        MethodEntry(
             f"gauss{order}",
             order,
             True,
@@ -308,7 +326,7 @@ for _method in (
         )
         for order in (4, 6, 8)
     ),
-    Method(
+    MethodEntry(
         "semi",
         3,
         True,
@@ -319,7 +337,7 @@ for _method in (
         on_joints(_corrected(_semi)),
         ("keep",),
     ),
-    Method("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
+    MethodEntry("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
 ):
     register_method(_method)
 
@@ -333,14 +351,14 @@ def _for_scenes(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         return METHODS["natural"].make(setting)
 
 
-AUTO = Method(
+AUTO = MethodEntry(
     "auto", 8, True, False, False, True, "rk54 or rk87, radau where stiff", _for_scenes, ("keep",), impacts=True
 )
-"""Method behind `auto` for mechanisms in joint coordinates."""
+"""MethodEntry behind `auto` for mechanisms in joint coordinates."""
 
 
-def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple[Method, str]:
-    """The method of a name, and for ``auto`` the reason; a method as a value is returned unchanged.
+def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: float | None) -> tuple[MethodEntry, str]:
+    """The method of a name, and for ``auto`` the reason; a method as a value is taken as it is.
 
     Raises
     ------
@@ -352,10 +370,12 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
         if hard is not None:
             return (AUTO, "a mechanism with hard contacts") if step is None else (METHODS["rk54"], "hard contacts")
         return _for_all(problem, step)
-    if not isinstance(name, Method) and name not in METHODS:
+    if isinstance(name, own.Method):
+        name = entry_of(name)
+    if not isinstance(name, MethodEntry) and name not in METHODS:
         known = ("auto", *METHODS)
-        raise OptionError("method", name, f"one of {', '.join(known)}" + nearest_of(name, known))
-    method = name if isinstance(name, Method) else METHODS[name]
+        raise OptionError("method", name, f"one of {', '.join(known)}, or an ephs.Method" + nearest_of(name, known))
+    method = name if isinstance(name, MethodEntry) else METHODS[name]
     name = method.name
     if problem.scene is not None and not method.scenes:
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
@@ -369,7 +389,7 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
     return method, ""
 
 
-def _for_all(problem: Problem, step: float | None) -> tuple[Method, str]:
+def _for_all(problem: Problem, step: float | None) -> tuple[MethodEntry, str]:
     if step is not None:
         return METHODS["natural"], "a constant step is given"
     if problem.scene is not None:
@@ -388,3 +408,10 @@ def _for_all(problem: Problem, step: float | None) -> tuple[Method, str]:
 def _flat(problem: Problem) -> bool:
     """Whether all states lie in vector spaces."""
     return all(manifold(slot.quantity.space).code == VECTOR for slot in problem.descriptor.states)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Method":
+        warn("registry.Method is called MethodEntry; ephs.Method is a method of one's own", DeprecationWarning, 2)
+        return MethodEntry
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,7 +7,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.methods.registry import METHODS, Method, Setting, chosen
+from ephs.mechanics.methods.registry import METHODS, MethodEntry, Setting, chosen
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds
@@ -38,7 +38,7 @@ class Course:
     """
 
     problem: Problem
-    method: Method
+    method: MethodEntry
     start: float
     end: float
     control: Control

@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.mechanics.constraints.redundancy import explain
 from ephs.mechanics.methods.options import options_of
-from ephs.mechanics.methods.registry import METHODS, Method, chosen
+from ephs.mechanics.methods.registry import METHODS, MethodEntry, chosen
 from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.views import view_of
@@ -51,6 +51,7 @@ from ephs.solve.ending import solution_of
 from ephs.solve.errors import OptionError, count_of, failing_at, nearest_of, number_of
 from ephs.solve.events import events_of
 from ephs.solve.journal import Journal
+from ephs.solve.methods.own import Method, coefficients_of
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.record import Record
 from ephs.solve.result.solution import Solution
@@ -75,7 +76,7 @@ def simulate(
     *,
     t0: float = 0.0,
     initial: Mapping[str, "ArrayLike"] | None = None,
-    method: str | Method = "auto",
+    method: str | Method | MethodEntry = "auto",
     rtol: "float | Mapping[str, float]" = RTOL,
     atol: "float | Mapping[str, float]" = ATOL,
     step: float | None = None,
@@ -103,10 +104,10 @@ def simulate(
         Values of states by path. Other states start at the identity in a system, and as the scene says in a scene.
     method
         One of `ephs.mechanics.methods.registry.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
-        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"gauss4"``, ``"gauss6"``, ``"gauss8"``, ``"semi"``, ``"ida"``; a user's
-        `Method`; or ``"auto"``: with ``step`` natural, with hard contacts rk54; without it rk54 or rk87 for mechanisms,
-        semi where surfaces may touch and tolerances are coarse, and radau when stability limits the steps, radau for
-        systems on vector spaces, natural4 for others.
+        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"gauss4"``, ``"gauss6"``, ``"gauss8"``, ``"semi"``, ``"ida"``; a method
+        of one's own, an instance of `ephs.Method`; or ``"auto"``: with ``step`` natural, with hard contacts rk54;
+        without it rk54 or rk87 for mechanisms, semi where surfaces may touch and tolerances are coarse, and radau when
+        stability limits the steps, radau for systems on vector spaces, natural4 for others.
     rtol, atol
         Tolerances without ``step``: the error of each state x should be at most ``atol + rtol·|x|``. The unit of atol
         is that of the state; for a mechanism far from 1 m, 1 kg and 1 s it is made of the mechanism's own length, mass
@@ -191,6 +192,8 @@ def simulate(
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
         "options": options, "inputs": given, "jumps": jumps, "events": [event.name for event in watched],
     }  # fmt: skip
+    if isinstance(method, Method):  # another method may have the same name
+        asked["coefficients"] = coefficients_of(method, chosen=step is None).numbers
     for one in held:
         if one.sampled.period < control.least * unit:
             raise OptionError("min_step", min_step, f"at most the period of {one.name}, {one.sampled.period!r} s")
@@ -228,7 +231,7 @@ def simulate(
     return judged(solution, audit)
 
 
-def _fits(form: str, method: Method) -> None:
+def _fits(form: str, method: MethodEntry) -> None:
     forms = (*method.forms, "reduced")
     if form not in forms:
         raise OptionError("form", form, f"{' or '.join(forms)}, which {method.name} solves")

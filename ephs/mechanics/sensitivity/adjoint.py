@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
@@ -18,6 +19,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError
+from ephs.solve.methods.own import Method
 from ephs.solve.sparse import Index
 from ephs.solve.threads import in_one_thread
 
@@ -54,7 +56,7 @@ def gradient(
     *,
     t0: float = 0.0,
     initial: "Mapping[str, ArrayLike] | None" = None,
-    method: str = "rk87",
+    method: str | Method = "rk87",
     rtol: float = RTOL,
     atol: float = ATOL,
     step: float | None = None,
@@ -78,7 +80,7 @@ def gradient(
         ``joints.pin.coordinate`` or ``joints.pin.rate`` -> (n,) or (n, d), for the degrees of freedom of a joint of the
         tree whose elements are its coordinates; of a system the joint's path, ``linkage.joints.pin.rate``.
     method
-        ``"rk54"`` or ``"rk87"``.
+        ``"rk54"``, ``"rk87"`` or an `ephs.Method`.
 
     Raises
     ------
@@ -87,8 +89,8 @@ def gradient(
     SimulationError
         The run failed.
     """
-    if method not in ("rk54", "rk87"):
-        raise OptionError("method", method, "rk54 or rk87")
+    if not isinstance(method, Method) and method not in ("rk54", "rk87"):
+        raise OptionError("method", method, "rk54, rk87 or an ephs.Method")
     if not parameters:
         raise OptionError("parameters", parameters, "at least one path")
     family = Family(model, parameters, initial, inputs, None, joints=True)
@@ -100,7 +102,7 @@ def gradient(
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
     grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
-    forward = ExplicitTangent(family, t0, method)
+    forward = ExplicitTangent(family, t0, tableau(method, chosen=step is None))
     point, eq = forward.start(), forward.equations
     seeds = [_seed(eq, name, np.asarray(given, dtype=float), wanted.size) for name, given in weights.items()]
     steps = StepAdjoint(eq.engine, partial(relation_of, family.problem.descriptor), forward.tangents[0][1])

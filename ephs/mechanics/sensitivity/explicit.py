@@ -11,7 +11,7 @@ from typing import Any, Final, Never, final
 
 import numpy as np
 
-from ephs.mechanics.methods.explicit import tableau
+from ephs.mechanics.methods.explicit import Tableau
 from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, Family, Stencil, difference, relation_of, same_shape
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
@@ -95,8 +95,8 @@ class ExplicitTangent:
         Numbers of parameters, and steps with derivatives by these, after a start.
     """
 
-    def __init__(self, family: Family, t0: float, method: str) -> None:
-        self.family, self.t0, self.method = family, t0, tableau(method)
+    def __init__(self, family: Family, t0: float, method: Tableau) -> None:
+        self.family, self.t0, self.method = family, t0, method
         self.equations = Equations(family.problem, t0)
         self._others: dict[tuple[int, float], tuple[Problem, Equations, ReducedState]] = {}
         self._stencils: dict[int, Stencil] = {}

@@ -14,6 +14,7 @@ from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.system import System
 from ephs.solve.errors import OptionError, failing_at, nearest_of
+from ephs.solve.methods.own import Method
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread
@@ -105,7 +106,7 @@ def sensitivity(
     *,
     t0: float = 0.0,
     initial: "Mapping[str, ArrayLike] | None" = None,
-    method: str = "auto",
+    method: str | Method = "auto",
     rtol: float = RTOL,
     atol: float = ATOL,
     step: float | None = None,
@@ -125,8 +126,8 @@ def sensitivity(
         ``joints.pin.coordinate`` (initial values of joints), ``joints.pin.frame1.position[0]``, ``osc.pe.k``, and of a
         system initial values by the paths of its states, ``osc.pe.q``. See `ephs.mechanics.scene.parameters`.
     method
-        ``"rk54"`` or ``"rk87"``, with or without ``step``; ``"natural"`` with ``step``. ``"auto"``: natural with a
-        step, else rk87.
+        ``"rk54"``, ``"rk87"`` or an `ephs.Method`, with or without ``step``; ``"natural"`` with ``step``. ``"auto"``:
+        natural with a step, else rk87.
     inputs
         As for `simulate`: functions of time alone, constant ones for natural.
 
@@ -148,10 +149,12 @@ def sensitivity(
     if times is not None and not (np.all(np.diff(times) > 0.0) and grid[0] <= times.min() and times.max() <= grid[-1]):
         raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
     with failing_at(float(grid[0])):
-        return _along(family, name, grid, times)
+        return _along(family, name, grid, times, chosen=step is None)
 
 
-def _method(method: str, step: float | None) -> str:
+def _method(method: str | Method, step: float | None) -> str | Method:
+    if isinstance(method, Method):
+        return method
     found = method
     if method == "auto":
         found = "natural" if step is not None else "rk87"
@@ -164,17 +167,18 @@ def _method(method: str, step: float | None) -> str:
     return found
 
 
-def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sensitivity:
+def _along(family: Family, method: str | Method, grid: Array, times: Array | None, *, chosen: bool) -> Sensitivity:
     """The tangent along the steps of a grid; kept at its times, or at others, by shortened steps."""
-    t0 = float(grid[0])
+    t0, name = float(grid[0]), method.name if isinstance(method, Method) else method
     if method == "natural":
         from ephs.mechanics.sensitivity.implicit import NaturalTangent
 
         stepper: Any = NaturalTangent(family, t0)
     else:
+        from ephs.mechanics.methods.explicit import tableau
         from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 
-        stepper = ExplicitTangent(family, t0, method)
+        stepper = ExplicitTangent(family, t0, tableau(method, chosen=chosen))
     point = stepper.start()
     wanted = grid if times is None else times
     kept: list[Any] = [point] if wanted[0] == t0 else []
@@ -185,11 +189,11 @@ def _along(family: Family, method: str, grid: Array, times: Array | None) -> Sen
             point = stepper.step(point, after - before)
         if after in wanted:
             kept.append(point)
-    solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], method)
+    solution = replay(family.problem, wanted, [stepper.row(p) for p in kept], name)
 
     def neighbour(number: int, model: float, states: float) -> Solution:
         problem, rows = stepper.beside(number, model, states, kept)
-        return replay(problem, wanted, rows, method)
+        return replay(problem, wanted, rows, name)
 
     sizes = [max((stepper.size(p, j) for p in kept), default=0.0) for j in range(len(family.parameters))]
     offsets = np.array([NEAR / size if size else 1.0 for size in sizes])

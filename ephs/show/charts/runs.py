@@ -9,7 +9,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.methods.registry import Method
+from ephs.mechanics.methods.registry import MethodEntry
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundle import Array
@@ -17,6 +17,7 @@ from ephs.semantics.system import System
 from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.errors import Interrupted, SimulationError
 from ephs.solve.errors import Outcome as Failure
+from ephs.solve.methods.own import Method
 from ephs.solve.result.solution import Solution
 
 MOST_STEPS = 500_000
@@ -93,7 +94,7 @@ class _TimeLimit:
 def attempt(
     model: Scene | System,
     until: float,
-    method: str | Method,
+    method: str | Method | MethodEntry,
     setting: RunSetting,
     *,
     limit: float,

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.registry import Method, on_joints
+from ephs.mechanics.methods.registry import MethodEntry, on_joints
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import FOLLOWED
@@ -110,11 +110,11 @@ class TrapezoidalIndex3(_OnLoops):
 SPECIMENS = {
     method.name: method
     for method in (
-        Method(
+        MethodEntry(
             "velocity-midpoint", 2, False, True, False, True,
             "specimen: constraints on velocities, positions drift", on_joints(VelocityMidpoint),
         ),
-        Method(
+        MethodEntry(
             "trapezoidal-index3", 2, False, True, False, True,
             "specimen: constraints on positions, multipliers swing", on_joints(TrapezoidalIndex3),
         ),

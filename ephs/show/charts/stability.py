@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.methods.registry import METHODS, Method
+from ephs.mechanics.methods.registry import METHODS, MethodEntry
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import CONDITION, SILENT, Outcome, horizon, judge, right
@@ -66,7 +66,7 @@ class Cell:
     condition: float
 
 
-def settings_of(family: Family, value: float, method: Method, *, quick: bool = False) -> list[RunSetting]:
+def settings_of(family: Family, value: float, method: MethodEntry, *, quick: bool = False) -> list[RunSetting]:
     """A method's settings for a value: constant steps, the coarse ones first, then tolerances."""
     steps = family.steps_at(value)[:1] if quick else family.steps_at(value)
     found = [RunSetting("step", step) for step in steps] if method.fixed else []
@@ -146,7 +146,7 @@ class _ValueTrial:
         truth = replace(truth, motion=truth.motion.until(count))
         return cls(family, value, family.make(value), times, truth, float(conditions[count - 1]), why)
 
-    def cell(self, method: Method, setting: RunSetting, limit: float, slow: RunSetting | None) -> Cell:
+    def cell(self, method: MethodEntry, setting: RunSetting, limit: float, slow: RunSetting | None) -> Cell:
         """One run, omitted if a coarser one took too long."""
         if slow is None:
             until = float(self.times[-1])

@@ -97,6 +97,7 @@ def attempt(
 
     if errors is not None:
         on.when(tableau.guess.rows > 0, lambda: collocated(errors))
+    on.when(on.same(count, 1), lambda: copy(on, start, last))
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(one))
     return status.value
 

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.sensitivity import explicit
 from ephs.mechanics.sensitivity.family import Family
 from ephs.mechanics.tree.engine.tangents import StepTangent
 from ephs.solve.errors import OptionError
 from tests.mechanics.sensitivity.test_exact import PENDULUM, pendulum
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
+from tests.solve.test_own_methods import Kutta
 
 NEAR = 1e-12
 """Part of the largest derivative: both ways round the same derivatives of some thousand operations a step."""
@@ -18,7 +20,7 @@ READ = 1e-9
 PATHS = ["bodies.coupler.mass", "bodies.rocker.inertia[2]", "joints.main.friction", "joints.main.drive",
          "joints.knee.frame1.position[0]", "joints.main.coordinate", "joints.main.rate"]  # fmt: skip
 TIMES = [0.08, 0.16]
-STEPS = {"rk54": 0.02, "rk87": 0.08}
+STEPS = {"rk54": 0.02, "rk87": 0.08, Kutta(): 0.02}
 WEIGHTS = {"joints.main.coordinate": [0.0, 1.0], "joints.main.rate": [-0.3, 0.7]}
 STRIKING = """
 format = 1
@@ -68,7 +70,8 @@ def backwards(method, paths=PATHS):
 
 def forwards(scene, paths, times, weights, method, step):
     """The same by tangents carried forward: what elements and rates are by the parameters."""
-    along = explicit.ExplicitTangent(Family(scene, paths, None, None, None, joints=True), 0.0, method)
+    family = Family(scene, paths, None, None, None, joints=True)
+    along = explicit.ExplicitTangent(family, 0.0, tableau(method, chosen=False))
     point, layout, found = along.start(), along.equations.layout, np.zeros(len(paths))
     for k in range(round(times[-1] / step)):
         point = along.step(point, step)
@@ -80,7 +83,7 @@ def forwards(scene, paths, times, weights, method, step):
     return found
 
 
-@pytest.mark.parametrize("method", ["rk54", "rk87"])
+@pytest.mark.parametrize("method", STEPS, ids=str)
 def test_steps_with_loops_friction_and_the_balance_kept_as_tangents_say(method, monkeypatch):
     scene = ephs.load("scenes/four-bar.toml")
     found, expected = backwards(method), forwards(scene, PATHS, TIMES, WEIGHTS, method, STEPS[method])

@@ -131,7 +131,7 @@ def test_inputs_of_time_are_taken_stage_by_stage():
     ]
     ends = []
     for one in family:
-        steps = ExplicitTangent(one, 0.0, "rk87")
+        steps = ExplicitTangent(one, 0.0, tableau("rk87"))
         ends.append(steps.step(steps.start(), 0.04))
     assert np.abs(ends[0].y - ends[1].y).max() < EXACT * np.abs(ends[0].y).max()
     with pytest.raises(ephs.OptionError, match="functions of time"):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names, read
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import Family
@@ -35,7 +36,7 @@ at = [0.5, 0.0, 0.0]
 
 
 def tangent(scene, paths):
-    return ExplicitTangent(Family(scene, paths, None, None, None, joints=True), 0.0, "rk54")
+    return ExplicitTangent(Family(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
 
 
 def weights(scene):
