@@ -11,11 +11,11 @@ from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function, known
-from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells, Variable
+from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, Matrix, RealCells, Variable, Vector
 from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
 from ephs.semantics.stage.plain import elementary
 from ephs.semantics.stage.reaching import Part, Reached
-from ephs.semantics.stage.records import Record
+from ephs.semantics.stage.records import Record, Table
 
 _INTRINSIC: Final[dict[Function, str]] = {
     "sqrt": "sqrt",
@@ -324,6 +324,18 @@ class Machine(Evaluator):
         return _Emitted(name, returns, form)
 
 
+_PASSED: Final[dict[type, str]] = {Vector: "start", Integers: "start", Matrix: "start", Table: "size"}
+"""Integers that are handed over also where they are known: one function then serves all windows of memory."""
+
+
+def _counted(to: Writer, value: Integer, leaf: Callable[[str, str], None]) -> Any:
+    """Hand over an integer, known or not."""
+    if isinstance(value, int):
+        leaf("i64", to.of_integer(value))
+        return (WholeSymbol, False)
+    return _flat(to, value, leaf)
+
+
 def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
     """Hand over the operands in a value, and return its form: a hashable picture with holes for them."""
     match value:
@@ -350,8 +362,10 @@ def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
             parts = (value.integers, value.integer_start, value.reals, value.real_start)
             return (Record, type(value), *(_flat(to, part, leaf) for part in parts))
         case _ if is_dataclass(value) and not isinstance(value, type):
-            parts = [getattr(value, field.name) for field in fields(value)]
-            return (is_dataclass, type(value), *(_flat(to, part, leaf) for part in parts))
+            parts = {field.name: getattr(value, field.name) for field in fields(value)}
+            passed = _PASSED.get(type(value))
+            forms = [_counted(to, x, leaf) if name == passed else _flat(to, x, leaf) for name, x in parts.items()]
+            return (is_dataclass, type(value), *forms)
         case float():
             return (float, type(value), float(value).hex())
         case _:

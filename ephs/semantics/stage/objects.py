@@ -68,7 +68,7 @@ def telling(say: Callable[[str], None]) -> Generator[None]:
         _TOLD.reset(before)
 
 
-def compiled(text: str, name: str = "program") -> Library:
+def compiled(text: str, name: str = "program", most: int = LEVEL) -> Library:
     """Return a module in machine code for this process, compiled if neither package nor store has it.
 
     Parameters
@@ -77,6 +77,8 @@ def compiled(text: str, name: str = "program") -> Library:
         Assembly text of LLVM.
     name
         What is told where it is compiled.
+    most
+        Highest level that pays: of large programs that are run a few times.
 
     Raises
     ------
@@ -87,7 +89,7 @@ def compiled(text: str, name: str = "program") -> Library:
     code = shipped(text, fitting(target))
     if code is not None:
         return load(code)
-    optimisation = level()
+    optimisation = min(level(), most)
     file = name_of(text, target, optimisation)
     code = STORE.read(file)
     if code is None:

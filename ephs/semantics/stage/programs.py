@@ -16,6 +16,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.known import known
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
+from ephs.semantics.stage.llvm import LEVEL
 from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
 from ephs.semantics.stage.reaching import Atom
@@ -34,14 +35,16 @@ class Program:
     ----------
     name
         The program's name: functions of the object code are named `<name>_<entry>`.
+    level
+        Highest level of optimisation that pays, see `objects.level`.
     **entries
         The entry functions, each under its name.
     """
 
-    def __init__(self, name: str, **entries: Entry) -> None:
+    def __init__(self, name: str, *, level: int = LEVEL, **entries: Entry) -> None:
         if not entries or not name.isidentifier():
             raise StageError("entries", where=name, found=", ".join(entries) or "none")
-        self.name, self.entries = name, MappingProxyType(entries)
+        self.name, self.level, self.entries = name, level, MappingProxyType(entries)
 
     def tangent(self, directions: int = 1) -> "Program":
         """Return the program of all entry functions' tangents, see `Entry.tangent`."""
@@ -180,7 +183,8 @@ def _tangent(program: Program, directions: int) -> Program:
 
 @cache
 def _taped(program: Program) -> Program:
-    return Program(f"{program.name}_taped", **{name: entry.taped() for name, entry in program.entries.items()})
+    taped = {name: entry.taped() for name, entry in program.entries.items()}
+    return Program(f"{program.name}_taped", level=0, **taped)
 
 
 @cache
@@ -215,7 +219,7 @@ def _emitted(program: Program, members: int, shared: tuple[str, ...]) -> tuple[s
 @cache
 def _compiled(program: Program, members: int, shared: tuple[str, ...]) -> Mapping[str, Call]:
     text, blocks, results = _staged(program, members, shared)
-    library = compiled(text + blocks, program.name)
+    library = compiled(text + blocks, program.name, program.level)
 
     def trail(name: str) -> tuple[int | None, ...]:
         return () if members == 1 or name in shared else (members,)

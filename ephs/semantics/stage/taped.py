@@ -6,15 +6,17 @@ run and one reading, however many there are. Griewank and Walther, *Evaluating D
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Final, TypeAlias, final
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, wraps
+from typing import Any, Final, TypeAlias, cast, final
 
 from ephs.semantics.stage.duals import RULES
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
-from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells, Vector
+from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells, Variable, Vector
 from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
 from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
+from ephs.semantics.stage.records import Record
 
 POSITION, ROWS, CAPACITY, COUNT = range(4)
 """Counters of a tape: where the next entry goes, the number of the next row, room for entries; how many counters."""
@@ -243,7 +245,85 @@ class Taped(Evaluator):
         return self.base._reach(Reached(signature, function.address), passed)
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        return function(on, *arguments)  # the tape is memory of the function that is emitted
+        if on is not self:
+            return function(on, *arguments)
+        passed = self.base.call(_writing(function), self.tape, _swapped(arguments, self._passed))
+        return _swapped(passed, self._taken)
+
+    def _passed(self, number: Any) -> Any:
+        """Return what stands for a number or for memory beside a tape that is handed over: its row is written."""
+        match number:
+            case Traced():
+                return _PassedNumber(number.value, self.place(number.terms))
+            case TapedCells():
+                return _PassedCells(number.values, number.places)
+            case _:
+                return None
+
+    def _taken(self, passed: Any) -> Any:
+        """Return the number or the memory that something stands for: `_passed` undone."""
+        match passed:
+            case _PassedNumber():
+                return Traced(self, passed.value, ((passed.place, 1.0),))
+            case _PassedCells():
+                return TapedCells(self, passed.values, passed.places)
+            case _:
+                return None
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _PassedNumber:
+    """A traced number without its tape."""
+
+    value: Real
+    place: Integer
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _PassedCells:
+    """Cells of traced numbers without their tape."""
+
+    values: RealCells
+    places: IntegerCells
+
+
+@cache
+def _writing(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A staged function as one that takes the tape that it writes to: emitted once, as the function itself is."""
+
+    @wraps(function)
+    def run(base: Evaluator, tape: Tape, arguments: tuple[Any, ...]) -> Any:
+        on = Taped(base, tape)
+        return _swapped(function(on, *_swapped(arguments, on._taken)), on._passed)
+
+    return run
+
+
+def _swapped(value: Any, swap: Callable[[Any], Any]) -> Any:
+    """A value with what is in it exchanged where ``swap`` does not return None: entries of lists, tuples, records,
+    variables and frozen dataclasses.
+    """
+    found = swap(value)
+    if found is not None:
+        return found
+    match value:
+        case list() | tuple():
+            entries = [_swapped(entry, swap) for entry in cast("list[Any]", value)]
+            return entries if isinstance(value, list) else tuple(entries)
+        case Variable():
+            return Variable[Any](_swapped(cast("Variable[Any]", value).cells, swap))
+        case Record():
+            parts = (value.integers, value.integer_start, value.reals, value.real_start)
+            return type(value)(*(_swapped(part, swap) for part in parts))
+        case Number() | Cells():
+            return value
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            made = cast("Callable[..., Any]", type(value))
+            return made(*(_swapped(getattr(value, field.name), swap) for field in fields(value)))
+        case _:
+            return value
 
 
 @final
