@@ -103,7 +103,7 @@ def gradient(
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
     grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
     forward = ExplicitTangent(family, t0, tableau(method, chosen=step is None))
-    point, eq = forward.start(), forward.equations
+    point, eq = forward.begin(), forward.equations
     seeds = [_seed(eq, name, np.asarray(given, dtype=float), wanted.size) for name, given in weights.items()]
     steps = StepAdjoint(eq.engine, partial(relation_of, family.problem.descriptor), forward.tangents[0][1])
     q, y = point.state.q, eq.vector(point.state)
@@ -122,6 +122,7 @@ def gradient(
                 (by_q if of_q else by_y)[where] += w[place]
         by_q, by_y = steps.back(*states[k], float(grid[k + 1] - grid[k]), by_q, by_y)
         by_y[: eq.nv] = 0.0
+    by_q, by_y = steps.begin(point.state.q, eq.vector(point.state), by_q, by_y)
     found = point.q @ by_q + point.y @ by_y[eq.nv :]
     for which, tangent in forward.tangents:
         for name, slopes in tangent.slopes.items():

@@ -106,6 +106,10 @@ class ExplicitTangent:
 
     def start(self) -> Point:
         """The initial state."""
+        return self._closed(self.begin())
+
+    def begin(self) -> Point:
+        """The initial state, whose derivatives may open its loops."""
         eq, count = self.equations, len(self.family.parameters)
         state = eq.start(self.t0)
         if eq.prescribed.changing:
@@ -132,7 +136,7 @@ class ExplicitTangent:
                 for name in made.slopes:
                     made.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
             self.tangents.append((which, made))
-        return self._closed(point)
+        return point
 
     def step(self, point: Point, h: float) -> Point:
         """One step of h seconds."""

@@ -14,9 +14,9 @@ from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, T
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.known import known
+from ephs.semantics.stage.llvm import LEVEL
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
-from ephs.semantics.stage.llvm import LEVEL
 from ephs.semantics.stage.objects import compiled
 from ephs.semantics.stage.plain import PLAIN
 from ephs.semantics.stage.reaching import Atom

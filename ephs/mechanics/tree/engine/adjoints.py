@@ -1,6 +1,7 @@
 """Reverse accumulation through explicit steps: gradients by all numbers that a step reads."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, final
 
 from ephs.mechanics.tree.engine.engine import Engine
@@ -23,26 +24,39 @@ class StepAdjoint:
     """
 
     def __init__(self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tangent: StepTangent) -> None:
-        program = step_program(looped=engine.looped)
-        given = {name: _values(tangent.arguments[name]) for name in program.entries["step"].kinds}
+        entries = step_program(looped=engine.looped).entries
+        given = {name: _values(tangent.given[name]) for name in entries["step"].kinds}
         self._arrays = {name: given[name] for name in ("base", "start", "q", "y")}
-        given["tables"] = {**given["tables"], **{n: engine.tables[n] for n in ("own", "component", "net")}}
-        self._forward = program.compiled()["step"].bind(*given.values())
+        self._forward = Program("forward", level=0, step=entries["step"]).compiled()["step"].bind(*given.values())
         taped = {**given, "tables": {**given["tables"], **reaching(engine, relation, Program.taped)}}
-        self._back = Gradients(program.entries["step"], **taped)
+        self._back = Gradients(entries["step"], **taped)
         self._sum: Shares | None = None
+        self._close = partial(Gradients, entries["close"], **{name: taped[name] for name in entries["close"].kinds})
+        self._first: Mapping[str, Array] = {}
+        self._looped = engine.looped
 
     @property
     def tables(self) -> Mapping[str, Array]:
-        """The function's derivative by each real number of each table, by its name: the sum over steps taken back."""
-        found = self._sum or {}
-        return {name.removeprefix("tables."): found[name] for name in found if name.startswith("tables.")}
+        """The function's derivative by each real number of each table, by its name: the sum of all taken back."""
+        found, start = self._sum or {}, "tables."
+        of_tables = [name for name in found if name.startswith(start)]
+        return {name.removeprefix(start): found[name] + self._first.get(name, 0.0) for name in of_tables}
 
     def step(self, q: Array, y: Array, h: float) -> tuple[int, Array, Array]:
         """Take a step of h seconds: a status, and elements and y at its end."""
         self._arrays["base"][:], self._arrays["start"][:] = q, y
         status = int(self._forward(h))
         return status, self._arrays["q"].copy(), self._arrays["y"].copy()
+
+    def begin(self, q: Array, y: Array, by_q: Array, by_y: Array) -> tuple[Array, Array]:
+        """Take derivatives by a state whose loops are closed back to one where they are so but for derivatives."""
+        if not self._looped:
+            return by_q, by_y
+        self._arrays["q"][:], self._arrays["y"][:] = q, y
+        closing = self._close()
+        closing.run()
+        self._first = found = closing.pull({"q": by_q, "y": by_y})
+        return found["q"], found["y"]
 
     def back(self, q: Array, y: Array, h: float, by_q: Array, by_y: Array) -> tuple[Array, Array]:
         """Take a function's derivatives by the end of the step from (q, y) back to its start, and to the tables."""

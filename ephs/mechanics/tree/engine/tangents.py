@@ -5,7 +5,7 @@ step does (stages, totals, loops closed at its end) is stated where marches take
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property, partial
 from typing import Any, Final, cast, final
 
 import numpy as np
@@ -147,8 +147,9 @@ class StepTangent:
     ----------
     slopes
         Of the real numbers of each table, (…, directions), by its name: set before steps.
-    arguments
-        What the programs take, by name: pairs of numbers and slopes.
+    given, arguments
+        What the programs take, by name: pairs of numbers and slopes; with tables that call the engine's programs, and
+        their tangents, which the first step compiles.
     pairs, stage
         States, rates and memory among them; rates at (base, start).
     """
@@ -159,10 +160,14 @@ class StepTangent:
     ) -> None:  # fmt: skip
         coordinates, size = engine.sizes
         stages = tableau["a"].shape[0]
-        tables, work, self.slopes = paired_tables(engine, relation)
+        self.slopes: dict[str, Array] = {}
+        self._tangents = partial(reaching, engine, relation, lambda program: program.tangent(DIRECTIONS))
+        self._looped = engine.looped
+        tables = {name: _paired(value, self.slopes, name) for name, value in engine.tables.items()}
+        work = {name: _paired(value, {}, name) for name, value in engine.work.items()}
         coefficients = {name: _paired(value, {}, name) for name, value in tableau.items()}
-        self.arguments: dict[str, Any] = {"tables": tables, "work": work, "tableau": coefficients}
-        arguments = self.arguments
+        self.given: dict[str, Any] = {"tables": tables, "work": work, "tableau": coefficients}
+        arguments = self.given
         shapes: dict[str, tuple[int, ...]] = {
             "base": (coordinates,), "start": (size,), "k": (stages, size), "last": (size,), "y": (size,),
             "q": (coordinates,),
@@ -174,30 +179,37 @@ class StepTangent:
         arguments.update({"control": _paired(Control.table(1), {}, ""), "account": _paired(account, {}, "")})
         counted = 2 * engine.work["force"].size + engine.work["entropy"].size
         arguments.update({"allowed": _pair(np.full(counted, BEYOND)), "h": 0.0, **self.pairs})
-        program = step_tangents(engine.looped).compiled()
+        self._bound: dict[str, Any] = {}
 
-        def bound(name: str, **others: Any) -> Any:
-            given = {**arguments, **others}
-            return program[name].bind(*(given[key] for key in step_program(looped=engine.looped).entries[name].kinds))
+    @cached_property
+    def arguments(self) -> dict[str, Any]:
+        slopes = {name: self.slopes[name] for name in ("own", "component", "net") if name in self.slopes}
+        reached = {name: (value, slopes[name]) if name in slopes else value for name, value in self._tangents().items()}
+        return {**self.given, "tables": {**self.given["tables"], **reached}}
 
-        self._step, self._settle, self._close = bound("step"), bound("settle"), bound("close")
-        self._rates = bound("rates", k=self.stage)
+    def _run(self, name: str, *numbers: float) -> int:
+        """Call an entry function of the tangents, bound when it is first asked for; return its status."""
+        if name not in self._bound:
+            given = {**self.arguments, **({"k": self.stage} if name == "rates" else {})}
+            kinds = step_program(looped=self._looped).entries[name].kinds
+            self._bound[name] = step_tangents(self._looped).compiled()[name].bind(*(given[key] for key in kinds))
+        return int(self._bound[name](*numbers))
 
     def step(self, h: float) -> int:
         """Take a step of h seconds from (base, start) to (q, y); return a status. Inputs are constant in it."""
-        return int(self._step(h))
+        return self._run("step", h)
 
     def close(self) -> int:
         """Put the derivatives of the state (q, y), whose loops are closed, on the constraints; return a status."""
-        return int(self._close())
+        return self._run("close")
 
     def rates(self) -> int:
         """Write the rates at (base, start) to ``stage``; return a status."""
-        return int(self._rates())
+        return self._run("rates")
 
     def settle(self, h: float) -> int:
         """Take the end y of a step of h seconds from (base, start) to a state; return a status."""
-        return int(self._settle(h))
+        return self._run("settle", h)
 
 
 @cache
