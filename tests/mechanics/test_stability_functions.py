@@ -70,9 +70,6 @@ def semi(z):
 FUNCTIONS = {
     "natural": diagonal(1),
     "natural4": diagonal(3),
-    "gauss4": diagonal(2),
-    "gauss6": diagonal(3),
-    "gauss8": diagonal(4),
     "radau": radau,
     "rk54": explicit(tableaux.A5, tableaux.B5),
     "rk87": explicit(tableaux.A8, tableaux.B8),
@@ -103,30 +100,13 @@ def test_a_step_is_the_stability_function(scene, method, h):
         assert np.abs(found[i] - expected).max() <= 1e-11
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.6, 1.0])
-def test_generalised_alpha_is_its_recurrence(scene, rho):
-    """Chung and Hulbert's equations, solved as a linear system for angle, rate and mean acceleration."""
-    h, m, f = 0.05, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
-    gamma = 0.5 + f - m
-    beta = 0.25 * (0.5 + gamma) ** 2
-    stiff, damp = A[1]
-    new = np.array([[1.0, 0.0, -h * h * beta], [0.0, 1.0, -h * gamma], [-(1 - f) * stiff, -(1 - f) * damp, 1 - m]])
-    old = np.array([[1.0, h, h * h * (0.5 - beta)], [0.0, 1.0, h * (1 - gamma)], [f * stiff, f * damp, -m]])
-    y = np.array([*Y, A[1] @ Y])
-    expected = [Y]
-    for _ in range(3):
-        y = np.linalg.solve(new, old @ y)
-        expected.append(y[:2])
-    assert np.abs(states(scene, "alpha", h, 3, options={"rho": rho}) - expected).max() <= 1e-7
-
-
 def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle(scene):
     assert np.abs(states(scene, "variational", 0.1, 1)[1] - diagonal(1)(0.1 * A) @ Y).max() <= 1e-12
 
 
 def test_every_method_of_scenes_with_constant_steps_has_its_test():
     of_scenes = {name for name, m in METHODS.items() if m.scenes and m.fixed}
-    assert of_scenes == {*FUNCTIONS, "alpha", "variational"}
+    assert of_scenes == {*FUNCTIONS, "variational"}
 
 
 # ---- systems without bodies -------------------------------------------------------------------------------------
