@@ -17,7 +17,6 @@ RUNS: dict[str, dict[str, Any]] = {
     "rk54": {"rtol": 1e-8},
     "rk87": {"rtol": 1e-10},
     "radau": {},
-    "alpha": {"step": 1e-3},
     "natural": {"step": 1e-3},
     "natural4": {"step": 2e-3},
 }

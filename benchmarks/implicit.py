@@ -6,6 +6,7 @@ IDA (package scikit-sundae, if it is installed) solves the same scenes in joint 
 from collections.abc import Iterable
 from pathlib import Path
 
+from benchmarks import ida
 from benchmarks.report import Report, table_of
 from benchmarks.work import cell, collect
 
@@ -18,6 +19,7 @@ TARGETS = (1e-3, 1e-5, 1e-7)
 
 def report(out: Path | None = None, cells: Iterable[str] = CELLS) -> Report:
     """The least seconds of a natural method and of IDA by scene and target; a folder keeps what was measured."""
+    ida.register()
     runs = collect(None if out is None else out / "implicit.jsonl", cells, (OWN, OTHERS), TARGETS)
     rows = [cell(name, target, runs, OTHERS) for name in cells for target in TARGETS]
     columns = {

@@ -88,10 +88,7 @@ CELLS = (
 METHODS = {
     "natural": Asked("natural"),
     "natural4": Asked("natural4"),
-    **{name: Asked(name, chosen=True) for name in ("auto", "rk54", "rk87", "radau", "semi", "ida")},
-    **{name: Asked(name) for name in ("gauss4", "gauss6", "gauss8")},
-    "alpha": Asked("alpha"),
-    "alpha, corrected": Asked("alpha", options=BOTH),
+    **{name: Asked(name, chosen=True) for name in ("auto", "rk54", "rk87", "radau", "semi")},
     "variational": Asked("variational"),
     "variational, corrected": Asked("variational", options=BOTH),
 }

@@ -30,12 +30,8 @@ RUNS = {
     "natural4": (0.02, 1.0),
     "variational": (0.02, 0.5),
     "radau": (0.02, 1.0),
-    "alpha": (0.01, 1.0),
     "rk54": (0.01, 20.0),
     "rk87": (0.02, 20.0),
-    "gauss4": (0.0025, 0.5),
-    "gauss6": (0.0025, 0.5),
-    "gauss8": (0.0025, 0.5),
     "semi": (0.01, 10.0),
 }
 """Constant step and time in s of the methods on one window of four bars, so that steps cost more than setting up; those

@@ -28,7 +28,6 @@ STIFFNESS = (2e9, 2e10, 2e11, 2e12, 2e13, 2e14)
 METHODS: dict[str, dict[str, float]] = {
     "natural": {"step": UNTIL / 200.0},
     "natural4": {"step": UNTIL / 100.0},
-    "alpha": {"step": UNTIL / 200.0},
     "radau, constant steps": {"step": UNTIL / 100.0},
     "radau": {"rtol": 1e-4},
     "rk87": {"rtol": 1e-4},

@@ -207,4 +207,4 @@ def test_promised_commands_take_their_options(command):
 
 
 def test_promised_methods_are_there():
-    assert {"natural", "natural4", "variational", "radau", "alpha", "rk54", "rk87"} <= set(METHODS)
+    assert {"natural", "natural4", "variational", "radau", "rk54", "rk87"} <= set(METHODS)

@@ -109,12 +109,12 @@ def test_slips_are_met_with_the_nearest_name(here, capsys, words, expected):
 
 @pytest.mark.parametrize(
     ("options", "expected"),
-    [({"method": "rk45"}, "'rk54'"), ({"form": "fodled"}, "'folded'"), ({"options": {"roh": 0.8}}, "'rho'")],
+    [({"method": "rk45"}, "'rk54'"), ({"form": "fodled"}, "'folded'"), ({"options": {"kepe": "energy"}}, "'keep'")],
 )
 def test_slips_in_python_are_met_with_the_nearest_name(options, expected):
     scene = ephs.load(ROOT / "scenes/mbs.toml")
     with pytest.raises(ephs.OptionError, match=f"did you mean {expected}"):
-        ephs.simulate(scene, 1.0, step=0.1, **{"method": "alpha", **options})
+        ephs.simulate(scene, 1.0, step=0.1, **{"method": "radau", **options})
 
 
 def every_command():

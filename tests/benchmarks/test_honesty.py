@@ -8,13 +8,13 @@ from ephs.solve import ending
 from ephs.solve.auditing.findings import Audit
 
 HERE = {
-    "brake 100": ("natural", "natural4", "radau", "alpha", "rk54", "ida"),
+    "brake 100": ("natural", "natural4", "radau", "rk54"),
     "beyond stability": ("auto", "natural", "variational", "rk54", "rk87"),
-    "dead centre": ("rk87", "variational", "ida"),
+    "dead centre": ("rk87", "variational"),
     "pin tilted 1e-07": ("auto", "natural"),
     "heavy rocker": ("natural4", "radau"),
     "wired and open": ("natural", "radau", "rk54"),
-    "jumps": ("natural4", "alpha", "rk87"),
+    "jumps": ("natural4", "rk87"),
     "bricard": ("radau", "rk54"),
     "nothing supplied": ("rk54", "radau"),
     "size 3e-09 m": ("auto", "rk54", "rk87"),

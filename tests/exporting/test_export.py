@@ -142,7 +142,7 @@ def test_c_text_gives_the_same_bits(crank):
     np.testing.assert_array_equal([float.fromhex(each) for each in told], expected)
 
 
-@pytest.mark.parametrize("fault", [{"file": "a.txt"}, {"target": "moon"}, {"inputs": ["joints.no"]}, {"method": "ida"},
+@pytest.mark.parametrize("fault", [{"file": "a.txt"}, {"target": "moon"}, {"inputs": ["joints.no"]}, {"method": "semi"},
                                    {"name": "1 a"}])  # fmt: skip
 def test_what_cannot_be_exported_is_refused_by_name(crank, tmp_path, fault):
     given = {"file": "a.o", **fault}

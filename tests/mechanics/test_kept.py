@@ -22,7 +22,7 @@ FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 
 
 def ran(scene, method, **more):
-    step = {} if METHODS[method].adaptive and method != "alpha" else {"step": 2e-3}
+    step = {} if METHODS[method].adaptive else {"step": 2e-3}
     sol = ephs.simulate(scene, 0.01, method=method, audit="off", **step, **more)
     return sol.t, sol["bodies.crank.ke.p"], sol["bodies.coupler.pe.q"], sol.heat
 

@@ -26,8 +26,6 @@ shape = {{ box = [1.0, 1.0, {THICK}] }}
 stiffness = 1e7
 """
 WAY = THICK + 2.0 * RADIUS
-METHODS = ("natural", "alpha")
-"""None of their stages of such a step lies inside the plate."""
 
 
 @pytest.fixture
@@ -40,13 +38,15 @@ def ball(tmp_path):
     return scene
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("kept", [None, 5])
-def test_a_ball_that_passes_a_plate_in_a_step_is_found(method, kept, ball):
-    """0.1 m a step through 0.04 m: the motion is that of a free body, and every balance is kept."""
+def test_a_ball_that_passes_a_plate_in_a_step_is_found(kept, ball):
+    """0.1 m a step through 0.04 m: the motion is that of a free body, and every balance is kept.
+
+    The stage of such a step of `natural` does not lie inside the plate.
+    """
     step, until = 0.0097, 0.06
     times = None if kept is None else np.linspace(0.0, until, kept)
-    run = ephs.simulate(ball(), until, method=method, step=step, save_at=times, audit="off")
+    run = ephs.simulate(ball(), until, method="natural", step=step, save_at=times, audit="off")
     assert run.body("ball").position[-1, 2] == pytest.approx(START - SPEED * until), "the control: it went through"
     (path, _, size) = max(run.motion.leaps(step), key=lambda leap: leap[2])
     assert str(path) == "contacts.ball_plate" and size == pytest.approx(SPEED * step / WAY, rel=1e-6)
@@ -80,7 +80,7 @@ def test_the_step_that_is_advised_meets_the_plate(ball):
     assert not any("passed" in finding.advice for finding in met.audit.findings)
 
 
-@pytest.mark.parametrize("method", ["natural", "alpha", "rk54"])
+@pytest.mark.parametrize("method", ["natural", "variational", "rk54"])
 @pytest.mark.parametrize("part", [0.03, 0.15, 0.3, 0.45])
 @pytest.mark.parametrize("offset", [0.0, 0.4])
 def test_no_soft_contact_lets_a_ball_through_in_silence(offset, part, method, tmp_path):

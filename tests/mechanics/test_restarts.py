@@ -13,9 +13,8 @@ from tests.mechanics.test_twins import PIN, SCENE, TWINS, load  # noqa: F401 - a
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 STEP, STEPS = 1e-3, 10
-ONWARDS = ("alpha", "ida", "natural")
-"""Methods whose steps depend on more than a scene's state: on accelerations or steps before, or on momenta that leave
-the joints by the method's error, which the state of a system has."""
+ONWARDS = ("natural",)
+"""Its steps depend on more than a scene's state: on momenta that leave the joints by the method's error."""
 ROUNDING = 8 * 7 * STEPS * np.finfo(float).eps
 """Of eight sums a stage, seven stages a step, relative."""
 CONDITION = 1e3

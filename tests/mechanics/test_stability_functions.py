@@ -18,7 +18,7 @@ from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.solve.control import Control, Tolerance
-from ephs.solve.methods.radau import COEFFICIENTS, NODES
+from ephs.solve.methods.collocation import radau as coefficients
 from ephs.solve.model import compile_model
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
@@ -70,9 +70,6 @@ def semi(z):
 FUNCTIONS = {
     "natural": diagonal(1),
     "natural4": diagonal(3),
-    "gauss4": diagonal(2),
-    "gauss6": diagonal(3),
-    "gauss8": diagonal(4),
     "radau": radau,
     "rk54": explicit(tableaux.A5, tableaux.B5),
     "rk87": explicit(tableaux.A8, tableaux.B8),
@@ -103,30 +100,13 @@ def test_a_step_is_the_stability_function(scene, method, h):
         assert np.abs(found[i] - expected).max() <= 1e-11
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.6, 1.0])
-def test_generalised_alpha_is_its_recurrence(scene, rho):
-    """Chung and Hulbert's equations, solved as a linear system for angle, rate and mean acceleration."""
-    h, m, f = 0.05, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
-    gamma = 0.5 + f - m
-    beta = 0.25 * (0.5 + gamma) ** 2
-    stiff, damp = A[1]
-    new = np.array([[1.0, 0.0, -h * h * beta], [0.0, 1.0, -h * gamma], [-(1 - f) * stiff, -(1 - f) * damp, 1 - m]])
-    old = np.array([[1.0, h, h * h * (0.5 - beta)], [0.0, 1.0, h * (1 - gamma)], [f * stiff, f * damp, -m]])
-    y = np.array([*Y, A[1] @ Y])
-    expected = [Y]
-    for _ in range(3):
-        y = np.linalg.solve(new, old @ y)
-        expected.append(y[:2])
-    assert np.abs(states(scene, "alpha", h, 3, options={"rho": rho}) - expected).max() <= 1e-7
-
-
 def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle(scene):
     assert np.abs(states(scene, "variational", 0.1, 1)[1] - diagonal(1)(0.1 * A) @ Y).max() <= 1e-12
 
 
 def test_every_method_of_scenes_with_constant_steps_has_its_test():
     of_scenes = {name for name, m in METHODS.items() if m.scenes and m.fixed}
-    assert of_scenes == {*FUNCTIONS, "alpha", "variational"}
+    assert of_scenes == {*FUNCTIONS, "variational"}
 
 
 # ---- systems without bodies -------------------------------------------------------------------------------------
@@ -190,17 +170,18 @@ def test_methods_have_the_orders_that_are_said_of_them():
 
 
 def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
-    control = Control(Tolerance(1e-6, {}), Tolerance(1e-6, {}), None, 0.0, np.inf, None)
-    method, _ = METHODS["radau"].make(Setting(problem_of_system(SYSTEM, START), 0.0, control, {}))
-    start = method.start(0.0, 0.05)
-    one, two = (method.step(start, h) for h in (0.05, 0.025))
-    assert round(np.log2(one.error / two.error)) == method.exponent == 4.0
-    # dense output is the polynomial through the stages: of order 3 inside, and the step itself at its ends
+    for rtol, h, power in ((1e-2, 0.05, 4.0), (1e-9, 0.4, 8.0), (1e-6, 0.1, 6.0)):
+        control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
+        method, _ = METHODS["radau"].make(Setting(problem_of_system(SYSTEM, START), 0.0, control, {}))
+        start = method.start(0.0, h)
+        one, two = (method.step(start, part * h) for part in (1.0, 0.5))
+        assert round(np.log2(one.error / two.error)) == method.exponent == power
+    # dense output is the polynomial through the stages, and the step itself at its ends
     for attempt in (one, two):
         assert np.abs(method.inside(attempt, attempt.h).x - attempt.end.x).max() <= 1e-14
         assert np.abs(method.inside(attempt, 0.0).x - start.x).max() <= 1e-14
-    inside = method.inside(one, 0.025)
-    assert inside.t == 0.025 and np.abs(inside.x - two.end.x).max() <= 1e-6
+    inside = method.inside(one, 0.05)
+    assert inside.t == 0.05 and np.abs(inside.x - two.end.x).max() <= 1e-6
     assert np.abs(inside.z - two.end.z).max() <= 1e-4
     row = method.row(one.end)  # what is made by friction, and the energies of storages, each at its place
     names = [str(slot.path) for slot in method.model.descriptor.components]
@@ -212,23 +193,28 @@ def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
     assert energies["mf"] == pytest.approx(row.sums[3], rel=1e-12) and energies["mf"] > 0.0
 
 
+@pytest.mark.parametrize(("rtol", "count"), [(1e-2, 3), (1e-6, 5), (1e-9, 7)])
 @pytest.mark.parametrize("h", [0.2, 0.5])
-def test_the_estimate_of_radau_is_the_filtered_defect_of_order_three(h):
-    """(I − h γ A)⁻¹ h (γ f(y⁰) + Σ dᵢ f(Yᵢ)), where γ and d integrate polynomials up to order 3."""
-    rtol = atol = 1e-6
-    control = Control(Tolerance(rtol, {}), Tolerance(atol, {}), None, 0.0, np.inf, None)
+def test_the_estimate_of_radau_is_the_filtered_defect_of_the_embedded_method(h, rtol, count):
+    """(I − h γ A)⁻¹ h (γ f(y⁰) + Σ dᵢ f(Yᵢ)), where γ and d integrate polynomials up to the number of stages."""
+    control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
     problem = problem_of_system(LINKED, START | {"ke2.p": -1.1})
     method, _ = METHODS["radau"].make(Setting(problem, 0.0, control, {}))
     assert method.evaluations == method.factorisations == method.iterations == 0
     attempt = method.step(method.start(0.0, h), h)
     matrix, y = np.array([[0.0, 1.0 / MASS], [-0.5 * SPRING, 0.0]]), np.array(list(START.values()))
-    stages = np.linalg.solve(np.eye(6) - h * np.kron(COEFFICIENTS, matrix), np.tile(matrix @ y, 3)).reshape(3, 2)
-    gamma = (6.0 + 81.0 ** (1 / 3) - 9.0 ** (1 / 3)) / 30.0
-    weights = np.linalg.solve(np.vander(NODES, increasing=True).T, [1.0 - gamma, 1 / 2, 1 / 3]) - COEFFICIENTS[-1]
+    scheme = coefficients(count)
+    a, nodes = scheme.coefficients, scheme.nodes
+    whole = np.eye(2 * count) - h * np.kron(a, matrix)
+    stages = np.linalg.solve(whole, np.tile(matrix @ y, count)).reshape(count, 2)
+    values = np.linalg.eigvals(a)
+    gamma = float(np.real(values[np.abs(values.imag) < 1e-9]).item())
+    right = 1.0 / np.arange(1.0, count + 1.0) - gamma * np.eye(count)[0]
+    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, right) - a[-1]
     found = np.linalg.solve(np.eye(2) - h * gamma * matrix, h * (gamma * matrix @ y + weights @ stages))
-    end = y + h * COEFFICIENTS[-1] @ stages
-    expected = np.abs(found) / (atol + rtol * np.maximum(np.abs(y), np.abs(end)))
-    assert attempt.error == pytest.approx(expected.max(), rel=1e-4)
+    end = y + h * a[-1] @ stages
+    expected = np.abs(found) / (rtol + rtol * np.maximum(np.abs(y), np.abs(end)))
+    assert attempt.error == pytest.approx(expected.max(), rel=1e-4, abs=1e-7)
 
 
 # ---- the coefficients -------------------------------------------------------------------------------------------

@@ -16,7 +16,6 @@ COUNTED = ("steps", "rejected", "iterations", "evaluations", "jacobians", "facto
 SETTINGS = {
     name: [*([{"step": 0.01}] if m.fixed else []), *([{"rtol": 1e-4, "atol": 1e-6}] if m.adaptive else [])]
     for name, m in METHODS.items()
-    if name != "ida"  # another library's counts
 }
 CASES = [
     (scene, name, setting)

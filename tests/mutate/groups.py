@@ -125,7 +125,6 @@ GROUPS = {
             "ephs/solve/methods/integral.py",
             "ephs/mechanics/methods/explicit.py",
             "ephs/mechanics/methods/tableaux.py",
-            "ephs/mechanics/methods/alpha.py",
             "ephs/mechanics/methods/radau.py",
             "ephs/mechanics/methods/variational.py",
         ),

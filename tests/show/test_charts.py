@@ -249,7 +249,7 @@ def test_runs_that_differ_in_place_and_numbers_alone_share_a_reason(tmp_path):
     message = "t = {} s at joints.{}: no solution near by ({} rows); take a shorter step"
     blank = Point("rk54", RunSetting("step", 0.1), np.nan, np.nan, 0, 0, RunEnding.FAILED)
     points = [replace(blank, message=message.format(k, "ab"[k % 2], k)) for k in range(4)]
-    points += [replace(blank, method="alpha", message="its scenes have no loops", outcome=RunEnding.REFUSED)]
+    points += [replace(blank, method="variational", message="its scenes have no loops", outcome=RunEnding.REFUSED)]
     points += [
         replace(blank, message="took too long: 1 s", outcome=RunEnding.SLOW),
         replace(blank, outcome=RunEnding.DONE),
@@ -257,10 +257,10 @@ def test_runs_that_differ_in_place_and_numbers_alone_share_a_reason(tmp_path):
     found = reasons(points)
     assert [(each.letter, each.text, dict(each.runs)) for each in found.values()] == [
         ("a", "no solution near by", {"rk54": 4}),
-        ("b", "its scenes have no loops", {"alpha": 1}),
+        ("b", "its scenes have no loops", {"variational": 1}),
     ]
     assert [letter_of(point, found) for point in points] == ["a"] * 4 + ["b", "", ""]
-    assert "| refused | its scenes have no loops | alpha 1 |" in reasons_table([*found.values()])
+    assert "| refused | its scenes have no loops | variational 1 |" in reasons_table([*found.values()])
     _, svg, *_ = draw_work_precision(points, "failures only", tmp_path, "failed")  # no curve at all
     assert svg.stat().st_size > 0 and svg.suffix == ".svg"
 

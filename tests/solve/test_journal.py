@@ -44,7 +44,7 @@ RUNS = {
             ("rk54", {}),
             ("radau", {}),
             ("natural4", {}),
-            ("alpha", {"step": 0.01}),
+            ("variational", {"step": 0.01}),
             ("natural", {"step": 0.01}),
         )
     },

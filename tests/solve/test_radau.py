@@ -9,7 +9,7 @@ from ephs import Pattern, junction, library
 from ephs.operad import quantity as Q
 from ephs.solve.errors import Outcome
 from ephs.solve.heats import Heats
-from ephs.solve.methods.radau import COEFFICIENTS, NODES, Radau
+from ephs.solve.methods.radau import Radau
 from examples import oscillator, physics
 from tests.mechanics.plain import uncorrected
 
@@ -180,13 +180,6 @@ def test_what_is_prescribed_is_not_moved_with_the_energy(monkeypatch):
     assert missed() <= 8.0 * np.finfo(float).eps * 0.3
     monkeypatch.setattr(Radau, "_filtered", lambda self, h, changes: changes)
     assert missed() > 1e-7, "the control"
-
-
-def test_the_coefficients_integrate_polynomials_of_degree_four_over_the_step():
-    for k in range(5):
-        assert COEFFICIENTS[-1] @ NODES**k == pytest.approx(1.0 / (k + 1), abs=1e-14)
-    for k in range(3):
-        assert pytest.approx(NODES ** (k + 1) / (k + 1), abs=1e-14) == COEFFICIENTS @ NODES**k
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])

@@ -31,7 +31,7 @@ stiffness = {STIFFNESS}
 SECOND, STEERED = 1e-3, 1e-7
 """Methods of second order at h = 5 ms: (γ h)² v with the plant's damping γ = 7/s and speeds v below 1 m/s; the others
 at rtol = 1e-10, over 20 samples of which each starts anew."""
-PLAIN = ("natural", "natural4", "alpha", "variational")
+PLAIN = ("natural", "natural4", "variational")
 """Methods that are run at constant steps."""
 
 

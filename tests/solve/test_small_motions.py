@@ -13,7 +13,7 @@ from tests.solve.test_audit import bent
 
 EPS = float(np.finfo(float).eps)
 METHODS = {
-    "natural": 0.01, "natural4": 0.01, "variational": 0.01, "alpha": 0.01, "radau": 0.01, "rk54": 0.01, "rk87": 0.01,
+    "natural": 0.01, "natural4": 0.01, "variational": 0.01, "radau": 0.01, "rk54": 0.01, "rk87": 0.01,
     "auto": None,
 }  # fmt: skip
 MASS, SPIN, AWAY, HEIGHT, GRAVITY = 2.0, 0.02, 0.1, 0.3, 9.81

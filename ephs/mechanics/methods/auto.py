@@ -23,13 +23,10 @@ from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
 if TYPE_CHECKING:
-    from ephs.mechanics.methods.gauss import Gauss
     from ephs.mechanics.methods.radau import Implicit
 
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
-SLOW = 0.5
-"""Contraction of a Gauss method's sweeps above which it limits steps, instead of accuracy."""
 FREEDOMS = 64
 """Degrees of freedom up to which factorising their matrix costs less than an explicit method's shorter steps."""
 TRIAL = 400
@@ -44,22 +41,14 @@ DIGITS = 1e-5
 
 @final
 class Auto(ReducedMethod):
-    """rk54 or rk87 by the tolerance, or a Gauss method, and radau from where the problem shows itself stiff.
-
-    Parameters
-    ----------
-    gauss
-        The Gauss method that goes first.
-    """
+    """rk54 or rk87 by the tolerance, and radau from where the problem shows itself stiff."""
 
     name = "auto"
 
-    def __init__(self, equations: Equations, control: Control, gauss: "Gauss | None" = None) -> None:
+    def __init__(self, equations: Equations, control: Control) -> None:
         super().__init__(equations, control)
         name = "rk87" if control.rtol.value < DIGITS else "rk54"
-        first = gauss or Explicit(equations, control, tableau(name))
-        name, self._limit = first.name, SLOW * gauss.limit if gauss else LIMITS[name]
-        self._explicit = first
+        self._explicit, self._limit = Explicit(equations, control, tableau(name)), LIMITS[name]
         self._implicit: Implicit | None = None
         self._begun: Implicit | None = None
         self._held = self._free = self._failures = 0
@@ -121,12 +110,10 @@ class Auto(ReducedMethod):
         if self._semi is not None:
             self._begin()
         if self._implicit is not None:
-            if self._trial is None or not isinstance(self._explicit, Explicit):
+            if self._trial is None:
                 return self._implicit.many(span)
             return self._implicit.many(span, Rival(self._limit, self._explicit.method.c.size, self._return))
-        if isinstance(self._explicit, Explicit):
-            return self._explicit.many(span, self._limit, self._switch, self._trial)
-        return self._explicit.many(span, self._limit, self._switch)
+        return self._explicit.many(span, self._limit, self._switch, self._trial)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
         self._go_implicit()

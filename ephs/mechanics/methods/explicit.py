@@ -26,14 +26,11 @@ from ephs.solve.stepping import Attempt, Leg, Span
 if TYPE_CHECKING:
     from ephs.mechanics.methods.semi import Semi
 
-Solve = Callable[..., Array]
-"""Solver of the stages of a step, with the arguments of `Equations.stages`."""
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Tableau:
-    """The coefficients of a method, explicit or iterated.
+    """The coefficients of an explicit method.
 
     Attributes
     ----------
@@ -93,18 +90,13 @@ class Explicit(ReducedMethod):
 
     Parameters
     ----------
-    solve
-        Solves the stages of a step as `Equations.stages` does, which is taken where there is none.
     lagged
         Memory of semi-implicit steps, which need no rates at the start and turn energy that they lose into heat.
     """
 
-    def __init__(
-        self, equations: Equations, control: Control, method: Tableau, solve: Solve | None = None,
-        lagged: "Semi | None" = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, equations: Equations, control: Control, method: Tableau, lagged: "Semi | None" = None) -> None:
         super().__init__(equations, control)
-        self.solve: Solve = solve or (equations.stages if lagged is None else lagged.stages)
+        self.solve = equations.stages if lagged is None else lagged.stages
         self.lagged = lagged
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)

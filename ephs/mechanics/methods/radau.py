@@ -17,16 +17,16 @@ from ephs.mechanics.methods.stages import Kept, Stages
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
-from ephs.solve.methods.radau import COEFFICIENTS, NODES
+from ephs.solve.methods.collocation import radau
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
-_S6 = 6.0**0.5
-_EMBEDDED = np.array([-13.0 - 7.0 * _S6, -13.0 + 7.0 * _S6, -1.0]) / 3.0
+SCHEME: Final = radau(3)
+_EMBEDDED = SCHEME.defect @ np.linalg.inv(SCHEME.coefficients) / SCHEME.gamma
 ARRAYS: Final[Mapping[str, Any]] = {
-    "a": np.pad(np.vstack([np.zeros(3), COEFFICIENTS, COEFFICIENTS[-1]]), ((0, 0), (1, 0))),
+    "a": np.pad(np.vstack([np.zeros(3), SCHEME.coefficients, SCHEME.coefficients[-1]]), ((0, 0), (1, 0))),
     "guess": np.zeros((4, 4)),
-    "error": np.array([1.0, *(_EMBEDDED @ COEFFICIENTS), 0.0]),
+    "error": np.array([1.0, *(SCHEME.defect / SCHEME.gamma), 0.0]),
     "coarse": np.zeros(5),
     "eighth": np.zeros(1, dtype=np.int64),
 }
@@ -45,7 +45,7 @@ class Implicit(ReducedMethod):
         self.counts = self.counts if counts is None else counts
         self._known: tuple[Array, Array] | None = None
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
-        self._stages = Stages(equations, control, NODES, COEFFICIENTS, self.counts)
+        self._stages = Stages(equations, control, SCHEME, self.counts)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
@@ -60,7 +60,7 @@ class Implicit(ReducedMethod):
         y1[: stages.shape[1]] += stages[-1]
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
-        passed, allowed = h * (COEFFICIENTS[-1] @ passed), self._stages.allowed(y0, y1)
+        passed, allowed = h * (SCHEME.coefficients[-1] @ passed), self._stages.allowed(y0, y1)
         closed = eq.booking.step(state, closed, passed[2:], float(passed[1]))
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
@@ -72,7 +72,7 @@ class Implicit(ReducedMethod):
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant:
             return None
-        return March(self, ARRAYS, span, kept=Kept(self._stages, COEFFICIENTS), rival=rival)
+        return March(self, ARRAYS, span, kept=Kept(self._stages), rival=rival)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""

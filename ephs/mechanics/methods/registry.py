@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, final
 from warnings import warn
 
@@ -152,27 +153,10 @@ def entry_of(method: own.Method) -> MethodEntry:
     )
 
 
-def _alpha(equations: Any, control: Control, **options: Any) -> Any:
-    from ephs.mechanics.methods.alpha import Alpha
-
-    return Alpha(equations, control, **options)
-
-
 def _implicit(equations: Any, control: Control) -> Any:
     from ephs.mechanics.methods.radau import Implicit
 
     return Implicit(equations, control)
-
-
-def _gauss(name: str) -> Callable[..., Any]:
-    def make(equations: Any, control: Control) -> Any:
-        from ephs.mechanics.methods.auto import Auto
-        from ephs.mechanics.methods.gauss import Gauss
-
-        first = Gauss(equations, control, name)
-        return first if control.step is not None else Auto(equations, control, first)
-
-    return make
 
 
 def _semi(equations: Any, control: Control) -> Any:
@@ -185,12 +169,6 @@ def _variational(equations: Any, control: Control, **options: Any) -> Any:
     from ephs.mechanics.methods.variational import Variational
 
     return Variational(equations, control, **options)
-
-
-def _ida(equations: Any, control: Control) -> Any:
-    from ephs.mechanics.methods.ida import Ida
-
-    return Ida(equations, control)
 
 
 def _auto(equations: Any, control: Control) -> Any:
@@ -235,6 +213,17 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
 
 METHODS: dict[str, MethodEntry] = {}
 """The registered methods."""
+REPLACED: Mapping[str, str] = MappingProxyType(
+    {
+        "alpha": "radau, which took its place: it damps what a step does not resolve, and keeps the balance of energy",
+        "ida": "radau, which took its place",
+        **dict.fromkeys(
+            ("gauss4", "gauss6", "gauss8"),
+            "rk87, which took its place, or natural4, which is symmetric in time and damps nothing, too",
+        ),
+    }
+)
+"""Names of former methods, and what to take instead."""
 
 
 def register_method(method: own.Method | MethodEntry) -> None:
@@ -293,9 +282,6 @@ for _method in (
         undamped=Natural,
     ),
     MethodEntry("radau", 5, True, True, True, True, "Radau IIA, stiff", _radau, ("keep",), impacts=True),
-    MethodEntry(
-        "alpha", 2, True, True, False, True, "generalised-α, damps what is fast", on_joints(_alpha), ("rho", "keep")
-    ),
     *(
         MethodEntry(
             name,
@@ -311,21 +297,6 @@ for _method in (
         )
         for name, order, more in (("rk54", 5, ""), ("rk87", 8, ", many digits"))
     ),
-    *(
-        MethodEntry(
-            f"gauss{order}",
-            order,
-            True,
-            True,
-            False,
-            True,
-            "Gauss, symmetric, implicit",
-            on_joints(_corrected(_gauss(f"gauss{order}"))),
-            ("keep",),
-            impacts=True,
-        )
-        for order in (4, 6, 8)
-    ),
     MethodEntry(
         "semi",
         3,
@@ -337,7 +308,6 @@ for _method in (
         on_joints(_corrected(_semi)),
         ("keep",),
     ),
-    MethodEntry("ida", 5, True, False, False, True, "IDA of SUNDIALS, an independent check", on_joints(_ida)),
 ):
     register_method(_method)
 
@@ -373,6 +343,8 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
     if isinstance(name, own.Method):
         name = entry_of(name)
     if not isinstance(name, MethodEntry) and name not in METHODS:
+        if name in REPLACED:
+            raise OptionError("method", name, REPLACED[name])
         known = ("auto", *METHODS)
         raise OptionError("method", name, f"one of {', '.join(known)}, or an ephs.Method" + nearest_of(name, known))
     method = name if isinstance(name, MethodEntry) else METHODS[name]

@@ -4,6 +4,7 @@ Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8: the syste
 the mechanism's size for each eigenvalue of the method's coefficients, complex ones in pairs.
 """
 
+from functools import partial
 from typing import Any, final
 
 import numpy as np
@@ -13,18 +14,16 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.decompositions import eigen
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
 from ephs.solve.march.newton import ITERATIONS
+from ephs.solve.methods.collocation import Collocation
 from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
 
 SOLVED = 1e-13
 """Attainable relative accuracy of a step's equations: rounding, times a condition of some hundreds."""
-REAL = 1e-12
-"""Relative imaginary part of an eigenvalue that counts as rounding."""
 ROUNDING = 1e-14
 """Tolerances to which stages are solved at constant steps."""
 KEPT = 0.3
@@ -47,8 +46,8 @@ class Stages:
 
     Parameters
     ----------
-    nodes, coefficients
-        (stages,) and (stages, stages).
+    scheme
+        The method's coefficients.
     counts
         Where iterations and factorisations are counted.
 
@@ -63,10 +62,8 @@ class Stages:
         that is good enough where the iteration gets no further.
     """
 
-    def __init__(
-        self, equations: Equations, control: Control, nodes: Array, coefficients: Array, counts: dict[str, Any]
-    ) -> None:
-        self.equations, self._nodes, self.inverse = equations, nodes, np.linalg.inv(coefficients)
+    def __init__(self, equations: Equations, control: Control, scheme: Collocation, counts: dict[str, Any]) -> None:
+        self.equations, self.scheme, self.inverse = equations, scheme, np.linalg.inv(scheme.coefficients)
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         if control.step is None:
             # Convergence of Newton's method, relative to the tolerance: below the method's own error.
@@ -76,13 +73,6 @@ class Stages:
         else:  # to rounding, and near changes of rank as far as it converges
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
-        values, vectors = eigen(self.inverse)
-        sizes, turns = np.abs(values), np.imag(values)
-        kept = np.flatnonzero(turns >= -REAL * sizes)
-        kept = kept[np.argsort(np.abs(turns[kept]))]
-        self._values, self._into, self._out = values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept]
-        # Of a pair one is solved for: the other is its conjugate.
-        self._twice = np.where(np.abs(turns[kept]) > REAL * sizes[kept], 2.0, 1.0)
         self._solvers: tuple[float, list[Any]] | None = None
         # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
         self._separation, self._stale = equations.separation(), False
@@ -114,11 +104,11 @@ class Stages:
         self._stale = not fast or self._turned()
 
     def solvers(self, state: ReducedState, h: float) -> list[Any]:
-        """Factors of μ/h − J, eigenvalue by eigenvalue of the coefficients' inverse, real ones first."""
+        """Factors of 1/(h μ) − J for the eigenvalues μ of the coefficients, the real one first."""
         if self._solvers is None or self._solvers[0] != h:
             matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
-            numbers = [mu if twice > 1.0 else mu.real for mu, twice in zip(self._values, self._twice, strict=True)]
-            self._solvers = h, [factors(mu / h * unit - matrix) for mu in numbers]
+            real, *pairs = self.scheme.values
+            self._solvers = h, [factors(unit / (h * mu) - matrix) for mu in (real.real, *pairs)]
             self.counts["factorisations"] += 1
         return self._solvers[1]
 
@@ -157,22 +147,18 @@ class Stages:
 
     def _change(self, state: ReducedState, h: float, defect: Array) -> Array:
         """(stages, size) Newton corrections of the stages' increments."""
-        parts = self._into @ defect
-        out = np.zeros(defect.shape)
-        for column, twice, part, solver in zip(self._out.T, self._twice, parts, self.solvers(state, h), strict=True):
-            found = lu_solve(solver, part if twice > 1.0 else np.real(part), check_finite=False)
-            out += twice * np.real(column[:, None] * found)
-        return out
+        solvers = [partial(lu_solve, solver, check_finite=False) for solver in self.solvers(state, h)]
+        return self.scheme.solved(defect, solvers)
 
     def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
-        eq, size, count = self.equations, self.jacobian.size, self._nodes.size
+        eq, size, count = self.equations, self.jacobian.size, self.scheme.nodes.size
         stages, rates = np.zeros((count, size)), np.zeros((count, eq.size))
         coldest = eq.heats.coldest(y0[self.heat])  # an iterate may overshoot, a solution is not below
         totals = slice(eq.nv + eq.n + eq.ns, eq.size)
         worst, before = np.zeros(eq.counted.size), np.inf
         rate = moved = np.inf
         for iteration in range(1, ITERATIONS + 1):
-            for i, node in enumerate(self._nodes):
+            for i, node in enumerate(self.scheme.nodes):
                 y = y0.copy()
                 y[:size] += stages[i]
                 y[self.heat] = np.maximum(y[self.heat], coldest)
@@ -209,31 +195,26 @@ class Kept:
     Parameters
     ----------
     stages
-        The same method step by step, whose Jacobian and counts it shares.
-    coefficients
-        (3, 3), with one real eigenvalue.
+        The same method step by step, with three stages, whose Jacobian and counts it shares.
     """
 
-    def __init__(self, stages: Stages, coefficients: Array) -> None:
+    def __init__(self, stages: Stages) -> None:
         eq, m = stages.equations, stages.jacobian.size
         self._stages, self._counted = stages, [0, 0]
-        inverse = np.linalg.inv(coefficients)
-        values, vectors = eigen(inverse)
-        real, imaginary = np.real(values), np.imag(values)
-        one, pair = int(np.argmin(np.abs(imaginary))), int(np.argmax(imaginary))
-        out = np.column_stack([np.real(vectors[:, one]), np.real(vectors[:, pair]), np.imag(vectors[:, pair])])
+        (one, pair), (vector, turned) = stages.scheme.values, stages.scheme.back.T
+        out = np.column_stack([np.real(vector), np.real(turned), -np.imag(turned)])
         self.newton = Newton.table(1)
         n: Any = self.newton[0]
         n.enough, n.rough, n.stale = stages.enough_kept, stages.rough, 1
         # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
-        n.decay, n.growth, n.turning = float(real[one]), float(real[pair]), -float(imaginary[pair])
+        n.decay, n.growth, n.turning = 1.0 / one.real, (1.0 / pair).real, (1.0 / pair).imag
         shapes: dict[str, tuple[int, ...]] = {
             "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "single": (m, m), "pair": (2 * m, m),
             "stages": (3, m), "change": (3, m), "part": (m,), "parts": (2 * m,), "right": (2 * eq.n,), "y": (eq.size,),
             "rate": (eq.size,), "q": (eq.reduced.coordinates,),
         }  # fmt: skip
         self.memory: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()} | {
-            "newton": self.newton, "inverse": inverse, "into": np.linalg.inv(out), "out": out,
+            "newton": self.newton, "inverse": stages.inverse, "into": np.linalg.inv(out), "out": out,
             **{name: np.zeros(m, dtype=np.int64) for name in PIVOTING},
         }  # fmt: skip
 

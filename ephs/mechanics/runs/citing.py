@@ -15,12 +15,9 @@ METHOD_SOURCES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "natural4": ("Gonzalez1996", "McLachlanQuispelRobidoux1999", "HairerLubichRoche1989"),
         "variational": ("MarsdenWest2001",),
         "radau": ("HairerWanner1996",),
-        "alpha": ("ChungHulbert1993", "BrulsCardonaArnold2012"),
         "rk54": ("DormandPrince1980",),
         "rk87": ("PrinceDormand1981", "HairerNorsettWanner1993"),
-        **{f"gauss{order}": ("HairerLubichWanner2006",) for order in (4, 6, 8)},
         "semi": ("PareschiRusso2005", "BoscarinoFilbetRusso2016"),
-        "ida": ("HindmarshEtAl2005",),
     }
 )
 """Keys in ``references.bib`` of each method's sources."""

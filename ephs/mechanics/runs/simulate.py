@@ -104,10 +104,10 @@ def simulate(
         Values of states by path. Other states start at the identity in a system, and as the scene says in a scene.
     method
         One of `ephs.mechanics.methods.registry.METHODS`: ``"natural"``, ``"natural4"``, ``"variational"``, ``"radau"``,
-        ``"alpha"``, ``"rk54"``, ``"rk87"``, ``"gauss4"``, ``"gauss6"``, ``"gauss8"``, ``"semi"``, ``"ida"``; a method
-        of one's own, an instance of `ephs.Method`; or ``"auto"``: with ``step`` natural, with hard contacts rk54;
-        without it rk54 or rk87 for mechanisms, semi where surfaces may touch and tolerances are coarse, and radau when
-        stability limits the steps, radau for systems on vector spaces, natural4 for others.
+        ``"rk54"``, ``"rk87"``, ``"semi"``; a method of one's own, an instance of `ephs.Method`; or ``"auto"``: with
+        ``step`` natural, with hard contacts rk54; without it rk54 or rk87 for mechanisms, semi where surfaces may touch
+        and tolerances are coarse, and radau when stability limits the steps, radau for systems on vector spaces,
+        natural4 for others.
     rtol, atol
         Tolerances without ``step``: the error of each state x should be at most ``atol + rtol·|x|``. The unit of atol
         is that of the state; for a mechanism far from 1 m, 1 kg and 1 s it is made of the mechanism's own length, mass
@@ -126,7 +126,7 @@ def simulate(
         `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
         and end the run if they are terminal.
     options
-        Options of the method, such as ``{"rho": 0.8}`` of alpha.
+        Options of the method, such as ``{"keep": "energy and momenta"}``.
     inputs
         ``{port: {"effort": f}}`` or ``{"flow": f}`` at outer ports; of a scene also ``{"joints.pin": f}``, a
         generalised force on u_r, ``{"bodies.crank": f}``, a wrench in the body frame, and ``{"markers.tip": f}``, a

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5 on the descriptor form: stiff, adaptive, constraints met at every step.
+"""Radau IIA of order 5, 9 or 13 on the descriptor form: stiff, adaptive, constraints met at every step.
 
 The collocation method of Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8, written for implicit
 equations g(x, ẋ, e, λ) = 0: the unknowns of a stage are its rates, efforts and multipliers, so neither a mass matrix
@@ -12,10 +12,9 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.decompositions import eigen
 from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
-from ephs.solve.methods.collocation import moments, values
+from ephs.solve.methods.collocation import moments, radau, values
 from ephs.solve.methods.continuous import Continuous, Matrices
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.passages import Passages
@@ -31,30 +30,13 @@ from ephs.solve.stepping import Attempt, Row, Span
 PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""
 
-_S6 = 6.0**0.5
-NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
 ITERATIONS = 10
+COARSE, FINE = 3e-3, 3e-7
+"""Relative tolerances above the first are for order 5, those below the second for order 13, the others for order 9."""
 ROUNDING = 10.0 * np.finfo(float).eps
 """Part of the terms of an equation by which rounding changes their sum."""
 FARTHEST = 2.0
 """Extrapolation, in lengths of the former step, beyond which the last value is the better guess."""
-
-
-COEFFICIENTS = np.array([moments(NODES, node) for node in NODES])
-_EIGENVALUES, _VECTORS = eigen(COEFFICIENTS)
-_ORDER = [
-    int(np.argmin(np.abs(np.imag(_EIGENVALUES)))),
-    int(np.argmax(np.imag(_EIGENVALUES))),
-    int(np.argmin(np.imag(_EIGENVALUES))),
-]
-VALUES = _EIGENVALUES[_ORDER]
-"""Eigenvalues of the coefficients: the real one, then the pair."""
-GAMMA = float(VALUES[0].real)
-T = _VECTORS[:, _ORDER]
-T_INVERSE = np.linalg.inv(T)
-# The embedded method of order 3 takes γ₀ of the rate at the start; its defect, weight by weight.
-_ORDER_3 = np.array([1.0 - GAMMA, 1.0 / 2.0, 1.0 / 3.0])
-DEFECT = np.linalg.solve(np.vander(NODES, increasing=True).T, _ORDER_3) - COEFFICIENTS[-1]
 
 
 @final
@@ -82,12 +64,6 @@ class RadauState:
     h: float
     account: Array
 
-    def guess(self, h: float) -> Array:
-        """Unknowns at the stages of a step of h seconds, by the polynomial of the step before."""
-        if self.h == 0.0 or abs(h) > FARTHEST * abs(self.h):
-            return np.tile(self.z, (NODES.size, 1))
-        return np.array([values(NODES, 1.0 + c * h / self.h) @ self.stages for c in NODES])
-
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,8 +87,6 @@ class Radau:
     """The method for one problem whose states are on vector spaces."""
 
     name = "radau"
-    order = 5
-    exponent = 4.0
     hold = 1.2
 
     def __init__(self, problem: Problem, t0: float, control: Control) -> None:
@@ -123,6 +97,9 @@ class Radau:
         self._passages = Passages(self.model)
         self._settling = Settling(self.model, self._passages.components)
         self._chosen = control.step is None
+        rtol = control.rtol.value
+        self.scheme = radau(3 if not self._chosen or rtol > COARSE else 5 if rtol >= FINE else 7)
+        self.exponent = self.scheme.nodes.size + 1.0
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.evaluations = self.factorisations = self.iterations = 0
         self._rates = int(self.model.tables.counts[0])
@@ -130,7 +107,7 @@ class Radau:
         self._matrices: Matrices | None = None
         self._slow = False
         self._family = Solvers(self.model.unknown_name, self.equations.pivots)
-        self._solvers: tuple[float, Solver, Solver] | None = None
+        self._solvers: tuple[float, list[Solver]] | None = None
         self._current: RadauState | None = None
         self._last: tuple[RadauState, Array, Array] | None = None
 
@@ -154,16 +131,16 @@ class Radau:
         x = d.pack(self.problem.initial)
         z = self.equations.guess(x)
         account = self._settling.opened(x) if self._settling.active else np.zeros(0)
-        sums, stages = np.zeros(4 + len(d.components)), np.zeros((NODES.size, z.size))
+        sums, stages = np.zeros(4 + len(d.components)), np.zeros((self.scheme.nodes.size, z.size))
         start = RadauState(t, x.copy(), z, sums, stages, 0.0, account)
         first, second = (self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5))
         jumps = [self._size(end - x, x) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
             entry = int(np.argmax(np.abs(second - x) / (self.atol + self.rtol * np.abs(x))))
             raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
-        z = self._solved(start, 0.5 * PROBE * h)[0][-1]
+        stages = self._solved(start, 0.5 * PROBE * h)[0]
         self._matrices = None
-        return replace(start, z=z)
+        return replace(start, z=values(self.scheme.nodes, 0.0) @ stages)
 
     def prepare(self, state: RadauState, h: float) -> None:
         """Nothing is left to do: the start has evaluated everything."""
@@ -197,8 +174,8 @@ class Radau:
         stages, totals = attempt.detail
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
-        x = start.x + h * moments(NODES, theta) @ stages[:, : self._rates]
-        return self._end(start, h, theta, x, values(NODES, theta) @ stages, totals)[0]
+        x = start.x + h * moments(self.scheme.nodes, theta) @ stages[:, : self._rates]
+        return self._end(start, h, theta, x, values(self.scheme.nodes, theta) @ stages, totals)[0]
 
     def missed(self, attempt: Attempt[RadauState]) -> None:
         """None: the balance of energy shows it."""
@@ -265,13 +242,13 @@ class Radau:
                 raise
             self._refresh(state)
             stages, iterations = self._stages(state, h)
-        return stages, state.x + h * COEFFICIENTS[-1] @ stages[:, : self._rates], iterations
+        return stages, state.x + h * self.scheme.coefficients[-1] @ stages[:, : self._rates], iterations
 
     def _totals(self, state: RadauState, h: float, stages: Array) -> Totals:
         """Entries of the ledgers at the stages, and the heat that is passed there and at the start."""
-        xs = state.x + h * COEFFICIENTS @ stages[:, : self._rates]
+        xs = state.x + h * self.scheme.coefficients @ stages[:, : self._rates]
         powers, passed = list[Array](), list[Array]()
-        for x, z, c in zip(xs, stages, NODES, strict=True):
+        for x, z, c in zip(xs, stages, self.scheme.nodes, strict=True):
             found = self.equations.instant(x, z, self.inputs(state.t + c * h, x))
             powers.append(found.sums)
             passed.append(self._passages.powers(found.flows, found.unknowns))
@@ -291,13 +268,13 @@ class Radau:
 
         Its heat is booked by energy, see `Heats`, and it is moved to what energy is left, see `Settling`.
         """
-        t, weights, passages = state.t + theta * h, h * moments(NODES, theta), self._passages
+        t, weights, passages = state.t + theta * h, h * moments(self.scheme.nodes, theta), self._passages
         sums, heat, error, account = state.sums + weights @ totals.powers, 0.0, 0.0, state.account
         changed = x - state.x
         if passages.states.size:
             x[passages.states] = state.x[passages.states]
             energies = [self._known(state)[0], self.equations.instant(x, z, self.inputs(t, x)).energies]
-            missed = theta * h * (GAMMA * totals.passed[0, 0] + DEFECT @ totals.passed[1:, 0])
+            missed = theta * h * (self.scheme.gamma * totals.passed[0, 0] + self.scheme.defect @ totals.passed[1:, 0])
             booked = passages.booked(
                 state.x,
                 np.tensordot(weights, totals.passed[1:], 1),
@@ -324,32 +301,31 @@ class Radau:
         self._current = state
         self._solvers, self._slow = None, False
 
-    def _solve(self, h: float) -> tuple[Solver, Solver]:
-        """Solvers with ∂g/∂z + h·μ·∂g/∂x for the real and the complex eigenvalue μ."""
+    def _solve(self, h: float) -> list[Solver]:
+        """Solvers with ∂g/∂z + h·μ·∂g/∂x for the eigenvalues μ of the coefficients, the real one first."""
         if self._solvers is None or self._solvers[0] != h:
-            m = self._matrices
+            m, (real, *pairs) = self._matrices, self.scheme.values
             assert m is not None
-            shifts = h * GAMMA, h * complex(VALUES[1])
-            real, rest = (self._family.of(m.unknowns + shift * m.states) for shift in shifts)
-            self._solvers = h, real, rest
+            self._solvers = h, [self._family.of(m.unknowns + h * mu * m.states) for mu in (real.real, *pairs)]
             self.factorisations += 1
-        return self._solvers[1], self._solvers[2]
+        return self._solvers[1]
+
+    def _guess(self, state: RadauState, h: float) -> Array:
+        """Unknowns at the stages of a step of h seconds, by the polynomial of the step before."""
+        if state.h == 0.0 or abs(h) > FARTHEST * abs(state.h):
+            return np.tile(state.z, (self.scheme.nodes.size, 1))
+        return self.scheme.ahead(h / state.h) @ state.stages
 
     def _stages(self, state: RadauState, h: float) -> tuple[Array, int]:
-        real, rest = self._solve(h)
-        stages = state.guess(h)
-        rates = self._rates
+        solvers, scheme, stages, rates = self._solve(h), self.scheme, self._guess(state, h), self._rates
         parts, before = np.zeros((1, rates)), np.inf
         for iteration in range(1, ITERATIONS + 1):
-            xs = state.x + h * COEFFICIENTS @ stages[:, :rates]
-            inputs = np.array([self.inputs(state.t + c * h, x) for x, c in zip(xs, NODES, strict=True)])
-            found = self.equations.residuals(xs, stages, inputs)
-            self.evaluations += 3
-            turned = T_INVERSE @ found
-            pair = rest(turned[1])
-            change = np.real(T @ np.array([real(np.real(turned[0])), pair, np.conj(pair)]))
+            xs = state.x + h * scheme.coefficients @ stages[:, :rates]
+            inputs = np.array([self.inputs(state.t + c * h, x) for x, c in zip(xs, scheme.nodes, strict=True)])
+            change = scheme.solved(self.equations.residuals(xs, stages, inputs), solvers)
+            self.evaluations += len(stages)
             stages -= change
-            parts = np.abs(h * COEFFICIENTS @ change[:, :rates]) / (self.atol + self.rtol * np.abs(state.x))
+            parts = np.abs(h * scheme.coefficients @ change[:, :rates]) / (self.atol + self.rtol * np.abs(state.x))
             moved = float(np.max(parts, initial=0.0))
             if not np.isfinite(moved):
                 break
@@ -370,7 +346,7 @@ class Radau:
         m, real = self._matrices, self._solve(h)[0]
         assert m is not None
         rates, largest = self._rates, np.abs(stages).max(axis=0)
-        summed = np.abs(state.x) + abs(h) * np.abs(COEFFICIENTS[-1]).sum() * largest[:rates]
+        summed = np.abs(state.x) + abs(h) * np.abs(self.scheme.coefficients[-1]).sum() * largest[:rates]
         terms = abs(m.unknowns) @ largest + abs(m.states)[:, :rates] @ summed
         allowed = ROUNDING * np.abs(real(terms)[:rates])
         return bool(np.all(np.abs(change[:, :rates]) <= allowed))
@@ -382,17 +358,16 @@ class Radau:
 
     def _error(self, state: RadauState, h: float, stages: Array, x: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
-        raw = h * (GAMMA * state.z[: self._rates] + DEFECT @ stages[:, : self._rates])
+        raw = h * (self.scheme.gamma * state.z[: self._rates] + self.scheme.defect @ stages[:, : self._rates])
         return self._size(self._filtered(h, raw), np.maximum(np.abs(state.x), np.abs(x)))
 
     def _filtered(self, h: float, changes: Array) -> Array:
         """Changes (…, states) with their stiff parts damped, so that what is algebraic allows them."""
-        real, _ = self._solve(h)
-        m = self._matrices
+        real, m = self._solve(h)[0], self._matrices
         assert m is not None
         raw = np.zeros((*changes.shape[:-1], self.equations.unknowns))
         raw[..., : self._rates] = changes
-        return changes + h * GAMMA * real(-(m.states @ raw.T)).T[..., : self._rates]
+        return changes + h * self.scheme.gamma * real(-(m.states @ raw.T)).T[..., : self._rates]
 
     def _size(self, difference: Array, x: Array) -> float:
         """Largest entry relative to its tolerance."""

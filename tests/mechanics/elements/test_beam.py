@@ -316,7 +316,7 @@ def momenta(sol):
 STRUCK = "angular_velocity = [0.0, 2.0, 3.0]\nstrain = [0.1, 0.05, 0.0, 0.02, 0.0, 0.01]\nvelocity = [1.0, 2.0, 3.0]\n"
 
 
-CONSTANT = ("natural", "natural4", "variational", "alpha")
+CONSTANT = ("natural", "natural4", "variational")
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])

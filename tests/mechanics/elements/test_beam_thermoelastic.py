@@ -70,14 +70,14 @@ def gap(found, wanted):
     return max(off[:ELEMENTS].max() / np.abs(u).max(), off[ELEMENTS:].max() / np.abs(theta - WARM).max())
 
 
-@pytest.mark.parametrize(("method", "near"), [("rk54", 1e-8), ("rk87", 1e-8), ("radau", 1e-7), ("ida", 1e-6)])
+@pytest.mark.parametrize(("method", "near"), [("rk54", 1e-8), ("rk87", 1e-8), ("radau", 1e-7)])
 def test_a_warm_rod_swings_as_the_equations_by_hand(method, near, by_hand, tmp_path):
     assert gap(swung(tmp_path, method, rtol=1e-10), by_hand.y) < near
 
 
 @pytest.mark.parametrize(
     ("method", "step", "order"),
-    [("natural", 2e-4, 2), ("alpha", 2e-4, 2), ("variational", 5e-4, 2), ("natural4", 1e-3, 4), ("gauss6", 2e-3, 6)],
+    [("natural", 2e-4, 2), ("variational", 5e-4, 2), ("natural4", 1e-3, 4)],
 )
 def test_constant_steps_have_their_order(method, step, order, by_hand, tmp_path):
     coarse, fine = (gap(swung(tmp_path, method, step=h), by_hand.y) for h in (step, 0.5 * step))

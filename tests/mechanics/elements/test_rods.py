@@ -138,7 +138,7 @@ def test_a_rod_twists_by_its_closed_form(tmp_path):
 
 THICK = KIRCHHOFF.replace("[2e-4, 1e-4, 1e-4]", "[2e-2, 1e-2, 1e-2]")
 STRUCK = "angular_velocity = [0.5, 2.0, 3.0]\nstrain = [0.1, 0.5, 0.3, 0.0, 0.0, 0.0]\nvelocity = [1.0, 2.0, 3.0]\n"
-CONSTANT = ("natural", "natural4", "variational", "alpha")
+CONSTANT = ("natural", "natural4", "variational")
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])

@@ -105,11 +105,8 @@ METHODS = [
     ("rk54", {"rtol": 1e-11, "atol": 1e-12}, 1e-9),
     ("rk87", {"rtol": 1e-11, "atol": 1e-12}, 1e-9),
     ("radau", {"rtol": 1e-11, "atol": 1e-12}, 1e-9),
-    ("ida", {"rtol": 1e-10, "atol": 1e-12}, 1e-7),
-    ("gauss6", {"step": 4e-3}, 1e-9),
     ("natural4", {"step": 2e-3}, 1e-8),
     ("natural", {"step": 1e-3}, 1e-4),
-    ("alpha", {"step": 1e-3}, 1e-3),
     ("variational", {"step": 2e-3}, 1e-3),
 ]
 
@@ -143,8 +140,7 @@ def test_a_bob_across_a_damped_tendon_moves_as_equations_by_hand_say(tmp_path, m
     found = [rail.coordinate[-1, 0], rail.rate[-1, 0], sol.heat[-1]]
     assert np.allclose(found, [z, v, heat], rtol=0.0, atol=10.0 * near)
     assert np.all(np.diff(sol.heat) >= 0.0)
-    if method != "alpha":
-        assert sol.energy_error.max() < 1e-10
+    assert sol.energy_error.max() < 1e-10
 
 
 def test_a_cable_only_pulls(tmp_path):

@@ -15,12 +15,11 @@ from tests.mechanics.plain import uncorrected
 ROUNDING = 1e-12
 """Of ten steps whose equations are solved to rounding, with a condition of some hundreds."""
 MAPS = {
-    "natural": True, "natural4": True, "variational": True, "alpha": True,
-    "rk54": False, "rk87": False, "gauss4": False, "gauss6": False, "gauss8": False, "radau": False,
-    "semi": False,
+    "natural": True, "natural4": True, "variational": True,
+    "rk54": False, "rk87": False, "radau": False, "semi": False,
 }  # fmt: skip
 """Whether the steps of a method, as it is by default, are those of the parts."""
-STEPS = {"rk87": 0.25, "gauss6": 0.2, "gauss8": 0.4, "radau": 0.2}
+STEPS = {"rk87": 0.25, "radau": 0.2}
 """Steps in s at which the correction of a method is far above rounding; of the others 0.1 s."""
 
 

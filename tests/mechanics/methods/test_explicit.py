@@ -201,8 +201,7 @@ def test_a_loop_of_prescribed_joints_is_refused_by_name(tmp_path):
         ({"method": "rk54", "max_step": 0.0}, "max_step is 0.0"),
         (
             {"method": "rk45"},
-            "method is 'rk45', expected one of auto, natural, natural4, variational, radau, alpha, rk54, rk87, gauss4, "
-            "gauss6, gauss8, semi, ida",
+            "method is 'rk45', expected one of auto, natural, natural4, variational, radau, rk54, rk87, semi; did",
         ),
     ],
 )

@@ -41,7 +41,7 @@ def scene(tmp_path_factory):
     return ephs.load(file)
 
 
-@pytest.mark.parametrize("method", ["rk54", "radau", "variational", "alpha"])
+@pytest.mark.parametrize("method", ["rk54", "radau", "variational"])
 def test_a_run_begins_at_what_was_given(scene, method):
     sol = ephs.simulate(scene, 0.002, method=method, step=0.001)
     reference = ephs.simulate(scene, 0.002, method="natural", step=0.001)

@@ -45,24 +45,22 @@ def ended(method, **options):
     return np.array([rate, current, machines.THETA * np.exp(run["housing.s"][-1] / machines.HEAT)]).ravel(), run
 
 
-@pytest.mark.parametrize("method", ["rk54", "rk87", "auto", "radau", "ida"])
+@pytest.mark.parametrize("method", ["rk54", "rk87", "auto", "radau"])
 def test_a_motor_on_a_four_bar_moves_as_equations_by_hand_say(method):
     found, run = ended(method, rtol=1e-11, atol=1e-12)
     assert np.allclose(found, machines.motor_by_hand(UNTIL)[1:], rtol=1e-9, atol=0.0)
     assert run.energy_error.max() < 1e-9
 
 
-@pytest.mark.parametrize(("method", "step"), [("gauss6", 1e-3), ("gauss4", 2.5e-4), ("natural4", 5e-4)])
-def test_lawful_methods_move_it_so_too(method, step):
-    found, run = ended(method, step=step, audit="off")
+def test_natural4_moves_it_so_too():
+    found, run = ended("natural4", step=5e-4, audit="off")
     assert np.allclose(found, machines.motor_by_hand(UNTIL)[1:], rtol=1e-9, atol=0.0)
     assert run.energy_error.max() < 1e-13
 
 
-@pytest.mark.parametrize("method", ["alpha", "variational"])
-def test_methods_of_order_two_come_to_the_same_motion(method):
+def test_the_variational_method_comes_to_the_same_motion():
     exact = machines.motor_by_hand(UNTIL)[1:]
-    coarse, fine = (ended(method, step=step, audit="off")[0] - exact for step in (1e-3, 5e-4))
+    coarse, fine = (ended("variational", step=step, audit="off")[0] - exact for step in (1e-3, 5e-4))
     assert np.all(np.abs(coarse) < 2e-3 * np.abs(exact))
     assert np.allclose(coarse, 4.0 * fine, rtol=0.05, atol=1e-9)
 
@@ -78,7 +76,7 @@ def sprung(method, **options):
     return np.array([volume, hot, m.THETA * np.exp(run["oil.s"][-1] / m.OIL)]).ravel(), run
 
 
-@pytest.mark.parametrize("method", ["rk54", "rk87", "auto", "ida"])
+@pytest.mark.parametrize("method", ["rk54", "rk87", "auto"])
 def test_a_gas_spring_and_hot_oil_on_a_slider_crank_do_as_equations_by_hand_say(method):
     found, run = sprung(method, rtol=1e-11, atol=1e-12)
     assert np.allclose(found, machines.gas_spring_by_hand(UNTIL)[2:], rtol=1e-9, atol=0.0)

@@ -79,12 +79,10 @@ def pair_by_hand():
     return run.y[:, -1]
 
 
-@pytest.mark.parametrize(
-    "method", ["rk54", "rk87", "radau", "gauss6", "ida", "auto", "natural", "alpha", "variational"]
-)
+@pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "auto", "natural", "variational"])
 def test_two_wheels_on_a_gear_turn_as_one_inertia_does(method):
     system, start = pair()
-    second = method in ("natural", "alpha", "variational")
+    second = method in ("natural", "variational")
     options = {"step": 1e-3} if second else {"rtol": 1e-11, "atol": 1e-12}
     run = ephs.simulate(system, UNTIL, initial=start, method=method, save_at=[0.0, UNTIL], audit="off", **options)
     angle, _ = pair_by_hand()

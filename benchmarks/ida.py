@@ -1,4 +1,4 @@
-"""IDA of SUNDIALS on the reduced form: an independent integrator, to check the others against.
+"""IDA of SUNDIALS on the reduced form: an independent integrator, beside which the others are measured.
 
 Its unknowns are the increments from a base that is moved, with the loops closed, where they have grown or a loop has
 opened by rounding; each move starts IDA anew, at order 1. What it hands over at each of its steps keeps the balance of
@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.registry import METHODS, Method, on_joints, register_method
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -41,12 +42,12 @@ class Ida(ReducedMethod):
 
     def __init__(self, equations: Equations, control: Control) -> None:
         try:
-            from sksundae.ida import IDA
+            from sksundae.ida import IDA as Solver
         except ImportError as error:
             raise OptionError("method", "ida", "another, or ephs[ida] installed, which brings scikit-sundae") from error
         super().__init__(equations, control)
         equations.accounts.followed = False
-        self._make: Any = IDA
+        self._make: Any = Solver
         self._failure: SolveError | None = None
         self._base: ReducedState | None = None
         self._last: Array | None = None
@@ -149,3 +150,12 @@ def _unlogged() -> Generator[None, None, None]:
         yield
     finally:
         del os.environ[LOG]
+
+
+IDA = Method("ida", 5, True, False, False, True, "IDA of SUNDIALS", on_joints(Ida))
+
+
+def register() -> None:
+    """Register it as the method ``ida`` of this process."""
+    if IDA.name not in METHODS:
+        register_method(IDA)
