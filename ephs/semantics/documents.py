@@ -25,9 +25,9 @@ LARGEST = 10_000_000
 _READ = Reader("system")
 
 
-def to_dict(system: System) -> dict[str, Any]:
+def to_dict(system: System, proofs: bool = False) -> dict[str, Any]:
     """The system as nested dictionaries of text and numbers; see `System.to_dict`."""
-    return _record(system, pattern_record, sorted)
+    return _record(system, pattern_record, sorted, proofs)
 
 
 def to_dict_in_order(system: System) -> dict[str, Any]:
@@ -39,6 +39,7 @@ def _record(
     system: System,
     pattern_of: Callable[[Pattern], dict[str, Any]],
     arranged: Callable[[Any], list[tuple[Path, Filling]]],
+    proofs: bool = False,
 ) -> dict[str, Any]:
     parts: list[dict[str, Any]] = []
     known: dict[str, int] = {}
@@ -54,7 +55,7 @@ def _record(
             places = {str(box): numbers[id(part)] for box, part in inner}
             entry: dict[str, Any] = {"pattern": pattern_of(filling.pattern), "fillings": places}
         else:
-            entry = {} if id(filling) in numbers else primitive_record(path, filling)
+            entry = {} if id(filling) in numbers else primitive_record(path, filling, proofs)
         pending.pop()
         if id(filling) in numbers:
             continue
@@ -65,9 +66,9 @@ def _record(
     return {"format": FORMAT, "parts": parts}
 
 
-def to_json(system: System) -> str:
+def to_json(system: System, proofs: bool = False) -> str:
     """The document as JSON text, a line for each part; see `System.to_json`."""
-    parts = (json.dumps(part, ensure_ascii=False, allow_nan=False) for part in to_dict(system)["parts"])
+    parts = (json.dumps(part, ensure_ascii=False, allow_nan=False) for part in to_dict(system, proofs)["parts"])
     return f'{{"format": {FORMAT}, "parts": [\n' + ",\n".join(parts) + "\n]}\n"
 
 

@@ -1,7 +1,9 @@
 """Primitives as parts of documents: library parts by name and numbers, others by their formula."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -13,16 +15,17 @@ from ephs.operad.reading import Reader
 from ephs.semantics import constructors, structures
 from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.catalogue import find_part, part_of
+from ephs.semantics.derive.recording import Untraceable
+from ephs.semantics.derive.recording import record as recording
 from ephs.semantics.domains import Bounds
 from ephs.semantics.errors import SemanticsError, StructureError
 from ephs.semantics.extents import between
 from ephs.semantics.forms import stacked
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
-from ephs.semantics.symbols.algebra import sp
-from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, term_from, term_of
-from ephs.semantics.symbols.tracing import Untraceable, symbols_of, trace
+from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, recorded, simple, term_from
 from ephs.semantics.verdicts.checks import random_efforts, random_point
+from ephs.semantics.verdicts.proving import proof_of, replay
 
 FLAGS = {"reversible": "reversed_field", "irreversible": "one_sided"}
 """Key that says that a structure need not be invariant under time reversal, by kind."""
@@ -32,14 +35,20 @@ AGREEMENT = 1e-9
 _FAULTS = (ArithmeticError, LookupError, TypeError, ValueError)
 
 
-def primitive_record(path: Path, primitive: Primitive) -> dict[str, Any]:
-    """A primitive as part of a document.
+def primitive_record(path: Path, primitive: Primitive, proofs: bool = False) -> dict[str, Any]:
+    """A primitive as part of a document, with the proof of its structure if asked for.
 
     Raises
     ------
     SemanticsError
         It is no part of the library, and has no formula that can be traced, written and read back.
     """
+    entry = _primitive(path, primitive)
+    proof = proof_of(primitive) if proofs else {}
+    return entry | ({"proof": proof} if proof else {})
+
+
+def _primitive(path: Path, primitive: Primitive) -> dict[str, Any]:
     ports = [[str(port), port_record(kind)] for port, kind in primitive.interface.items()]
     part = part_of(primitive)
     if part is not None:
@@ -80,6 +89,7 @@ def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
     flagged = found.pop(flag, False) if flag else False
     if not isinstance(flagged, bool):
         reader.refuse(f"{where}.{flag}", str(flagged), "true or false")
+    proof = found.pop("proof", None)
     initial = found.pop("initial", None) if kind in ("part", "storage") else None
     read = {"part": _part, "storage": _storage, "reversible": _reversible, "irreversible": _irreversible}[kind]
     keys = {"part": {"parameters"}, "storage": {"energy"}, "reversible": set[str](), "irreversible": {"M"}}[kind]
@@ -96,7 +106,18 @@ def primitive_from(reader: Reader, where: str, value: object) -> Primitive:
     if list(made.interface.items()) != list(ports.items()):
         expected = ", ".join(f"{port}: {kind}" for port, kind in made.interface.items())
         reader.refuse(f"{where}.ports", ", ".join(f"{port}: {kind}" for port, kind in ports.items()), expected)
-    return made if initial is None else _starting(reader, f"{where}.initial", made, initial)
+    made = made if initial is None else _starting(reader, f"{where}.initial", made, initial)
+    if proof is not None:
+        _require_proved(reader, f"{where}.proof", made, dict(reader.mapping(f"{where}.proof", proof)))
+    return made
+
+
+def _require_proved(reader: Reader, where: str, made: Primitive, proof: Mapping[str, object]) -> None:
+    shown = replay(made, proof)
+    for statement, evidence in proof.items():
+        if statement not in shown:
+            found = json.dumps(evidence, ensure_ascii=False)
+            reader.refuse(f"{where}.{statement}", found if len(found) < 80 else f"{found[:77]}…", "a proof of it")
 
 
 def _started(primitive: Primitive) -> dict[str, Any]:
@@ -267,7 +288,7 @@ def _formula(primitive: Primitive) -> dict[str, Any]:
             if isinstance(function, Written):
                 return {"energy": record(function.term), "function": function.name}
             names = dict.fromkeys(map(str, primitive.interface), True)
-            energy: Any = _terms(primitive, function, given, names).item()
+            (energy,) = _terms(primitive, function, given, names)
             return {"energy": record(energy), "function": str(getattr(function, "__name__", type(function).__name__))}
         case Reversible():
             names = {str(port): True for port in primitive.reads}
@@ -276,13 +297,15 @@ def _formula(primitive: Primitive) -> dict[str, Any]:
                 return {key: _rows(part.rows) for key, part in parts.items() if part is not None}
             n, k = primitive.bundle.size, primitive.multipliers
             both = _terms(primitive, stacked(primitive.formula, n, k), given, names)
-            return {"L": _rows(both[:n])} | ({"C": _rows(both[n:])} if k else {})
+            rows = [both[i : i + n] for i in range(0, len(both), n)]
+            return {"L": _rows(rows[:n])} | ({"C": _rows(rows[n:])} if k else {})
         case Irreversible():
             if isinstance(function, Matrix):
                 return {"M": _rows(function.rows)}
             names = {str(port): not kind.power for port, kind in primitive.interface.items()}
             n = primitive.bundle.size
-            return {"M": _rows(_terms(primitive, function, given, names).reshape(n, n))}
+            entries = _terms(primitive, function, given, names)
+            return {"M": _rows([entries[i : i + n] for i in range(0, n * n, n)])}
 
 
 def _rows(rows: Any) -> list[list[Any]]:
@@ -291,24 +314,17 @@ def _rows(rows: Any) -> list[list[Any]]:
 
 def _terms(
     primitive: Primitive, function: Callable[..., Any], numbers: Mapping[str, object], names: Mapping[str, bool]
-) -> "np.ndarray[Any, np.dtype[np.object_]]":
-    """Terms of a function's value; of each named port it takes the state, or the effort where that is False."""
-    arguments: dict[str, Any] = dict(numbers)
-    values: dict[Any, Term] = {}
-    for number, (name, state) in enumerate(names.items()):
-        quantity = primitive.interface[name].quantity
-        size = quantity.space.size if state else quantity.space.dim
-        symbols = (
-            symbols_of(f"x_{number}", quantity, size) if state else tuple(sp.symbols(f"e_{number}_:{size}", real=True))
-        )
-        arguments[name] = symbols[0] if size == 1 else symbols
-        values |= {s: name if size == 1 else ("entry", name, i) for i, s in enumerate(symbols)}
-    traced = trace(function, arguments)
-    values |= traced.parameters
-    out = np.empty(traced.outputs.shape, dtype=object)
-    for index, entry in np.ndenumerate(traced.outputs):
-        out[index] = term_of(entry, values)
-    return out
+) -> tuple[Term, ...]:
+    """Terms of a function's values; of each named port it takes the state, or the effort where that is False."""
+    sizes: dict[str, int | None] = {}
+    inputs: list[Term] = []
+    for name, state in names.items():
+        space = primitive.interface[name].quantity.space
+        size = space.size if state else space.dim
+        sizes[name] = None if size == 1 else size
+        inputs += [name] if size == 1 else [("entry", name, i) for i in range(size)]
+    found = recorded(recording(partial(function, **numbers), sizes), inputs)
+    return tuple(map(simple, found))
 
 
 def _agree(one: Primitive, two: Primitive) -> bool:

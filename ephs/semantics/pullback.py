@@ -57,7 +57,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
 
     def carried() -> tuple[Condition, ...]:
         inner = process.verdict.conditions
-        return tuple(Condition(c.statement, c.proved, f"{c.how}; seen through e' = T e") for c in inner)
+        return tuple(Condition(c.statement, c.proved, ("seen", c.how)) for c in inner)
 
     proof = carried if sound else None
 

@@ -14,7 +14,7 @@ from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proo
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.verdicts.checks import STATEMENTS
-from ephs.semantics.verdicts.verdict import Condition, proved
+from ephs.semantics.verdicts.verdict import Condition, stated
 
 
 def quadratic(
@@ -43,7 +43,7 @@ def quadratic(
         # the kernel knows no reference environment
         kernel=None if Bundle.of(interface).charges else Kernel("quadratic", Linear("quadratic"), tuple(q.ravel())),
         formula=formula,
-        proof=lambda: _quadratic_proof(interface, q),
+        proof=None if formula is not None else lambda: _quadratic_proof(interface, q),
         trusted=trusted,
     )
 
@@ -55,10 +55,10 @@ def _quadratic_proof(interface: Interface, q: Array) -> tuple[Condition, ...]:
     even, turned, slope, hot = STATEMENTS["storage"]
     plain = all(manifold(quantity.space).code == codes.VECTOR for _, _, quantity in bundle.items())
     return (
-        Condition(even, not np.any(q[np.multiply.outer(parity, parity) < 0.0]), "Q joins states of one parity only"),
-        Condition(turned, plain, "none is read"),
-        Condition(slope, plain and np.array_equal(q, q.T) and bool(np.all(np.isfinite(q))), "Q is symmetric"),
-        Condition(hot, "entropy" not in bundle.charges, "no entropy is stored"),
+        stated(even, not np.any(q[np.multiply.outer(parity, parity) < 0.0]), "Q joins states of one parity only"),
+        stated(turned, plain, "none is read"),
+        stated(slope, plain and np.array_equal(q, q.T) and bool(np.all(np.isfinite(q))), "Q is symmetric"),
+        stated(hot, "entropy" not in bundle.charges, "no entropy is stored"),
     )
 
 
@@ -68,9 +68,6 @@ def exponential(
     """E = c1·(exp(s/c2) − 1): energies count from s = 0, so that small heats are not lost beside a large E."""
     sound = c1 > 0.0 and 0.0 < c2 < math.inf and 0.0 < c1 / c2 < math.inf
 
-    def proof() -> tuple[Condition, ...]:
-        return proved("an entropy is even, dE = θ = c1/c2 exp(s/c2), c1 > 0 and c2 > 0", *STATEMENTS["storage"])
-
     return stored(
         name,
         power_ports(s=quantity.entropy),
@@ -78,7 +75,6 @@ def exponential(
         {"c1": c1, "c2": c2},
         parameters,
         formula=formula,
-        proof=proof if sound else None,
         # a random state of a small capacity is too cold or too hot for differences
         trusted=sound,
     )
@@ -159,7 +155,7 @@ def dissipation(
         return onsager(resistance(x, u, theta) if callable(resistance) else resistance, u, theta)
 
     proof: Proof | None = shown
-    if not callable(resistance):
+    if formula is None and not callable(resistance):
         mu = np.asarray(resistance, dtype=float)
         proof = lambda: dissipation_proof(interface, mu)  # noqa: E731 - beside the one that is given
     said: dict[str, Any] = {"formula": formula, "proof": proof, "trusted": trusted, "one_sided": one_sided}
@@ -193,10 +189,10 @@ def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition
     symmetric, definite, energy, conserving, mirrored, turned = STATEMENTS["irreversible"]
     form = "M = Bᵀ (μ/θ) B with B = [θ, −u]"
     return (
-        Condition(symmetric, sound, f"{form}, μ is symmetric"),
-        Condition(definite, square, f"{form}, μ ⪰ 0 and θ > 0"),
-        Condition(energy, sound, f"{form}, B eᴱ = 0"),
-        Condition(conserving, not power.quantity.environment, "there are none"),
-        Condition(mirrored, sound, "μ is even"),
-        Condition(turned, sound, "μ reads none" if mu is not None else "μ is even in quaternions"),
+        stated(symmetric, sound, f"{form}, μ is symmetric"),
+        stated(definite, square, f"{form}, μ ⪰ 0 and θ > 0"),
+        stated(energy, sound, f"{form}, B eᴱ = 0"),
+        stated(conserving, not power.quantity.environment, "there are none"),
+        stated(mirrored, sound, "μ is even"),
+        stated(turned, sound, "μ reads none" if mu is not None else "μ is even in quaternions"),
     )

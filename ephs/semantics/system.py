@@ -260,8 +260,10 @@ class System:
 
         return check_system(self, reference, state=state)
 
-    def to_dict(self) -> "dict[str, Any]":
+    def to_dict(self, *, proofs: bool = False) -> "dict[str, Any]":
         """The system as nested dictionaries of text and numbers: patterns, library parts, formulas as data.
+
+        With ``proofs``, what proves the components' structures is in it, too; reading replays it.
 
         Raises
         ------
@@ -270,7 +272,7 @@ class System:
         """
         from ephs.semantics.documents import to_dict
 
-        return to_dict(self)
+        return to_dict(self, proofs)
 
     @staticmethod
     def from_dict(document: Mapping[str, object]) -> "System":
@@ -285,11 +287,11 @@ class System:
 
         return from_dict(document)
 
-    def to_json(self) -> str:
-        """The document as JSON text, by the schema ``ephs/semantics/system.schema.json``; errors as of `to_dict`."""
+    def to_json(self, *, proofs: bool = False) -> str:
+        """The document as JSON text, by the schema ``ephs/semantics/system.schema.json``; as `to_dict`."""
         from ephs.semantics.documents import to_json
 
-        return to_json(self)
+        return to_json(self, proofs)
 
     @staticmethod
     def from_json(text: str | bytes) -> "System":

@@ -77,9 +77,7 @@ def failures_of(run: Run) -> Generator[None, None, None]:
 
 
 def _no_motion(problem: Problem) -> str:
-    """The equations that contradict each other at the start of a system without scene, if no motion exists there."""
-    if problem.scene is not None:
-        return ""
+    """The equations that contradict each other at the start, if no motion exists there."""
     try:
         found = problem.descriptor.system.relation(problem.reference).at(problem.initial)
     except SemanticsError:

@@ -15,9 +15,7 @@ class Break:
 
 
 BREAKS = {
-    "left trivialisation": Break(
-        "ephs/semantics/symbols/calculus.py", "[[-a, -b, -c], [w, -c, b]", "[[-a, -b, -c], [w, c, b]"
-    ),
+    "left trivialisation": Break("ephs/semantics/verdicts/claims.py", '[[0.0, ("-", c), b], ', "[[0.0, c, b], "),
     "slope of a product": Break(
         "ephs/semantics/derive/slopes.py", "a.slopes, b.mean, b.slopes, a.mean", "a.slopes, b.start, b.slopes, a.end"
     ),

@@ -30,7 +30,7 @@ def judged(matrix, ports=PORTS):
 @given(skews())
 def test_what_is_right_is_proved(matrix):
     assert judged(matrix) == "proved"
-    assert all("as given" in c.how or "no " in c.how for c in judged(matrix).conditions)
+    assert all(c.how == ("expansion", "as given") for c in judged(matrix).conditions)
 
 
 @given(skews(), st.sampled_from([(0, 1), (2, 1), (0, 3), (2, 3)]), st.sampled_from([1e-13, 1e-9, 1e-4, 1.0]))

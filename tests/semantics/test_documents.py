@@ -20,10 +20,10 @@ from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
 from ephs.operad.reading import Reader
 from ephs.semantics import Storage
 from ephs.semantics.catalogue import find_part, part_of
+from ephs.semantics.derive.recording import record as recording
 from ephs.semantics.documents import SCHEMA_FILE
 from ephs.semantics.primitive_documents import AGREEMENT, _said
-from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, Written, record, term_from, term_of
-from ephs.semantics.symbols.tracing import symbols_of, trace
+from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, Written, record, recorded, term_from
 from ephs.testing import systems
 from tests.semantics.test_primitives import ARGUMENTS
 
@@ -294,10 +294,8 @@ def test_every_operation_is_written_and_read(word):
     inner = [["+", 1.5 if word == "acosh" else 0.25, ["*", 0.5, "q"]], ["entry", "r", 1]][:least]
     names = {"q": 1, "r": 2}
     term = term_from(Reader("system"), "here", [word, *inner], names)
-    q, *r = symbols_of("q", Q.displacement, 1) + symbols_of("r", Q.displacement, 2)
-    traced = trace(Written(term), {"q": q, "r": tuple(r)})
-    values = {q: "q", r[0]: ("entry", "r", 0), r[1]: ("entry", "r", 1)} | dict(traced.parameters)
-    again = term_of(traced.outputs.item(), values)
+    inputs = "q", ("entry", "r", 0), ("entry", "r", 1)
+    (again,) = recorded(recording(Written(term), {"q": None, "r": 2}), list(inputs))
     x = {"q": 0.3, "r": np.array([0.1, 0.7])}
     assert Written(again)(**x) == pytest.approx(Written(term)(**x), rel=1e-14)
     assert term_from(Reader("system"), "here", json.loads(json.dumps(record(again))), names) == again

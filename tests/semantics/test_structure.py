@@ -16,7 +16,7 @@ from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
 from ephs.semantics.stage.store import STORE
-from ephs.semantics.symbols import proofs as prover
+from ephs.semantics.verdicts import proving as prover
 from ephs.semantics.verdicts.proving import conditions_of
 from ephs.semantics.verdicts.verdict import Condition, StructureVerdict
 from ephs.testing import check_entropy_production, check_primitive
@@ -113,16 +113,16 @@ def test_the_formulas_of_the_library_are_proved_symbolically(name):
 
 @pytest.fixture
 def proofs(tmp_path, monkeypatch):
-    """Formulas proved by SymPy so far, with an empty store on disk."""
+    """Kinds of claims that were proved so far, with an empty store on disk."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(STORE, "usable", True)
     done = []
 
-    def counted(primitive, signs, prove=prover.findings_of):
-        done.append(primitive.name)
-        return prove(primitive, signs)
+    def counted(claim, prove=prover.evidence_of):
+        done.append(claim.kind)
+        return prove(claim)
 
-    monkeypatch.setattr(prover, "findings_of", counted)
+    monkeypatch.setattr(prover, "evidence_of", counted)
     return done
 
 
@@ -142,24 +142,16 @@ def test_proofs_of_other_signs_and_of_foreign_functions_are_not_taken_from_disk(
     own = ephs.storage({"q": Q.displacement}, lambda q: 0.5 * q * q)
     for _ in range(2):
         assert all(condition.proved for condition in conditions_of(own))
-    assert proofs.count(own.name) >= 2
-
-
-BY_SYMBOLS = (
-    "ideal_mixture", "inertance", "laminar_leak", "orifice", "pipe_loss", "reaction", "reluctance",
-    "saturating_inductor", "saturating_reluctance", "tank",
-)  # fmt: skip
-"""Parts that are proved from their formula, when somebody asks."""
-TRUSTED = {name: given for name, given in ARGUMENTS.items() if name not in BY_SYMBOLS}
+    assert proofs.count("storage") >= 2
 
 
 def test_the_library_is_proved_without_symbols():
     """Making and checking a system of library parts must not load SymPy."""
     code = (
-        "import sys\nfrom ephs.semantics import library\n"
-        f"for name, arguments in {TRUSTED!r}.items():\n"
-        "    assert getattr(library, name)(**arguments).verdict == 'proved'\n"
-        "assert 'sympy' not in sys.modules and 'hypothesis' not in sys.modules"
+        "import sys\nfrom tests.semantics.test_primitives import ARGUMENTS, made\n"
+        "for name in ARGUMENTS:\n"
+        "    assert made(name).verdict == 'proved'\n"
+        "assert 'sympy' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -223,9 +215,9 @@ def test_right_primitives_that_cannot_be_traced_are_searched(name):
 
 
 def test_a_verdict_is_a_word_with_its_conditions():
-    verdict = StructureVerdict([Condition("a", True, "x"), Condition("b", False, "y")])
-    assert verdict == "searched" and verdict.open == (Condition("b", False, "y"),)
-    assert verdict.text == "searched\n  a: proved, x\n  b: searched, y"
+    verdict = StructureVerdict([Condition("a", True, ("stated", "x")), Condition("b", False, ("off", "y"))])
+    assert verdict == "searched" and verdict.open == (Condition("b", False, ("off", "y")),)
+    assert verdict.text == "searched\n  a: proved, by construction: x\n  b: searched, y"
     assert pickle.loads(pickle.dumps(verdict)).conditions == verdict.conditions
 
 

@@ -157,7 +157,7 @@ class _Merge:
             discrete_gradient=discrete,
             parameters=(("first", one.parameters), ("second", two.parameters), ("x", tuple(x.tolist()))),
             proof=lambda: tuple(
-                Condition(a.statement, a.proved and b.proved, f"{a.how}; likewise of the second, carried by x")
+                Condition(a.statement, a.proved and b.proved, ("both", a.how, b.how))
                 for a, b in zip(one.verdict.conditions, two.verdict.conditions, strict=True)
             ),
             trusted=True,

@@ -13,16 +13,21 @@ from typing import Any, Protocol, TypeAlias, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.derive import relations
+from ephs.semantics.derive.tape import evaluate
 from ephs.semantics.differences import slope
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.components import efforts_of, rates_of
 from ephs.semantics.meaning.elimination import eliminated
-from ephs.semantics.meaning.fields import Row
+from ephs.semantics.meaning.fields import ROUNDED, Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable
-from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.primitives import Point, Primitive, Storage
+from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.rank import DIFFERENCE
+from ephs.semantics.stage.duals import Duals
+from ephs.semantics.stage.plain import PLAIN
 
 Labelled: TypeAlias = "tuple[str, Path, Row[Any]]"
 """Origin of an equation (``flow`` or ``effort`` of a junction, or ``component``), its path, and the row."""
@@ -131,18 +136,38 @@ def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
 
 def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Row[Any]]:
     """H″ by rows: of each effort at a storage's ports, minus its change with the rates of the states."""
-
-    def effort(v: Array) -> Array:
-        return storage.effort(storage.retract(point.read(path, storage), v), point.reference)
-
-    rates = rates_of(storage, path, point.names)
-    hessian = slope(effort, np.zeros(len(rates))).tolist()
-    efforts = efforts_of(storage, path)
+    rates, efforts = rates_of(storage, path, point.names), efforts_of(storage, path)
+    hessian, error = curvature(storage, point.read(path, storage))
     return {
         name: {
-            rate: point.field.number(-entry, DIFFERENCE * abs(entry))
+            rate: point.field.number(-entry, error * abs(entry))
             for rate, entry in zip(rates, row, strict=True)
             if entry
         }
-        for name, row in zip(efforts, hessian, strict=True)
+        for name, row in zip(efforts, hessian.tolist(), strict=True)
     }
+
+
+def curvature(storage: Storage, x: Point) -> tuple[Array, float]:
+    """H″ (n, n) in trivialised directions, with the relative error of its entries.
+
+    Exact derivatives of the recorded energy of vectors; else differences of the efforts.
+    """
+    kernel, n = storage.kernel, storage.bundle.size
+    if kernel is not None and isinstance(kernel.relation, relations.Storage):
+        tape, parameters = kernel.relation.energy, kernel.parameters[len(kernel.potentials) :]
+        if all(port.code == codes.VECTOR for port in kernel.relation.ports):
+            first = Duals(PLAIN, n)
+            second = Duals(first, n)
+            numbers = np.concatenate([x[port] for port in storage.reads])
+            inputs = [second.along(first.along(value, i), i) for i, value in enumerate(map(float, numbers))]
+            constants = [second.dual(first.dual(value)) for value in parameters[: tape.parameters]]
+            with np.errstate(all="ignore"):
+                (energy,) = evaluate(second, tape, inputs, constants)
+            slopes = [first.dual(each).slopes for each in second.dual(energy).slopes]
+            return np.array(slopes, dtype=float).reshape(n, n), ROUNDED
+
+    def effort(v: Array) -> Array:
+        return storage.effort(storage.retract(x, v), Reference())
+
+    return slope(effort, np.zeros(n)), DIFFERENCE

@@ -1,9 +1,11 @@
-"""Bounds of an expression over intervals of its symbols: interval arithmetic, rounded outwards."""
+"""Bounds and signs of a term from those of its symbols: interval arithmetic, rounded outwards; rules of signs."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from itertools import product
 
-from ephs.semantics.symbols.algebra import Expr, sp
+from ephs.semantics.symbols.terms import Term
 
 OUTWARDS = 8e-16
 """Part by which bounds are moved outwards: two of the last digits, and more than functions err by."""
@@ -13,7 +15,7 @@ ROUNDING = 1e-15
 """Error of a cosine."""
 
 Interval = tuple[float, float]
-Bounds = Mapping[Expr, Interval]
+Bounds = Mapping[Term, Interval]
 WHOLE: Interval = (-math.inf, math.inf)
 PIECES = 600
 """Boxes into which a domain is cut, at most."""
@@ -23,18 +25,15 @@ FAR = 1e6
 """Bound beyond which an unbounded side is no longer cut by doubling."""
 
 
-def at_least(expression: Expr, bounds: Bounds, *, strict: bool) -> bool:
-    """Whether an expression is proved ≥ 0, or > 0, on a box; undecided boxes are bisected.
-
-    Symbols without bounds run over all numbers.
-    """
-    symbols = sorted(expression.free_symbols, key=str)
-    boxes: list[tuple[Interval, ...]] = [tuple(bounds.get(symbol, WHOLE) for symbol in symbols)]
-    for _ in range(min(PIECES, 1 + OPERATIONS // (1 + int(expression.count_ops())))):
+def at_least(term: Term, bounds: Bounds, *, strict: bool) -> bool:
+    """Whether a term is proved ≥ 0, or > 0, on a box; undecided boxes are bisected."""
+    symbols = sorted(_symbols(term), key=str)
+    boxes: list[tuple[Interval, ...]] = [tuple(bounds[symbol] for symbol in symbols)]
+    for _ in range(min(PIECES, 1 + OPERATIONS // (1 + _size_of(term)))):
         if not boxes:
             return True
         box = boxes.pop()
-        low, high = _bounds(expression, dict(zip(symbols, box, strict=True)))
+        low, high = _bounds(term, dict(zip(symbols, box, strict=True)))
         if low > 0.0 or (low == 0.0 and not strict):
             continue
         if high < 0.0:
@@ -46,6 +45,16 @@ def at_least(expression: Expr, bounds: Bounds, *, strict: bool) -> bool:
         middle = _middle(low, high)
         boxes += [(*box[:widest], half, *box[widest + 1 :]) for half in ((low, middle), (middle, high))]
     return not boxes
+
+
+def _symbols(term: Term) -> set[Term]:
+    if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
+        return {term}
+    return {symbol for part in term[1:] for symbol in _symbols(part)} if isinstance(term, tuple) else set()
+
+
+def _size_of(term: Term) -> int:
+    return 1 + sum(map(_size_of, term[1:])) if isinstance(term, tuple) else 0
 
 
 def _width(interval: Interval) -> float:
@@ -76,27 +85,32 @@ def _moved(value: float, side: float) -> float:
     return value + side * OUTWARDS * abs(value) if math.isfinite(value) else value
 
 
-def _bounds(expression: Expr, box: Bounds) -> Interval:
-    if expression.is_Symbol:
-        return box[expression]
-    if expression.is_number:
-        value = float(expression)
-        return (value, value) if expression.is_Integer and abs(value) < 2**53 else _out(value, value)
-    parts = [_bounds(part, box) for part in expression.args]
-    if expression.is_Add:
-        low, high = parts[0]
-        for a, b in parts[1:]:
-            low, high = _out(low + a, high + b)
-        return low, high
-    if expression.is_Mul:
-        found = parts[0]
-        for part in parts[1:]:
-            found = _times(found, part)
-        return found
-    if expression.is_Pow:
-        return _power(parts[0], expression.args[1], parts[1])
-    rule = _RULES.get(expression.func)
-    return rule(*parts[0]) if rule is not None and len(parts) == 1 else WHOLE
+def _bounds(term: Term, box: Bounds) -> Interval:
+    if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
+        return box[term]
+    if not isinstance(term, tuple):
+        value = float(term)
+        return (value, value) if value == term else _out(value, value)
+    word, *arguments = term
+    parts = [_bounds(part, box) for part in arguments]
+    match word, parts:
+        case "+", _:
+            return reduce(lambda one, two: _out(one[0] + two[0], one[1] + two[1]), parts)
+        case "-", [one]:
+            return -one[1], -one[0]
+        case "-", [one, two]:
+            return _out(one[0] - two[1], one[1] - two[0])
+        case "*", _ if len(parts) == 2 and arguments[0] == arguments[1]:
+            return _power(parts[0], (2.0, 2.0))
+        case "*", _:
+            return reduce(_times, parts)
+        case "/", [one, two]:
+            return _times(one, _reciprocal(two))
+        case "^", [base, exponent]:
+            return _power(base, exponent)
+        case _:
+            rule = _RULES.get(word)
+            return rule(*parts[0]) if rule is not None else WHOLE
 
 
 def _times(one: Interval, two: Interval) -> Interval:
@@ -104,14 +118,14 @@ def _times(one: Interval, two: Interval) -> Interval:
     return _out(min(products), max(products))
 
 
-def _power(base: Interval, exponent: Expr, exponents: Interval) -> Interval:
+def _power(base: Interval, exponents: Interval) -> Interval:
     low, high = base
-    if exponent.is_Integer:
-        n = int(exponent)
-        if n < 0:
-            return _reciprocal(_power(base, -exponent, exponents))
-        ends = [_pow(low, float(n)), _pow(high, float(n))]
-        if n % 2 == 0:
+    n = exponents[0]
+    if exponents[0] == exponents[1] and n.is_integer():
+        if n < 0.0:
+            return _reciprocal(_power(base, (-n, -n)))
+        ends = [_pow(low, n), _pow(high, n)]
+        if n % 2.0 == 0.0:
             return _out(0.0 if low <= 0.0 <= high else min(ends), max(ends))
         return _out(*ends)
     if low >= 0.0:  # monotone in base and exponent each
@@ -184,16 +198,90 @@ def _sign(low: float, high: float) -> Interval:
     return (-1.0 if low < 0.0 else 0.0 if low == 0.0 else 1.0), (1.0 if high > 0.0 else 0.0 if high == 0.0 else -1.0)
 
 
-_RULES: dict[Expr, Callable[..., Interval]] = {
-    sp.exp: _rising(math.exp, least=0.0),
-    sp.log: _rising(lambda x: math.log(x) if x > 0.0 else -math.inf),
-    sp.tanh: _rising(math.tanh, -1.0, 1.0),
-    sp.sinh: _rising(math.sinh),
-    sp.atan: _rising(math.atan, -1.6, 1.6),
-    sp.asinh: _rising(math.asinh),
-    sp.sign: _sign,
-    sp.Abs: _size,
-    sp.cosh: _hyperbolic,
-    sp.cos: _wave(0.0),
-    sp.sin: _wave(0.5 * math.pi),
+def _root(low: float, high: float) -> Interval:
+    return _power((max(low, 0.0), max(high, 0.0)), (0.5, 0.5))
+
+
+_RULES: Mapping[str, Callable[..., Interval]] = {
+    "exp": _rising(math.exp, least=0.0),
+    "log": _rising(lambda x: math.log(x) if x > 0.0 else -math.inf),
+    "tanh": _rising(math.tanh, -1.0, 1.0),
+    "sinh": _rising(math.sinh),
+    "atan": _rising(math.atan, -1.6, 1.6),
+    "asinh": _rising(math.asinh),
+    "sqrt": _root,
+    "sign": _sign,
+    "abs": _size,
+    "cosh": _hyperbolic,
+    "cos": _wave(0.0),
+    "sin": _wave(0.5 * math.pi),
 }
+ANY = frozenset({-1, 0, 1})
+EVEN, RISING = ("cosh", "exp", "sinhc"), ("sinh", "tanh", "atan", "asinh", "asin", "atanh", "sign")
+"""Functions that are positive, and those with the sign of their argument."""
+
+
+def signs(term: Term, bounds: Bounds) -> frozenset[int]:
+    """Signs that a term can have where it is defined, by those of its parts; ``("shown", …)`` by its bounds.
+
+    A number that is known to be ≥ 0 counts as positive: a condition that holds there holds at 0, too, by continuity.
+    """
+    if not isinstance(term, tuple) or term[0] == "entry":
+        low, high = bounds[term] if isinstance(term, str | tuple) else (term, term)
+        if low == high == 0.0:
+            return frozenset({0})
+        return frozenset({1 if low >= 0.0 else -1}) if low >= 0.0 or high <= 0.0 else ANY
+    word, *arguments = term
+    if word == "shown":
+        if at_least(arguments[0], bounds, strict=True):
+            return frozenset({1})
+        return frozenset({0, 1}) if at_least(arguments[0], bounds, strict=False) else ANY
+    parts = [signs(each, bounds) for each in arguments]
+    match word, parts:
+        case "+", _:
+            return _of_sum(parts)
+        case "-", [one]:
+            return _opposite(one)
+        case "-", [one, two]:
+            return _of_sum([one, _opposite(two)])
+        case (("*" | "/"), _):
+            return _of_product(arguments, parts)
+        case "^", [base, _] if isinstance(arguments[1], int | float):
+            exponent = float(arguments[1])
+            if exponent.is_integer():
+                return base if exponent % 2.0 else _square(base)
+            return _square(base)  # defined where the base is not negative
+        case (("abs" | "sqrt"), [one]):
+            return _square(one)
+        case _:
+            return frozenset({1}) if word in EVEN else parts[0] if word in RISING else ANY
+
+
+def _opposite(part: frozenset[int]) -> frozenset[int]:
+    return frozenset(-sign for sign in part)
+
+
+def _square(part: frozenset[int]) -> frozenset[int]:
+    return frozenset(sign * sign for sign in part)
+
+
+def _of_sum(parts: Sequence[frozenset[int]]) -> frozenset[int]:
+    sides = frozenset[int]().union(*parts)
+    if {-1, 1} <= sides:
+        return ANY
+    return sides - {0} if any(0 not in part for part in parts) else sides
+
+
+def _of_product(factors: Sequence[Term], parts: Sequence[frozenset[int]]) -> frozenset[int]:
+    """Factors that occur twice are squares."""
+    single: dict[Term, frozenset[int]] = {}
+    squares: list[frozenset[int]] = []
+    for factor, part in zip(factors, parts, strict=True):
+        if factor in single:
+            squares.append(_square(single.pop(factor)))
+        else:
+            single[factor] = part
+    out = frozenset({1})
+    for part in (*single.values(), *squares):
+        out = frozenset(a * b for a, b in product(out, part))
+    return out

@@ -1,25 +1,136 @@
-"""Signs of expressions, and non-negative matrices as sums of squares."""
+"""Search for terms that show signs, and for sums of squares, where a formula does not show them as it is written.
+
+What is found is evidence for `verdicts.replay`, which decides: here nothing needs to be right.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 
 from ephs.semantics.symbols.algebra import Expr, sp
-from ephs.semantics.symbols.bounds import Bounds, at_least
+from ephs.semantics.symbols.bounds import Bounds, signs
+from ephs.semantics.symbols.terms import OPERATIONS, Term
 
 LARGE = 300
 """Largest number of operations in an expression to rewrite; beyond it rewriting may take minutes."""
 FACTORED = (60, 4)
 """Operations and symbols up to which a sum is factored."""
+Squares = tuple[tuple[Term, tuple[Term, ...]], ...]
+"""Factors ≥ 0 and vectors of a sum of squares."""
 
 
-def vanishes(expression: Expr) -> bool:
-    """Whether an expression is shown to be 0."""
-    expression = sp.sympify(expression)
-    if expression == 0 or sp.expand_mul(expression) == 0:
-        return True
-    if expression.count_ops() > 10 * LARGE:
-        return False
-    masked, _ = _masked(expression)
-    if sp.expand(sp.numer(sp.together(masked))) == 0:
-        return True
-    return bool(expression.has(sp.sin, sp.cos) and expression.count_ops() <= LARGE and sp.trigsimp(expression) == 0)
+class Signs:
+    """Expressions of SymPy for terms over the same symbols, and back."""
+
+    def __init__(self, bounds: Bounds) -> None:
+        self.bounds = bounds
+        self._symbols = {
+            term: sp.Symbol(f"x_{i}", real=True, **_sign(low, high))
+            for i, (term, (low, high)) in enumerate(bounds.items())
+        }
+        self._terms: dict[Expr, Term] = {symbol: term for term, symbol in self._symbols.items()}
+
+    def expression(self, term: Term) -> Expr:
+        """A term as an expression; functions that are not elementary stay symbols."""
+        if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
+            return self._symbols[term]
+        if not isinstance(term, tuple):
+            return sp.Rational(term)
+        word, *arguments = term
+        parts = [self.expression(each) for each in arguments]
+        if word in "+*-/^":
+            return OPERATIONS[word][2](*parts)
+        if word in _FUNCTIONS:
+            return _FUNCTIONS[word](*parts)
+        opaque = sp.Symbol(f"{word}({', '.join(map(str, parts))})", real=True, **_known(signs(term, self.bounds)))
+        self._terms[opaque] = term
+        return opaque
+
+    def term(self, expression: Expr) -> Term:
+        """An expression as a term."""
+        if expression in self._terms:
+            return self._terms[expression]
+        if expression.is_Rational:
+            number = float(expression)
+            p, q = int(expression.p), int(expression.q)
+            return number if sp.Rational(number) == expression else p if q == 1 else ("/", p, q)
+        if expression.is_Number or expression.is_NumberSymbol:
+            return float(expression)
+        word = _WORDS[expression.func]
+        return (word, *(self.term(argument) for argument in expression.args))
+
+    def shown(self, term: Term, *, strict: bool = False) -> "Term | None":
+        """A term that says by the signs of its parts that it is ≥ 0, or > 0, and equals the given one."""
+        allowed = {1} if strict else {0, 1}
+        if signs(term, self.bounds) <= allowed:
+            return term
+        expression = self.expression(term)
+        for candidate in (rational(expression), _factored(expression)):
+            found = self._product(candidate, strict)
+            if signs(found, self.bounds) <= allowed:
+                return found
+        return None
+
+    def _product(self, expression: Expr, strict: bool) -> Term:
+        """The term of a product whose factors each show their sign, where they have one."""
+        return ("*", *(self._factor(factor, strict) for factor in sp.Mul.make_args(expression)))
+
+    def _factor(self, factor: Expr, strict: bool) -> Term:
+        base, power = factor.as_base_exp()
+        if not base.is_Add:
+            return self.term(factor)
+        allowed = {1} if strict else {0, 1}
+        for side in (base, -base):
+            for term in self._sums(side, strict):
+                if signs(term, self.bounds) <= allowed:
+                    signed: Term = term if side is base else ("-", term)
+                    return signed if power == 1 else ("^", signed, self.term(power))
+        return self.term(factor)
+
+    def _sums(self, expression: Expr, strict: bool) -> Iterator[Term]:
+        """Ways to write a sum that may show its sign."""
+        expanded = sp.expand(expression)
+        yield self.term(expanded)
+        yield from self._completed(expanded)
+        yield ("shown", self.term(expression))
+        if expanded.is_polynomial():
+            yield ("shown", self.term(sp.horner(expanded)))
+
+    def _completed(self, expression: Expr) -> Iterator[Term]:
+        """a (x + b/2a)² + (4ac − b²)/4a of a x² + b x + c."""
+        for symbol in sorted(expression.free_symbols, key=str):
+            if not expression.is_polynomial(symbol) or sp.degree(expression, symbol) != 2:
+                continue
+            a, b, c = (expression.coeff(symbol, k) for k in (2, 1, 0))
+            square: Term = ("*", self.term(a), ("^", self.term(symbol + b / (2 * a)), 2.0))
+            rest = sp.expand(4 * a * c - b**2)
+            for term in (self.term(sp.factor(rest)), *(self._completed(rest) if rest.free_symbols else ())):
+                yield ("+", square, ("/", term, ("*", 4.0, self.term(a))))
+
+    def squares(self, matrix: Sequence[Term]) -> "Squares | None":
+        """A symmetric matrix (n, n) as Σ d v vᵀ, by elimination along the diagonal, each d ≥ 0."""
+        n = int(len(matrix) ** 0.5)
+        rest = sp.Matrix(n, n, [rational(self.expression(entry)) for entry in matrix])
+        left, found = list(range(n)), list[tuple[Term, tuple[Term, ...]]]()
+        while any(rest[i, j] != 0 for i in left for j in left):
+            for pivot in left:
+                d = rest[pivot, pivot]
+                shown = None if d == 0 else self.shown(self.term(d))
+                if shown is not None:
+                    break
+            else:
+                return None
+            column = [rational(rest[i, pivot] / d) if i in left else sp.Integer(0) for i in range(n)]
+            found.append((shown, tuple(map(self.term, column))))
+            rest = (rest - d * sp.Matrix(column) * sp.Matrix([column])).applyfunc(rational)
+            left.remove(pivot)
+        return tuple(found)
+
+
+def _sign(low: float, high: float) -> Mapping[str, bool]:
+    return {"positive": True} if low >= 0.0 else {"negative": True} if high <= 0.0 else {}
+
+
+def _known(possible: frozenset[int]) -> Mapping[str, bool]:
+    return _sign(*{frozenset({1}): (0.0, 1.0), frozenset({-1}): (-1.0, 0.0)}.get(possible, (-1.0, 1.0)))
 
 
 def _masked(expression: Expr) -> tuple[Expr, dict[Expr, Expr]]:
@@ -27,13 +138,9 @@ def _masked(expression: Expr) -> tuple[Expr, dict[Expr, Expr]]:
     atoms = [e for e in sp.preorder_traversal(expression) if e.is_Function or (e.is_Pow and not e.exp.is_Integer)]
     names: dict[Expr, Expr] = {}
     for atom in dict.fromkeys(atoms):
-        names[atom] = sp.Dummy(real=True, **_known(atom))
+        names[atom] = sp.Dummy(real=True, positive=True if atom.is_positive else None)
     masked = expression.xreplace(names)  # from the outside inwards: replacing an atom removes its contents
     return masked, {symbol: atom for atom, symbol in names.items()}
-
-
-def _known(expression: Expr) -> dict[str, bool]:
-    return {"positive": True} if expression.is_positive else {"nonnegative": True} if expression.is_nonnegative else {}
 
 
 def rational(expression: Expr) -> Expr:
@@ -44,23 +151,9 @@ def rational(expression: Expr) -> Expr:
     return sp.cancel(sp.together(masked)).xreplace(atoms)
 
 
-def sign_shown(expression: Expr, bounds: Bounds, *, strict: bool) -> str:
-    """Proof that an expression is ≥ 0, or > 0; empty where there is none."""
-    expression = sp.sympify(expression)
-    if _by_signs(expression, strict):
-        return "by the signs of its terms"
-    if expression.count_ops() <= LARGE:
-        factored = _factored(expression)
-        if _by_signs(factored, strict):
-            return "by the signs of its factors"
-        if _by_factors(factored, bounds, strict):
-            return "as a product of squares and what is of one sign"
-    if at_least(expression, bounds, strict=strict):
-        return "by interval arithmetic"
-    return ""
-
-
 def _factored(expression: Expr) -> Expr:
+    if expression.count_ops() > LARGE:
+        return expression
     masked, atoms = _masked(expression)
     masked = sp.cancel(sp.together(masked))
     operations, symbols = FACTORED
@@ -69,108 +162,15 @@ def _factored(expression: Expr) -> Expr:
     return sp.factor_terms(masked).xreplace(atoms)
 
 
-def _by_signs(expression: Expr, strict: bool) -> bool:
-    return bool(expression.is_positive if strict else expression.is_nonnegative)
-
-
-def _by_factors(expression: Expr, bounds: Bounds, strict: bool) -> bool:
-    """A product whose factors are even powers, or of one sign each."""
-    negative = False
-    for factor in sp.Mul.make_args(expression):
-        base, power = factor.as_base_exp()
-        if not strict and power.is_integer and power.is_even and power.is_positive:
-            continue
-        if factor.is_negative:
-            negative = not negative
-        elif not (_by_signs(factor, strict) or _sum_shown(base if power == 1 else factor, bounds, strict)):
-            if not _sum_shown(-base if power == 1 else -factor, bounds, strict):
-                return False
-            negative = not negative
-    return not negative
-
-
-def _sum_shown(expression: Expr, bounds: Bounds, strict: bool) -> bool:
-    if not expression.is_Add:
-        return False
-    expanded = sp.expand(expression)
-    if _by_signs(expanded, strict):
-        return True
-    return _by_square(expanded, strict) or _by_roots(expanded, strict) or at_least(expression, bounds, strict=strict)
-
-
-def _by_square(expression: Expr, strict: bool) -> bool:
-    """a x² + b x + c with a > 0 and 4ac ≥ b²."""
-    for symbol in sorted(expression.free_symbols, key=str):
-        if not expression.is_polynomial(symbol) or sp.degree(expression, symbol) != 2:
-            continue
-        a, b, c = (expression.coeff(symbol, k) for k in (2, 1, 0))
-        rest = sp.expand(4 * a * c - b**2)
-        if _by_signs(a, True) and (_by_signs(sp.factor(rest), strict) or _by_square(rest, strict)):
-            return True
-    return False
-
-
-def _by_roots(expression: Expr, strict: bool) -> bool:
-    """A polynomial with numerical coefficients: real roots of even multiplicity only, none for strict positivity."""
-    symbols = expression.free_symbols
-    if len(symbols) != 1 or not expression.is_polynomial(*symbols):
-        return False
-    (symbol,) = symbols
-    polynomial = sp.Poly(expression, symbol)
-    if not all(coefficient.is_Rational for coefficient in polynomial.all_coeffs()):
-        return False
-    least = 0 if symbol.is_positive else None
-    inside = 1 if symbol.is_positive else 0
-    odd = [factor for factor, times in polynomial.sqf_list()[1] if strict or times % 2]
-    return all(factor.count_roots(least, None) == 0 for factor in odd) and polynomial.eval(inside) > 0
-
-
-def squares_shown(matrix: Expr, bounds: Bounds) -> str:
-    """Proof that a symmetric matrix is a non-negative combination of squares; empty where there is none.
-
-    M = Σ d v vᵀ by elimination along the diagonal, each d ≥ 0. Where a pivot may be 0 the rest holds on a dense set,
-    and so everywhere if M is continuous.
-    """
-    rest, steps = matrix, list[str]()
-    left = list(range(matrix.rows))
-    continuous = not matrix.has(sp.sign, sp.Heaviside, sp.Piecewise, sp.floor, sp.ceiling)
-    while left:
-        if all(vanishes(rest[i, j]) for i in left for j in left):
-            return _told(steps)
-        for pivot in left:
-            d = rational(rest[pivot, pivot])
-            if d == 0:
-                continue
-            how = sign_shown(d, bounds, strict=False)
-            column = {i: rational(rest[i, pivot] / d) for i in left}
-            sound = continuous or all(_never_zero(sp.denom(v)) for v in column.values())
-            if how and sound and all(_thin(sp.denom(v)) for v in column.values()):
-                break
-        else:
-            return ""
-        steps.append(how)
-        reduced = rest.copy()
-        left.remove(pivot)
-        for i in left:
-            for j in left:
-                entry = rest[i, j] - column[i] * column[j] * d
-                reduced[i, j] = sp.Integer(0) if vanishes(entry) else entry
-        rest = reduced
-    return _told(steps)
-
-
-def _told(steps: list[str]) -> str:
-    kind = {1: "a square with a factor", 0: "it is 0"}.get(len(steps), f"a sum of {len(steps)} squares with factors")
-    ways = dict.fromkeys(step for step in steps if step)
-    return f"{kind} ≥ 0, {' and '.join(ways)}" if ways else kind
-
-
-def _never_zero(expression: Expr) -> bool:
-    return bool(sp.sympify(expression).is_nonzero)
-
-
-def _thin(expression: Expr) -> bool:
-    """Whether it vanishes on no open set: it is analytic and not identically 0, or has no zeros."""
-    expression = sp.sympify(expression)
-    kinks = expression.has(sp.Abs, sp.sign, sp.Heaviside, sp.Piecewise, sp.Min, sp.Max, sp.floor)
-    return _never_zero(expression) or (not kinks and expression != 0)
+_FUNCTIONS: Mapping[str, Expr] = {"abs": sp.Abs} | {
+    name: getattr(sp, name)
+    for name in (
+        *("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "exp", "log"),
+        *("sign", "sin", "sinh", "sqrt", "tan", "tanh"),
+    )
+}
+_WORDS: Mapping[Expr, str] = {function: word for word, function in _FUNCTIONS.items() if word != "sqrt"} | {
+    sp.Add: "+",
+    sp.Mul: "*",
+    sp.Pow: "^",
+}

@@ -4,7 +4,8 @@ A term is a number, the name of a scalar port, or a tuple of an operation's name
 ``("entry", "q", 3)`` is a number of the port q. In a document tuples are lists.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add, mul
@@ -14,8 +15,7 @@ from typing import Any, TypeAlias, cast, final
 import numpy as np
 
 from ephs.operad.reading import Reader
-from ephs.semantics.derive.recording import Recorded, Untraceable
-from ephs.semantics.symbols.algebra import Expr, sp
+from ephs.semantics.derive.recording import Recorded, Recording, Untraceable
 
 Term: TypeAlias = "float | str | tuple[Any, ...]"
 DEPTH, NODES = 50, 10_000
@@ -132,51 +132,81 @@ class Structure:
         return self.skew and self.skew(**x), self.constraint and self.constraint(**x)
 
 
-def term_of(expression: Expr, values: Mapping[Expr, Term]) -> Term:
-    """The term of a SymPy expression.
+def recorded(recording: Recording, inputs: Sequence[Term]) -> tuple[Term, ...]:
+    """The terms of what a function recorded; those that are used several times are the same objects.
 
     Parameters
     ----------
-    values
-        Symbol -> the term that it stands for: a port's name or entry, or a number.
+    inputs
+        Terms of the function's arguments, number by number.
+    """
+    return tuple(recording.tape.run(_RECORDED, float, list(inputs), list(recording.parameters)))
+
+
+def _joined(word: str) -> Callable[..., Term]:
+    """A sum or product, with that of its first terms in one."""
+
+    def joined(a: Term, b: Term) -> Term:
+        return (*a, b) if isinstance(a, tuple) and a[0] == word else (word, a, b)
+
+    return joined
+
+
+def _called(word: str) -> Callable[..., Term]:
+    return lambda *arguments: (word, *arguments)
+
+
+def _expm1(a: Term) -> Term:
+    return ("-", ("exp", a), 1.0)
+
+
+def _log1p(a: Term) -> Term:
+    return ("log", ("+", 1.0, a))
+
+
+_RECORDED: Mapping[str, Callable[..., Any]] = MappingProxyType(
+    {name: _called(name) for name in (*OPERATIONS, "sinhc", "turn_ratio", "turn_curve", "choose", "squared turn")}
+    | {
+        "turn_curve_slope": _called("turn_curve_slope"),
+        "root": _called("root"),
+        "+": _joined("+"),
+        "*": _joined("*"),
+        "negative": _called("-"),
+        "absolute": _called("abs"),
+        "power": _called("^"),
+        "exponential": _called("^"),
+        "expm1": _expm1,
+        "log1p": _log1p,
+    }
+)
+"""Operations of a tape as terms."""
+
+
+def simple(term: Term) -> Term:
+    """A term of a document: no deeper or larger than may be read back, of known operations.
 
     Raises
     ------
     Untraceable
-        A function that is not among the operations, or a term that is too deep or too large.
+        It is deeper or larger, or has a number that is not finite or an operation that documents do not know.
     """
     left = NODES
 
-    def written(entry: Expr, depth: int) -> Term:
+    def asked(entry: Term, depth: int) -> None:
         nonlocal left
         left -= 1
         if depth > DEPTH or left < 0:
             raise Untraceable(f"a formula of more than {DEPTH} levels or {NODES} numbers, names and operations")
-        if entry in values:
-            return values[entry]
-        if entry.is_Number or entry.is_NumberSymbol:
-            if not entry.is_finite:
-                raise Untraceable(f"the number {entry}")
-            return float(entry)
-        word = _WORDS.get(entry.func)
-        if word is None:
-            raise Untraceable(f"the function {entry.func.__name__}")
-        arguments = sorted(entry.args, key=sp.default_sort_key) if word in "+*" else entry.args
-        return (word, *(written(argument, depth + 1) for argument in arguments))
+        if isinstance(entry, float) and not math.isfinite(entry):
+            raise Untraceable(f"the number {entry}")
+        if isinstance(entry, tuple) and entry[0] != "entry":
+            if entry[0] not in OPERATIONS:
+                raise Untraceable(f"the function {entry[0]}")
+            for argument in entry[1:]:
+                asked(argument, depth + 1)
 
-    return written(sp.sympify(expression), 1)
-
-
-_WORDS: Mapping[Any, str] = MappingProxyType(
-    {sp.Add: "+", sp.Mul: "*", sp.Pow: "^", sp.Abs: "abs", sp.atan2: "atan2"}
-    | {
-        getattr(sp, name): name
-        for name in (
-            *("acos", "acosh", "asin", "asinh", "atan", "atanh"),
-            *("cos", "cosh", "exp", "log", "sign", "sin", "sinh", "tan", "tanh"),
-        )
-    }
-)
+    asked(term, 1)
+    return term
 
 
 def record(term: Term) -> Any:

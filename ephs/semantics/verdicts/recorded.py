@@ -79,7 +79,7 @@ def require_recorded(primitive: "Primitive") -> tuple[Condition, ...]:
             if offset is None:  # an energy is known up to a constant
                 offset = own - expected if primitive.kind == "storage" else np.zeros(1)
             _require_alike(primitive, recording, trial, own - offset, expected)
-    return (Condition(DEFINED, False, f"it has none at {gap}"),) if gap else ()
+    return (Condition(DEFINED, False, ("off", f"it has none at {gap}")),) if gap else ()
 
 
 def require_steady(primitive: "Primitive") -> None:

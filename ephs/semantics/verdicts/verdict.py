@@ -3,12 +3,32 @@
 A structure with a counterexample is refused: `StructureError`, with the smallest one found as its ``witness``.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, final
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, final
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive
+
+
+Evidence: TypeAlias = "tuple[Any, ...]"
+"""A word of `FORMS`, and what belongs to it: texts, numbers, terms, and tuples of them."""
+FORMS: Mapping[str, str] = {
+    "expansion": "both sides expand to the same, of the numbers {0}",
+    "signs": "by the signs of the parts of a formula that expands to the same",
+    "squares": "a sum of squares with factors ≥ 0",
+    "rounding": "decided up to the rounding of each number",
+    "relations": "both are one relation over ℚ, of the numbers {0}",
+    "stated": "by construction: {0}",
+    "seen": "that of the process it is made of, seen through e' = T e",
+    "both": "as of both parts that it is made of",
+    "open": "not proved",
+    "searched": "none of {0} states and efforts contradicts it",
+    "off": "{0}",
+}
+"""Words of evidence, and what they say; ``replay`` checks the first ones."""
+OPEN: Evidence = ("open",)
 
 
 @final
@@ -23,15 +43,26 @@ class Condition:
     proved
         For all states and efforts; else no counterexample was found.
     how
-        By which argument, or where it was looked for.
+        Evidence: what proves it, or where it was looked for.
     """
 
     statement: str
     proved: bool
-    how: str
+    how: Evidence
 
     def __str__(self) -> str:
-        return f"{self.statement}: {'proved' if self.proved else 'searched'}, {self.how}"
+        word, *data = self.how
+        return f"{self.statement}: {'proved' if self.proved else 'searched'}, {FORMS[word].format(*data)}"
+
+
+def plain(value: object) -> Any:
+    """Evidence as part of a document: lists in place of tuples."""
+    return [plain(each) for each in cast("tuple[object, ...]", value)] if isinstance(value, tuple) else value
+
+
+def as_evidence(value: object) -> Any:
+    """The inverse of `plain`."""
+    return tuple(map(as_evidence, cast("list[object]", value))) if isinstance(value, list | tuple) else value
 
 
 @final
@@ -69,8 +100,13 @@ class StructureVerdict(str):
 
 
 def proved(how: str, *statements: str) -> tuple[Condition, ...]:
-    """Conditions with a common proof."""
-    return tuple(Condition(statement, True, how) for statement in statements)
+    """Conditions that hold by construction, as whoever made the structure states."""
+    return tuple(Condition(statement, True, ("stated", how)) for statement in statements)
+
+
+def stated(statement: str, holds: bool, why: str) -> Condition:
+    """A condition that holds by construction, or is open."""
+    return Condition(statement, holds, ("stated", why) if holds else OPEN)
 
 
 def examine(primitive: "Primitive") -> StructureVerdict:
@@ -87,9 +123,9 @@ def examine(primitive: "Primitive") -> StructureVerdict:
     if all(each.proved for each in conditions):
         return StructureVerdict(conditions)
     tried = search(primitive, COUNT)
-    how = f"none of {tried} states and efforts contradicts it"
     return StructureVerdict(
-        each if each.proved else Condition(each.statement, False, each.how or how) for each in conditions
+        each if each.proved or each.how != OPEN else Condition(each.statement, False, ("searched", tried))
+        for each in conditions
     )
 
 
@@ -105,13 +141,47 @@ def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[C
 
 def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
     """Each condition with its proof, or without one."""
-    from ephs.semantics.verdicts.checks import STATEMENTS
-    from ephs.semantics.verdicts.search import simplest
-
     if primitive.kind == "environment":
         return proved("by definition of the reference environment", "H = 0 and e = 0")
     if primitive.proof is not None:
         return primitive.proof()
+    formula = primitive.formula
+    if formula is not None and formula.parameters and primitive.trusted:
+        from ephs.semantics.verdicts.proving import signs_of
+
+        signs = tuple(signs_of(primitive).items())
+        key = (primitive.kind, tuple(primitive.interface.items()), primitive.reads, primitive.domain)
+        return _of_library((key, formula.function, formula.gradient, signs), _Alike(primitive))
+    return _shown(primitive)
+
+
+class _Alike:
+    """A primitive that compares equal to all others, to keep it out of cache keys."""
+
+    __slots__ = ("primitive",)
+
+    def __init__(self, primitive: "Primitive") -> None:
+        self.primitive = primitive
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Alike)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+@lru_cache(maxsize=256)
+def _of_library(key: object, like: _Alike) -> tuple[Condition, ...]:
+    """Conditions on all trusted primitives with this formula whose parameters have the same signs."""
+    del key
+    return _shown(like.primitive)
+
+
+def _shown(primitive: "Primitive") -> tuple[Condition, ...]:
+    """Conditions, proved of the formula after it was compared with the function."""
+    from ephs.semantics.verdicts.checks import STATEMENTS
+    from ephs.semantics.verdicts.search import simplest
+
     if primitive.formula is not None:
         from ephs.semantics.verdicts.recorded import require_steady
 
@@ -122,7 +192,7 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
 
         return decided(primitive)
     if primitive.formula is None:
-        return tuple(Condition(statement, False, "") for statement in STATEMENTS[primitive.kind])
+        return tuple(Condition(statement, False, OPEN) for statement in STATEMENTS[primitive.kind])
     from ephs.semantics.verdicts.proving import conditions_of
     from ephs.semantics.verdicts.recorded import require_recorded
 

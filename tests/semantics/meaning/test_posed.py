@@ -16,6 +16,7 @@ from ephs.semantics.meaning import relation_of_pattern
 from ephs.semantics.meaning.fields import Rational, Rounded, as_written
 from ephs.semantics.meaning.functor import filled
 from ephs.semantics.meaning.linear import LinearRelation
+from ephs.semantics.meaning.posed import curvature
 from ephs.semantics.meaning.variables import Variable
 from ephs.testing import nestings
 
@@ -189,3 +190,31 @@ def test_spins_are_not_hidden_by_velocities(apart):
     flight = np.array([0.0, 0.0, 0.0, 1000.0, 0.0, 0.0])
     found = system.relation().at({"one.p": flight + apart * np.eye(6)[0], "two.p": flight})
     assert bool(found.empty) == (apart > 0.0)
+
+
+CURVED = {
+    "a polynomial": (lambda q: 0.25 * q**4 - q**2, lambda q: 3.0 * q**2 - 2.0),
+    "a wave": (lambda q: np.cos(3.0 * q), lambda q: -9.0 * np.cos(3.0 * q)),
+    "an exponential": (lambda q: np.exp(q) * 1e9, lambda q: 1e9 * np.exp(q)),
+}
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_the_curvature_of_a_recorded_energy_is_exact(name):
+    energy, second = CURVED[name]
+    for x in (-1.3, 0.2, 2.0):
+        found, error = curvature(
+            ephs.storage({"q": ephs.quantity.displacement}, energy), {ephs.Path.of("q"): np.array([x])}
+        )
+        assert found[0, 0] == pytest.approx(second(x), rel=1e-14) and error < 1e-14
+
+
+def test_that_of_two_states_is_symmetric_and_what_is_not_recorded_is_differenced():
+    ports = {"a": ephs.quantity.displacement, "b": ephs.quantity.displacement}
+    point = {ephs.Path.of(name): np.array([value]) for name, value in (("a", 0.3), ("b", -0.7))}
+    expected = np.array([[2.0 * -0.7, 2.0 * 0.3], [2.0 * 0.3, 12.0 * 0.49]])
+    found, error = curvature(ephs.storage(ports, lambda a, b: a * a * b + b**4), point)
+    assert np.allclose(found, expected, rtol=1e-15) and error < 1e-14
+    plain = ephs.storage(ports, lambda a, b: float(a) ** 2 * float(b) + float(b) ** 4)
+    differenced, error = curvature(plain, point)
+    assert np.allclose(differenced, expected, rtol=1e-3) and error > 1e-9
