@@ -35,6 +35,7 @@ def info(scene: str, /, *, loading: LoadOptions = AS_GIVEN) -> int:
 def _of_scene(scene: "Scene") -> list[str]:
     from ephs.mechanics.motion.readout import freedoms_of
     from ephs.mechanics.runs.simulate import problem_of_scene
+    from ephs.mechanics.scene.build import element_inputs
     from ephs.mechanics.scene.own_units import mobility_of
 
     bodies, joints = list(scene.all_bodies()), list(scene.all_joints())
@@ -50,18 +51,21 @@ def _of_scene(scene: "Scene") -> list[str]:
             ((n, j.kind, f"{j.body1} – {j.body2}", _coordinates(freedoms[n]) if j.dim else "none") for n, j in joints),
         ),
     ]
+    own = dict.fromkeys(section for section, _, _ in scene.all_elements())
     rest: dict[str, Iterable[str]] = {
         "springs": (name for name, _ in scene.all_springs()),
         "tendons": (name for name, _ in scene.all_tendons()),
         "beams": (name for name, _ in scene.all_beams()),
         "contacts": (name for name, _ in scene.all_contacts()),
         "thermal nodes": (name for name, _ in scene.all_thermal()),
+        **{section: (name for name, _ in scene.every(section)) for section in own},
         "prescribed motions": (name for name, j in joints if j.motion is not None),
     }
     lines += [f"{kind}: {', '.join(_few(names))}" for kind, given in rest.items() if (names := list(given))]
     markers = [f"markers.{name}" for name, _ in scene.all_markers()]
     inputs = [f"joints.{name}" for name, j in joints if j.dim and j.motion is None]
     inputs += [f"{section}.{name}" for section, name, each in scene.all_attachments() if each.commanded]
+    inputs += element_inputs(scene)
     return [
         *lines,
         f"inputs: {', '.join(_few([*inputs, *markers]))}, bodies.NAME",

@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.tendon import tendon as tendon
     from ephs.mechanics.motion.inside import Inside as Inside
     from ephs.mechanics.rewrite.stabilised import stabilised as stabilised
+    from ephs.mechanics.scene.custom import Element as Element
+    from ephs.mechanics.scene.custom import key as key
+    from ephs.mechanics.scene.custom import register_element as register_element
+    from ephs.mechanics.scene.custom import rule as rule
+    from ephs.mechanics.scene.site import Site as Site
 
 _HOME = {
     "armature": "ephs.mechanics.elements.motor",
@@ -33,6 +38,11 @@ _HOME = {
     "motor": "ephs.mechanics.elements.motor",
     "beam_element": "ephs.mechanics.elements.beam",
     "Inside": "ephs.mechanics.motion.inside",
+    "Element": "ephs.mechanics.scene.custom",
+    "key": "ephs.mechanics.scene.custom",
+    "register_element": "ephs.mechanics.scene.custom",
+    "rule": "ephs.mechanics.scene.custom",
+    "Site": "ephs.mechanics.scene.site",
     "joint": "ephs.mechanics.elements.joints",
     "body_pattern": "ephs.mechanics.elements.bodies",
     "rigid_body": "ephs.mechanics.elements.bodies",

@@ -100,6 +100,7 @@ _TEXTS = {
     ),
     "unfilled": "{path}: found a pattern, expected a system or a scene; fill its boxes by pattern(box=…)",
     "unknown-input": "{path}: no such outer power port; the open ports are {expected}",
+    "unnamed": "{path}: it is built on {found}, expected {expected}",
     "input": "{path}: the input is {found}, expected {expected}",
     "joined": "{path}: joined to {port}, found {found}, expected {expected}; only equal quantities share a state",
     "units": "{path}: found {found}, expected {expected}",

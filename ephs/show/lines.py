@@ -1,9 +1,11 @@
-"""What runs straight from point to point of bodies: springs, and the segments of tendons."""
+"""What runs straight from point to point of bodies: springs, segments of tendons, lines of elements of one's own."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, final
 
+from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
+from ephs.mechanics.scene.site import trial
 from ephs.show.motion import Array
 
 
@@ -21,10 +23,20 @@ class BodyLine:
 
 
 def lines_of(scene: Any) -> dict[str, BodyLine]:
-    """The springs of a scene, and the segments NAME-1, NAME-2, … of its tendons."""
+    """The springs of a scene, the segments NAME-1, NAME-2, … of its tendons, and lines of its elements."""
     found = {name: BodyLine(s.body1, s.body2, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
     for name, tendon in scene.all_tendons():
         ends = pairwise(zip(tendon.bodies, tendon.points, strict=True))
         for k, ((one, here), (two, there)) in enumerate(ends, 1):
             found[f"{name}-{k}"] = BodyLine(one, two, here, there, tendon.heat, coiled=False)
+    for path, level in scene.levels():
+        for element in (each for own in level.elements.values() for each in own.values()):
+            site, _ = trial(level, element)
+            for k, (one, here, two, there) in enumerate(element.lines(site), 1):
+                ends = [
+                    (body if body == GROUND else path + body, site.point(body, at))
+                    for body, at in ((one, here), (two, there))
+                ]
+                name = f"{element.section}.{path}{element.name}-{k}"
+                found[name] = BodyLine(ends[0][0], ends[1][0], ends[0][1], ends[1][1], ENVIRONMENT, coiled=False)
     return found

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.runs.signals import View, signal
 from ephs.mechanics.scene.attached import Actuator
 from ephs.mechanics.scene.attaching import supplies_of
-from ephs.mechanics.scene.build import component_path, tension_port
+from ephs.mechanics.scene.build import component_path, element_inputs, tension_port
 from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.operad import Path
@@ -56,6 +56,8 @@ def scene_signals(
     supplied = {key: supplies_of(each) for key, each in attached.items()}
     sizes |= {key: len(given) for key, given in supplied.items() if given}
     sizes |= {key: 1 for key, each in attached.items() if isinstance(each, Actuator)}
+    own = element_inputs(scene)
+    sizes |= {key: signal.at(0.0, {}).size for key, ports in own.items() for signal in ports.values()}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
         push = _of_load(load)
@@ -65,6 +67,9 @@ def scene_signals(
         if supplied.get(key):
             parts = (part_of(given, slice(k, k + 1)) for k in range(len(supplied[key])))
             others |= {s.outer: replace(part, effort=True) for s, part in zip(supplied[key], parts, strict=True)}
+            continue
+        if key in own:
+            others |= {port: replace(given, effort=signal.effort) for port, signal in own[key].items()}
             continue
         if kind in ("joints", "actuators"):
             of = attached.get(key)

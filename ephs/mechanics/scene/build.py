@@ -9,7 +9,7 @@ never clash.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
 from ephs.mechanics.scene.attached import Actuator
 from ephs.mechanics.scene.attaching import SUPPLIED, starts_of, supplies, supplies_of, system_of
+from ephs.mechanics.scene.demands import Demands, demands_on_parts
 from ephs.mechanics.scene.made import Made, spring_system
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
+from ephs.mechanics.scene.site import INPUTS, Level, Site, trial
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.scene.tendons import tendon_ports, tendon_starts, tendon_system
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -73,7 +75,7 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
 
     def made() -> System:
         own = {name for name, j in scene.all_joints() if _is_driven(j)}
-        return _level(scene, _Demands(pushed, frozenset(), own | asked), top=True)
+        return _level(scene, Demands(pushed, frozenset(), own | asked), top=True)
 
     return once(scene, ("system", asked, pushed), made)
 
@@ -129,7 +131,7 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
     for prefix, part in _levels(scene):
         if _needs_environment(part):
             out[prefix / "environment" / "s"] = np.zeros(1)
-    return out
+    return scene_system(scene).state() | out if any(True for _ in scene.all_elements()) else out
 
 
 def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
@@ -153,11 +155,30 @@ def scene_inputs(scene: Scene) -> dict[Path, Signal]:
     """
     out = {supply.outer: Signal(supply.value, effort=True) for supply in supplies(scene)}
     out |= {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
+    out |= {port: signal for ports in element_inputs(scene).values() for port, signal in ports.items()}
     for _, j in scene.all_joints():
         if _is_driven(j):
             for port, where in drive_ports(j):
                 out[port] = Signal(np.array(j.drive[where])) if j.motion is None else Signal.of_motion(j.motion)
     return out
+
+
+def element_inputs(scene: Scene) -> Mapping[str, Mapping[Path, Signal]]:
+    """Inputs of elements of registered sections by their names, each with its ports and what these have without it."""
+
+    def made() -> dict[str, dict[Path, Signal]]:
+        out: dict[str, dict[Path, Signal]] = {}
+        for path, level in scene.levels():
+            for of in (each for own in level.elements.values() for each in own.values()):
+                site, trying = trial(level, of)
+                of.build(site)
+                for port, signal in trying.inputs.items():
+                    _, section, name, *rest = port
+                    key = ".".join([section, path + name, *rest])
+                    out[key] = {Path.of(f"{INPUTS}.{key}"): signal}
+        return out
+
+    return once(scene, "element inputs", made)
 
 
 def scene_names(scene: Scene) -> dict[Path, str]:
@@ -191,31 +212,12 @@ def _needs_environment(scene: Scene) -> bool:
     return any(ENVIRONMENT in c.between for c in scene.conduction.values())
 
 
-@final
-@dataclass(frozen=True, slots=True)
-class _Demands:
-    """Bodies, thermal nodes and driven joints that the level above connects to, by names of this level."""
-
-    bodies: frozenset[str]
-    nodes: frozenset[str]
-    joints: set[str]
-
-    def of_part(self, part: str) -> "_Demands":
-        """The same, as seen from a part."""
-        start = part + "."
-
-        def inside(names: Iterable[str]) -> set[str]:
-            return {name[len(start) :] for name in names if name.startswith(start)}
-
-        return _Demands(frozenset(inside(self.bodies)), frozenset(inside(self.nodes)), inside(self.joints))
-
-
 @dataclass(slots=True)
 class _Builder:
     """Collects the boxes of one level."""
 
-    demands: _Demands
-    inner: _Demands
+    demands: Demands
+    inner: Demands
     junctions: dict[Path, Any] = field(default_factory=dict)
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
@@ -260,11 +262,10 @@ class _Builder:
         self.boxes[path], self.fillings[path] = dict(ports), filling
 
 
-def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
-    inner = _demands_on_parts(scene, demands)
-    grounded = _uses_ground(scene)
-    if grounded and not top:
-        demands = _Demands(demands.bodies | {GROUND}, demands.nodes, demands.joints)
+def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
+    inner = demands_on_parts(scene, demands)
+    if not top:
+        demands = Demands(demands.bodies | {GROUND}, demands.nodes, demands.joints)
     b = _Builder(demands, inner)
     gravity = scene.world.gravity
     for name, body in scene.bodies.items():
@@ -323,7 +324,12 @@ def _level(scene: Scene, demands: _Demands, *, top: bool) -> System:
         if each.warms and each.heat != ENVIRONMENT:
             ports["s"] = b.entropy(each.heat)
         b.add(Path([section, name]), made[0], ports)
-    if grounded and top:
+    exposed = demands.bodies, demands.nodes
+    for of in (each for own in scene.elements.values() for each in own.values()):
+        of.build(Site(scene, of, Level(b.junctions, b.boxes, b.fillings), exposed))
+    if _at("entropies", ENVIRONMENT) in b.junctions and Path(["environment"]) not in b.boxes:
+        b.add(Path(["environment"]), library.environment(), {"s": b.entropy(ENVIRONMENT)})
+    if top and _at("momenta", GROUND) in b.junctions:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
 
@@ -354,34 +360,9 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
         return b.tension(name)
     if group in SUPPLIED:
         return b.supply(_at(group, name))
+    if group == INPUTS:
+        path = Path([INPUTS, rest[0], part, *rest[1:]])
+        b.junctions[path] = junction(of, exposed=True)
+        return str(path)
     joint_name = name if name in b.inner.joints else name.rpartition(".")[0]
     return b.drive(joint_name, Path(["drives", part, *rest]), of)
-
-
-def _demands_on_parts(scene: Scene, demands: _Demands) -> _Demands:
-    """Ports that the level above and this level's joints, springs and conductions need from its parts."""
-    pairs = [*scene.joints.values(), *scene.springs.values()]
-    bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
-    bodies |= {body for tendon in scene.tendons.values() for body in tendon.bodies}
-    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
-        name for c in scene.conduction.values() for name in c.between
-    }
-    attached = [each for _, _, each in scene.attachments()]
-    nodes |= {tendon.heat for tendon in scene.tendons.values()}
-    nodes |= {each.heat for each in attached if each.warms}
-    turned = {name for name, j in scene.joints.items() if j.armature}
-    turned |= {name for each in attached for name in each.tied if not isinstance(each, Actuator)}
-    return _Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
-
-
-def _uses_ground(scene: Scene) -> bool:
-    mine = [*scene.joints.values(), *scene.springs.values()]
-    if GROUND in _touching(scene) or any(GROUND in tendon_ports(tendon).values() for tendon in scene.tendons.values()):
-        return True
-    return any(GROUND in (x.body1, x.body2) for x in mine) or any(map(_uses_ground, scene.parts.values()))
-
-
-def _touching(scene: Scene) -> set[str]:
-    """The bodies of this level's own contacts, as seen from it."""
-    surfaces = dict(scene.all_surfaces())
-    return {surfaces[name].body for c in scene.contacts.values() for name in c.surfaces}

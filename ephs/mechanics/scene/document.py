@@ -11,8 +11,9 @@ import numpy as np
 
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.flexible import Strain
-from ephs.mechanics.scene.model import ELEMENTS, Scene, World, frozen
+from ephs.mechanics.scene.model import ELEMENTS, IDENTITY_POSE, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
+from ephs.mechanics.scene.registry import REGISTERED, elements_from
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -42,6 +43,8 @@ def _types(annotation: Any) -> set[Any]:
 def _plain(value: Any) -> Any:
     if value is None or isinstance(value, str | float | int):
         return value
+    if type(value) in REGISTERED.values():
+        return {name: getattr(value, name) for name in type(value).model_fields}
     if isinstance(value, np.ndarray):
         return {
             "shape": value.shape,
@@ -93,6 +96,8 @@ def _scene(data: dict[str, Any]) -> Scene:
         given[key] = {name: _value(cls, entry) for name, entry in given.get(key, {}).items()}
     given["parts"] = {name: _scene(part) for name, part in given.get("parts", {}).items()}
     given["world"] = _value(World, given["world"])
+    given["elements"] = elements_from(given.get("elements", {}))
+    given["origin"] = _array(given["origin"]) if "origin" in given else IDENTITY_POSE
     adjusted = given["adjusted"]
     if adjusted is not None:
         moved = tuple(Displacement(**entry) for entry in adjusted["moved"])

@@ -11,9 +11,11 @@ from typing import Any, Generic, TypeVar, final, get_args
 
 from pydantic import ValidationError, WrapValidator
 
+from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import FORMS
-from ephs.mechanics.scene.schema import SECTIONS, AssemblyEntry, SceneFile, WorldEntry
+from ephs.mechanics.scene.schema import FILE_KEYS, SECTIONS, AssemblyEntry, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
 from ephs.mechanics.scene.schema_touching import SurfaceShapeEntry
@@ -98,7 +100,7 @@ class Document:
 
 def read_document(raw: Mapping[str, Any], default_name: str, faults: list[Fault]) -> Document:
     """Validate a parsed file table by table; append the faults."""
-    known = list(SceneFile.model_fields)
+    known = [*FILE_KEYS, *REGISTERED]
     for key in raw:
         if key not in known:
             faults.append(_unknown_key(key, key, known))
@@ -112,7 +114,12 @@ def read_document(raw: Mapping[str, Any], default_name: str, faults: list[Fault]
         name = "scene"
     world = validate(WorldEntry, raw["world"], "world", faults).entry if "world" in raw else None
     assembly = validate(AssemblyEntry, raw.get("assembly", {}), "assembly", faults).entry
-    return Document(name, world, assembly, {key: _section(key, raw.get(key, {}), faults) for key in SECTIONS})
+    return Document(
+        name,
+        world,
+        assembly,
+        {key: _section(of, raw.get(key, {}), key, faults) for key, of in (SECTIONS | REGISTERED).items()},
+    )
 
 
 def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked[E]:
@@ -133,6 +140,8 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
                 spoiled.add(str(item["loc"][0]))
             spoiled |= misspelled
     sound = {k: v for k, v in raw.items() if k not in spoiled}
+    if issubclass(model, Element):
+        return Checked(model.model_construct(**sound), frozenset(spoiled))
     required = {k for k, field in model.model_fields.items() if field.is_required()}
     known = _NEUTRAL | (_NEUTRAL_PAIRS if model is SECTIONS["cylinders"] else {})
     neutral = {k: known[k] for k in spoiled & required}
@@ -161,11 +170,11 @@ def _check_format(raw: Mapping[str, Any], faults: list[Fault]) -> None:
         faults.append(fault("format", "format", "nothing" if found is None else shown(found)))
 
 
-def _section(section: str, raw: Any, faults: list[Fault]) -> dict[str, Checked[Any]]:
+def _section(of: type[Entry], raw: Any, section: str, faults: list[Fault]) -> dict[str, Checked[Any]]:
     if not isinstance(raw, Mapping):
         faults.append(fault("table", f"{section}.NAME", shown(raw)))
         return {}
-    return {name: validate(SECTIONS[section], table, f"{section}.{name}", faults) for name, table in raw.items()}
+    return {name: validate(of, table, f"{section}.{name}", faults) for name, table in raw.items()}
 
 
 def _translate(model: type[Entry], key: str, item: Any) -> Fault:

@@ -10,8 +10,19 @@ from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
-from ephs.mechanics.scene.model import ELEMENTS, GROUND, IDENTITY_POSE, Joint, Scene, World, frozen, mapped
+from ephs.mechanics.scene.model import (
+    ELEMENTS,
+    GROUND,
+    IDENTITY_POSE,
+    Joint,
+    Scene,
+    World,
+    frozen,
+    mapped,
+    with_sections,
+)
 from ephs.mechanics.scene.motions import changed, number_of_law
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.surfaces import Contact
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -63,15 +74,15 @@ def placed(scene: Scene, before: Scene, coordinates: Mapping[str, Array], rates:
 
 def _edited(scene: Scene, kind: str, name: str, change: Callable[[Any], Any]) -> Scene:
     """The scene with one of its elements changed, in any part."""
-    own = getattr(scene, kind)
+    own = scene.section(kind)
     if name in own:
-        return replace(scene, **{kind: {**own, name: change(own[name])}})
+        return with_sections(scene, {kind: {**own, name: change(own[name])}})
     part, _, rest = name.partition(".")
     return replace(scene, parts={**scene.parts, part: _edited(scene.parts[part], kind, rest, change)})
 
 
 def _thing(scene: Scene, kind: str, name: str) -> Any:
-    own = getattr(scene, kind)
+    own = scene.section(kind)
     if name in own:
         return own[name]
     part, _, rest = name.partition(".")
@@ -287,6 +298,32 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     if moments.size and moments[0] < -INERTIA * float(np.abs(moments).max()):
         return [fault("friction sign", f"joints.{name}.friction", f"the eigenvalue {moments[0]:.6g}")]
     return []
+
+
+def _registered(section: str) -> dict[str, Field]:
+    """The numbers of elements of a registered section, with the checks of their tables."""
+
+    def field(key: str) -> Field:
+        def get(scene: Scene, name: str) -> Array:
+            value = getattr(_thing(scene, section, name), key)
+            return np.zeros(0) if value is None else np.asarray(value, dtype=float)
+
+        def put(scene: Scene, name: str, values: Array) -> Scene:
+            return _edited(scene, section, name, lambda of: of.changed(**{key: values.tolist()}))
+
+        return Field(get, put, faults=faults)
+
+    def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
+        from ephs.mechanics.scene.resolve_elements import number_faults
+
+        return list(number_faults(_thing(scene, section, name), f"{section}.{name}"))
+
+    return {key: field(key) for key in REGISTERED[section].numbers}
+
+
+def fields_of(kind: str) -> Mapping[str, Field]:
+    """Key of the scene file -> its numbers, of a kind of element; none where there is no such kind."""
+    return _registered(kind) if kind in REGISTERED else FIELDS.get(kind, {})
 
 
 FIELDS: Mapping[str, Mapping[str, Field]] = {

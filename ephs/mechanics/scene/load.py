@@ -21,6 +21,7 @@ from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
 from ephs.mechanics.scene.moving import moved, spring_length
 from ephs.mechanics.scene.resolve_attached import resolve_attached
+from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements
 from ephs.mechanics.scene.state import Asked, adjusted
 from ephs.mechanics.scene.tendons import resolve_tendons, with_pulls
 from ephs.mechanics.scene.text import file_text, lost
@@ -143,6 +144,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     markers = resolve.resolve_plain("markers", document, names, faults)
     surfaces = resolve_surfaces(document, names, path.parent, faults)
     loads = resolve.resolve_plain("loads", document, names, faults)
+    elements = resolve_elements(document, parts, names, faults)
     if faults:
         return None
     drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
@@ -166,6 +168,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         beams={name: rod.beam for name, rod in rods.items()},
         loads=loads,
         tendons=tendons,
+        elements=elements,
     )
     attached = resolve_attached(document, scene, names, faults)
     scene = replace(scene, **attached)
@@ -177,6 +180,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     if faults:
         return None
     r.odd.extend(overlaps(scene, faults))
+    faults += placed_faults(scene)
     if faults:
         return None
     r.laws.clear()

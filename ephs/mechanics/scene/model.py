@@ -17,9 +17,11 @@ from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, Element, frozen
 from ephs.mechanics.scene.flexible import Beam, Load, Tendon
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept
 
 if TYPE_CHECKING:
+    from ephs.mechanics.scene.custom import Element as OwnElement
     from ephs.semantics import System
 
 __all__ = [
@@ -54,6 +56,8 @@ class Scene:
     ----------
     source : the file that it came from, or None
     adjusted : changes made by the assembly, or None if the initial state was consistent
+    elements : elements of registered sections, by section and name
+    origin : (7,) pose of a part's own ground in the world, in which ``elements`` have their numbers
     """
 
     name: str
@@ -77,6 +81,8 @@ class Scene:
     cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
     gas_springs: Mapping[str, attached.GasSpring] = field(default_factory=dict)
     actuators: Mapping[str, attached.Actuator] = field(default_factory=dict)
+    elements: Mapping[str, Mapping[str, "OwnElement"]] = field(default_factory=dict)
+    origin: Array = field(default_factory=lambda: IDENTITY_POSE)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
     def system(self) -> "System":
@@ -135,11 +141,21 @@ class Scene:
             return part.joints[own].seen(path)
         return _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
 
+    def section(self, name: str) -> Mapping[str, Any]:
+        """The elements of a section of this level, registered ones included."""
+        return getattr(self, name) if name in ELEMENTS else self.elements.get(name, {})
+
+    def all_elements(self) -> "Iterator[tuple[str, str, OwnElement]]":
+        """Section, dotted name and value of every element of registered sections; what it names is dotted, too."""
+        for path, scene in self.levels():
+            for section, own in scene.elements.items():
+                for name, each in own.items():
+                    yield section, path + name, each.seen(path)
+
     def every(self, section: str) -> Iterator[tuple[str, Any]]:
         """Dotted name and value of every element of a section, parts included; names in it are dotted, too."""
-        for path, scene in self._scenes():
-            own: Mapping[str, Element] = getattr(scene, section)
-            for each in own.values():
+        for path, scene in self.levels():
+            for each in scene.section(section).values():
                 yield path + each.name, each.seen(path)
 
     def all_bodies(self) -> Iterator[tuple[str, Body]]:
@@ -187,7 +203,7 @@ class Scene:
 
     def all_attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
         """Section, dotted name and value of every attachment; its joints and heat sink are dotted too."""
-        for path, scene in self._scenes():
+        for path, scene in self.levels():
             for section, name, each in scene.attachments():
                 yield section, path + name, each.seen(path)
 
@@ -225,10 +241,11 @@ class Scene:
             scene = None if scene is None else scene.parts.get(part)
         return scene, name[: len(name) - len(own)], own
 
-    def _scenes(self, path: str = "") -> Iterator[tuple[str, "Scene"]]:
+    def levels(self, path: str = "") -> Iterator[tuple[str, "Scene"]]:
+        """The scene and all its parts, each with the path to it, empty or with a dot at its end."""
         yield path, self
         for name, part in self.parts.items():
-            yield from part._scenes(f"{path}{name}.")
+            yield from part.levels(f"{path}{name}.")
 
 
 ELEMENTS: Mapping[str, type[Element]] = {
@@ -256,12 +273,20 @@ def mapped(
     ``changes`` has, by section, a function that gives the changed element from the path of its level, empty or with a
     dot at its end, and the element.
     """
-    made: dict[str, Any] = {
-        section: {name: change(path, each) for name, each in getattr(scene, section).items()}
+    made = {
+        section: {name: change(path, each) for name, each in own.items()}
         for section, change in changes.items()
+        if (own := scene.section(section)) or section in ELEMENTS
     }
     parts = {name: mapped(part, changes, world, f"{path}{name}.") for name, part in scene.parts.items()}
-    return replace(scene, parts=parts, world=world or scene.world, **made)
+    return with_sections(scene, made, parts=parts, world=world or scene.world)
+
+
+def with_sections(scene: Scene, sections: Mapping[str, Mapping[str, Any]], **more: Any) -> Scene:
+    """The scene with other elements in some sections, registered ones included."""
+    own = {name: each for name, each in sections.items() if name not in ELEMENTS}
+    fixed: dict[str, Any] = {name: each for name, each in sections.items() if name in ELEMENTS}
+    return replace(scene, elements={**scene.elements, **own}, **fixed, **more)
 
 
 def _find(values: Mapping[str, T], name: str, what: str) -> T:

@@ -30,19 +30,28 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
     def tendon(_: str, t: Tendon) -> Tendon:
         return replace(t, points=frozen([point(body, at) for body, at in zip(t.bodies, t.points, strict=True)]))
 
-    return mapped(
-        scene,
-        {
-            "loads": load,
-            "tendons": tendon,
-            "markers": lambda _, m: replace(m, at=point(m.body, m.at)),
-            "bodies": lambda _, b: replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose)))),
-            "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
-            "springs": lambda _, s: replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2)),
-            "surfaces": lambda _, s: replace(s, frame=frame(s.body, s.frame)),
-        },
-        world,
+    return _carried(
+        mapped(
+            scene,
+            {
+                "loads": load,
+                "tendons": tendon,
+                "markers": lambda _, m: replace(m, at=point(m.body, m.at)),
+                "bodies": lambda _, b: replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose)))),
+                "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
+                "springs": lambda _, s: replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2)),
+                "surfaces": lambda _, s: replace(s, frame=frame(s.body, s.frame)),
+            },
+            world,
+        ),
+        pose,
     )
+
+
+def _carried(scene: Scene, pose: Array) -> Scene:
+    """The scene with the origins of all its levels moved by a pose."""
+    parts = {name: _carried(part, pose) for name, part in scene.parts.items()}
+    return replace(scene, parts=parts, origin=frozen(SE3.normalise(SE3.compose(pose, scene.origin))))
 
 
 def spring_length(scene: Scene, spring: Spring) -> float:

@@ -12,12 +12,13 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.attaching import supplies
-from ephs.mechanics.scene.build import drive_ports, scene_system, tension_port, wrench_port
+from ephs.mechanics.scene.build import drive_ports, element_inputs, scene_system, tension_port, wrench_port
+from ephs.mechanics.scene.element import Number
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
 from ephs.mechanics.scene.state import Snapshot
-from ephs.operad import Path
+from ephs.operad import Path, Quantity
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.kept import once
@@ -46,7 +47,15 @@ class Units:
 
     @staticmethod
     def of(scene: Scene) -> "Units":
-        """Those of a scene: of its length and rate, and its mass as a whole."""
+        """Those of a scene: of its length and rate, and its mass as a whole.
+
+        Of one with elements of unknown quantities, those are m, kg and s: only their maker knows other units.
+        """
+        if any(True for _ in scene.all_elements()):
+            system = scene_system(scene)
+            ports = (port.quantity for port in system.interface.values())
+            if not all(_is_known(of) for of in (*system.states.values(), *ports)):
+                return SI
         scale = Snapshot.of(scene).scale(scene.world.gravity)
         mass = sum(body.mass for _, body in scene.all_bodies()) or 1.0
         sizes = scale.length, mass, 1.0 / scale.rate
@@ -75,6 +84,11 @@ def in_own_units(problem: Problem) -> Problem:
     force = units.mass * units.length / units.time**2
     sizes = units.length, units.mass, units.time, (1.0,)
     flows = {supply.outer: np.array([supply.flow.unit(*sizes) / force]) for supply in supplies(scene)}
+    flows |= {
+        port: _unit(scene_system(scene).interface[port].quantity, units) / units.time / force
+        for ports in element_inputs(scene).values()
+        for port in ports
+    }
     tensions = {tension_port(name): np.ones(1) for name, _ in scene.all_tendons()}
     forces = bodies | ports | flows | tensions
     driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
@@ -150,32 +164,50 @@ def _ports(j: Any, units: Units) -> list[tuple[Path, Array]]:
 
 def units_of_states(descriptor: Descriptor, units: Units, *, read: bool = False) -> dict[Path, Array]:
     """By path, the unit of each number of a state: (size,) as it is stored, or as users read it."""
-    out: dict[Path, Array] = {}
+    return {slot.path: _unit(slot.quantity, units, read=read) for slot in descriptor.states}
+
+
+def _is_known(of: Quantity) -> bool:
+    plain = of.space.dim == 1 or not of.space.name.endswith("*")
+    return of.kind in ("relative_pose", "pose") or of.space.dim == 6 or (of.kind in _SCALARS and plain)
+
+
+def _unit(quantity: Quantity, units: Units, *, read: bool = False) -> Array:
+    """(size,) units of a state.
+
+    Raises
+    ------
+    KeyError
+        Only its maker knows its unit.
+    """
+    space, kind = quantity.space, quantity.kind
     momentum = units.mass * units.length / units.time
-    for slot in descriptor.states:
-        space, kind = slot.quantity.space, slot.quantity.kind
-        if kind == "relative_pose":
-            of = Pair.from_space(space)
-            unit = np.where(np.any(of.basis[:3], axis=0), 1.0, units.length)
-            out[slot.path] = unit if read else element_units(space.size, unit, units.length)
-        elif kind == "pose":
-            out[slot.path] = np.array([1.0] * 4 + [units.length] * 3)
-        elif kind == "entropy":
-            out[slot.path] = np.array([units.energy])
-        elif kind == "flux_linkage":
-            out[slot.path] = np.array([units.energy * units.time])
-        elif kind == "momentum" and space.name.endswith("*") and space.dim == 1:  # of a joint's rate itself
-            turning = np.any(pair(space.name[:-1], **dict(space.parameters)).basis[:3])
-            out[slot.path] = np.array([momentum * (units.length if turning else 1.0)])
-        elif kind in ("displacement", "angle"):
-            out[slot.path] = np.array([units.length if kind == "displacement" else 1.0])
-        elif kind in ("volume", "liquid"):
-            out[slot.path] = np.array([units.length**3])
-        elif kind == "angular_momentum":
-            out[slot.path] = np.array([momentum * units.length])
-        else:
-            out[slot.path] = momentum * np.array([units.length] * 3 + [1.0] * 3)
-    return out
+    if kind == "relative_pose":
+        of = Pair.from_space(space)
+        unit = np.where(np.any(of.basis[:3], axis=0), 1.0, units.length)
+        return unit if read else element_units(space.size, unit, units.length)
+    if kind == "pose":
+        return np.array([1.0] * 4 + [units.length] * 3)
+    if kind == "momentum" and space.name.endswith("*") and space.dim == 1:  # of a joint's rate itself
+        turning = np.any(pair(space.name[:-1], **dict(space.parameters)).basis[:3])
+        return np.array([momentum * (units.length if turning else 1.0)])
+    if space.dim == 6:
+        return momentum * np.array([units.length] * 3 + [1.0] * 3)
+    return np.full(space.size, _SCALARS[kind].unit(units.length, units.mass, units.time, ()))
+
+
+_SCALARS: Mapping[str, Number] = {
+    "entropy": Number(energy=1),
+    "flux_linkage": Number(energy=1, time=1),
+    "charge": Number(),
+    "displacement": Number(length=1),
+    "angle": Number(),
+    "momentum": Number(energy=1, time=1, length=-1),
+    "angular_momentum": Number(energy=1, time=1),
+    "volume": Number(length=3),
+    "liquid": Number(length=3),
+}
+"""Kind of a quantity -> dimension of its state: temperatures and charges are the same in all units."""
 
 
 def _stats(stats: Mapping[str, Any], units: Units, factors: Mapping[Path, Array]) -> dict[str, Any]:

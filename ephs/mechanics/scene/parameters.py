@@ -18,8 +18,9 @@ from typing import Any, TypeVar, final
 import numpy as np
 
 from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, listing
-from ephs.mechanics.scene.fields import FIELDS, Field, placed
+from ephs.mechanics.scene.fields import FIELDS, Field, fields_of, placed
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.primitives import Irreversible, Reversible, Storage
@@ -92,7 +93,7 @@ class _Place:
         stem, index = _INDEX.split(path)[:2]
         entries = tuple(int(number) for number in re.findall(r"\d+", index))
         kind, _, rest = stem.partition(".")
-        for key, field in FIELDS.get(kind, {}).items():
+        for key, field in fields_of(kind).items():
             name = rest.removesuffix(key).removesuffix(".") if rest.endswith(key) else None
             if name is not None and (not name or rest == f"{name}.{key}") and _has(scene, kind, name):
                 found = _Place(path, key, name, field, entries)
@@ -171,7 +172,8 @@ def _has(scene: Scene, kind: str, name: str) -> bool:
 
 
 def _paths(scene: Scene) -> Iterator[str]:
-    for kind, fields in FIELDS.items():
+    for kind in (*FIELDS, *REGISTERED):
+        fields = fields_of(kind)
         for name in ("",) if kind == "world" else dict(scene.every(kind)):
             for key, field in fields.items():
                 stem = f"{kind}.{name}.{key}" if name else f"{kind}.{key}"

@@ -1,6 +1,8 @@
 """A scene in other units of length, mass and time: the same mechanism, all its numbers changed."""
 
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.semantics.bundle import Array
+
+if TYPE_CHECKING:
+    from ephs.mechanics.scene.custom import Element as OwnElement
 
 
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:
@@ -25,9 +30,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case Joint():
                 return _joint(x, *units)
             case Attachment():
-                of = (scene.joint(path + tied) for tied in x.tied)
-                own = tuple(float(freedom_units(coupling_of(j), j.coordinate, length)[0]) for j in of)
-                return x.rescaled(*units, own or (length,))
+                return x.rescaled(*units, _firsts((scene.joint(path + tied) for tied in x.tied), length))
             case Tendon():
                 return replace(x.rescaled(*units), points=frozen(x.points * length))
             case Surface():
@@ -38,7 +41,25 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case _:
                 return x.rescaled(*units)
 
-    return mapped(scene, dict.fromkeys(ELEMENTS, other), scene.world.rescaled(*units))
+    def own(path: str, x: "OwnElement") -> "OwnElement":
+        tied = [scene.joint(path + name) for kind in ("axis", "joint") for name in x.named(kind)]
+        return x.rescaled(*units, _firsts(tied, length))
+
+    registered = {section for _, level in scene.levels() for section in level.elements}
+    changes: dict[str, Any] = dict.fromkeys(ELEMENTS, other) | dict.fromkeys(registered, own)
+    return _moved_apart(mapped(scene, changes, scene.world.rescaled(*units)), length)
+
+
+def _firsts(joints: Iterable[Joint], length: float) -> tuple[float, ...]:
+    """The unit of the first coordinate of each joint; of none the length."""
+    found = [freedom_units(coupling_of(j), j.coordinate, length) for j in joints]
+    return tuple(float(unit[0]) if unit.size else 1.0 for unit in found) or (length,)
+
+
+def _moved_apart(scene: Scene, length: float) -> Scene:
+    """The scene with the origins of all its levels in another unit of length."""
+    parts = {name: _moved_apart(part, length) for name, part in scene.parts.items()}
+    return replace(scene, parts=parts, origin=frozen(scene.origin * np.array([1.0] * 4 + [length] * 3)))
 
 
 def _joint(j: Joint, length: float, mass: float, time: float) -> Joint:

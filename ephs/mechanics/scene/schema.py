@@ -12,6 +12,7 @@ from pydantic import Field, create_model
 from ephs.mechanics.scene.attached import Actuator, Cylinder, GasSpring, Gear, Motor
 from ephs.mechanics.scene.bodies import Marker, Spring, World
 from ephs.mechanics.scene.flexible import Load, Tendon
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_elements import table_of
 from ephs.mechanics.scene.schema_flexible import BeamEntry
@@ -201,9 +202,18 @@ _FILE: dict[str, Any] = {
 }
 for _key, (_table, _said) in _SECTIONS.items():
     _FILE[_key] = dict[str, _table], key(_said, default_factory=dict)
-SceneFile: Any = create_model("SceneFile", __base__=Entry, __doc__="A scene file.", **_FILE)
+FILE_KEYS = tuple(_FILE)
+"""Keys at the top of scene files, without registered sections."""
+
+
+def scene_file() -> Any:
+    """The model of a scene file, registered sections included."""
+    own: dict[str, Any] = {
+        section: (dict[str, of], key(of.said, default_factory=dict)) for section, of in REGISTERED.items()
+    }
+    return create_model("SceneFile", __base__=Entry, __doc__="A scene file.", **_FILE, **own)
 
 
 def json_schema() -> dict[str, Any]:
     """The JSON schema of a scene file, for editors."""
-    return SceneFile.model_json_schema()
+    return scene_file().model_json_schema()

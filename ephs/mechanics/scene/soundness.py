@@ -47,6 +47,8 @@ def check_scene(scene: Scene) -> None:
     }
     there["end"] = there["body"]
     named = [(kind, name) for _, each in _all(scene) for kind in set(each.names.values()) for name in each.named(kind)]
+    own = [each.references() for _, _, each in scene.all_elements()]
+    named += [("joint" if kind == "axis" else kind, name) for each in own for _, kind, name in each]
     beams = [beam for _, beam in scene.all_beams()]
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
@@ -88,6 +90,7 @@ def _all(scene: Scene) -> Iterator[tuple[str, Element]]:
 def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
     """Every number with its required shape."""
     yield "world", scene.world.values()
+    yield from ((f"{path}ground", {"origin": (level.origin, (7,))}) for path, level in scene.levels())
     for name, each in _all(scene):
         match each:
             case Joint():
@@ -140,6 +143,9 @@ def _check_names(scene: Scene) -> None:
         for name, thing in getattr(scene, section).items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")
+    for own in scene.elements.values():
+        for name in own:
+            Name([name])
     for name, part in scene.parts.items():
         Name([name])
         _check_names(part)

@@ -12,6 +12,7 @@ from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble
 from ephs.mechanics.sweep.images import FAULTS
@@ -69,6 +70,8 @@ class Job:
         Those of `ephs.simulate`.
     token
         What tells it from other jobs.
+    elements
+        Classes of registered sections that the scene has: other processes register them.
     """
 
     model: "str | System"
@@ -79,6 +82,7 @@ class Job:
     options: Mapping[str, Any]
     outputs: tuple[Output, ...]
     token: str
+    elements: tuple[type[Any], ...] = ()
 
     @staticmethod
     def document(model: "Scene | System") -> "str | System":
@@ -118,6 +122,8 @@ class _Prepared:
 
     def __init__(self, job: Job) -> None:
         self.job = job
+        for kind in job.elements:
+            REGISTERED.setdefault(kind.section, kind)
         self.model: Any = scene_from_text(job.model) if isinstance(job.model, str) else job.model
         self.members = job.axes.members
         self.ensemble: Ensemble | None = None

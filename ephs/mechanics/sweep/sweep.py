@@ -125,7 +125,7 @@ def sweep(
     times = times_of(save_at, start, end)
     assert times is not None  # instants were chosen
     kept = outputs_of(model, outputs)
-    job = Job(Job.document(model), axes, start, end, times, dict(options), kept, uuid.uuid4().hex)
+    job = Job(Job.document(model), axes, start, end, times, dict(options), kept, uuid.uuid4().hex, _own(model))
     count = len(axes.members)
     batches: list[Batch] = []
     begin = time.perf_counter()
@@ -233,3 +233,8 @@ def _table(job: Job, batches: Sequence[Batch], model: "System | Scene", seconds:
         "seconds": seconds, "t0": job.t0, "until": job.until,
     }  # fmt: skip
     return xr.Dataset(variables, {**coordinates, "t": times, **places}, attributes)
+
+
+def _own(model: "System | Scene") -> tuple[type[Any], ...]:
+    """Classes of a scene's elements of registered sections."""
+    return tuple({type(each): None for _, _, each in model.all_elements()}) if isinstance(model, Scene) else ()

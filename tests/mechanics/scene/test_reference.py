@@ -21,7 +21,7 @@ def test_every_key_of_every_table_is_there_with_its_words(model):
     tables = scene_tables()
     said = model.__doc__.splitlines()[0].strip("`")
     inner = model.__name__.removesuffix("Entry").lower()
-    found = rows(tables[TOP if model is schema.SceneFile else said if said.startswith("[") else inner])
+    found = rows(tables[TOP if model is schema.scene_file() else said if said.startswith("[") else inner])
     assert list(found) == list(model.model_fields)
     for key, field in model.model_fields.items():
         assert field.description is None or field.description in found[key][2]

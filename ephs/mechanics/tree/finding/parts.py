@@ -11,6 +11,7 @@ import numpy as np
 
 from ephs.mechanics.tree.finding.contraction import network_of
 from ephs.mechanics.tree.finding.frames import Frame, Frames, Link, LinkJoint, Unplaced, frames_of
+from ephs.mechanics.tree.finding.holding import check_determined
 from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.roles import Role
 from ephs.mechanics.tree.finding.spanning import Edge, islands
@@ -153,6 +154,7 @@ class _Reader:
             if self.roles[number] not in (Role.OTHER, Role.FRICTION, Role.CONDUCTION, Role.HEAT, Role.ENVIRONMENT):
                 raise Unplaced(self.wiring.components[number].path, "belongs to no body and no joint")
         found = network_of(self.wiring, left, self.rates, self.entropy, self._prescribed, self._bare)
+        check_determined(found, self.wiring.components)
         self.placed |= set(left)
         self.ports |= found.ports()
         return found

@@ -1,0 +1,357 @@
+"""Elements of one's own: the keys of their tables, rules about these, and the boxes that they become in a system.
+
+A key's annotation is its form and range; `key` gives its meaning, its unit, and the kind of what it names. Reading with
+all faults at once, result files, JSON schema and pages, parameter paths, other units and names seen from outside of a
+part follow from these.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
+
+import numpy as np
+from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
+
+from ephs.mechanics.scene.element import OUTSIDE, Number
+from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.schema_numbers import Entry
+from ephs.mechanics.scene.units import dimension, written
+from ephs.operad import Path, PatternError
+from ephs.semantics.bundle import Array
+
+if TYPE_CHECKING:
+    from ephs.mechanics.scene.site import Site
+
+AXIS: Final = "axis"
+"""Kind of a joint with one degree of freedom and no prescribed motion, on whose rate an element acts."""
+KINDS: Final = (*OUTSIDE, AXIS)
+"""Kinds of what keys may name."""
+_TEXTS: Final[Mapping[str, tuple[str, str]]] = {
+    "class": ("a subclass of ephs.mechanics.Element", "derive it from Element"),
+    "section": ("section= in the class statement, a name of letters, digits and underscores", "add it"),
+    "taken": ("a section that scene files do not have yet", "choose another name"),
+    "build": ("a method build(self, site)", "write what it adds to a system"),
+    "key": ("a key made by key(meaning, …)", "give its meaning, and the unit of a number"),
+    "reserved": ("a key that is not an attribute of elements", "rename it"),
+    "form": ("a number, a text, true or false, or a list of these", "take several keys instead of tables in a table"),
+    "unit": ('unit= of each number, "1" where it has none', "give its unit"),
+    "symbols": ("a unit such as N m/rad, kg m², m³/(s Pa)", "correct the unit"),
+    "names": (f"names= one of {', '.join(KINDS)}, of a text or a list of texts", "correct it"),
+    "rule": ("a rule of keys of this class", "name these keys"),
+    "validator": ("rules instead of pydantic's validators", "write a method with @rule, which has its own texts"),
+}
+
+
+class ElementError(ValueError):
+    """A class that cannot be registered: where, what was found, what was expected, what to do."""
+
+    def __init__(self, code: str, where: str, found: object) -> None:
+        expected, advice = _TEXTS[code]
+        super().__init__(f"{where}: found {found}, expected {expected}; {advice}")
+
+
+def key(meaning: str, default: Any = ..., *, unit: str = "", names: str = "", **more: Any) -> Any:
+    """A key of an element's table; it is required where it has no default.
+
+    Parameters
+    ----------
+    meaning
+        In words. The unit stands where it has ``{}``, else at the end.
+    unit
+        Of a number, or of each in a list: it is a parameter of sweeps and fits, and changes with units. ``"1"`` where
+        it has no dimension; ``q`` is the unit of the coordinate of the joint that the table names first.
+    names
+        Kind of the elements that it names: ``body``, ``node`` (of heat), ``joint``, ``axis`` (a joint with one free
+        degree of freedom), ``tendon``, ``surface``.
+    more
+        Bounds, as of pydantic's ``Field``: ``ge``, ``gt``, ``le``, ``lt``, ``min_length``, ``max_length``.
+    """
+    said = written(unit) if unit else ""
+    text = meaning.format(said) if "{}" in meaning else ", ".join(filter(None, (meaning, said)))
+    extra = {name: value for name, value in (("unit", unit), ("names", names)) if value}
+    return Field(default=default, description=text, json_schema_extra=_hidden(extra), **more)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _Hidden:
+    """Unit and references of a key; they are not shown to editors."""
+
+    unit: str = ""
+    names: str = ""
+
+    def __call__(self, schema: dict[str, Any]) -> None:
+        """Leave the schema as it is."""
+
+
+def _hidden(extra: Mapping[str, str]) -> Any:
+    return _Hidden(**extra)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A condition on keys of a table, with its texts."""
+
+    keys: tuple[str, ...]
+    holds: Callable[..., bool]
+    expected: str
+    advice: str
+    found: str
+    at: str
+    placed: bool
+
+    def texts(self, element: "Element") -> tuple[str, str]:
+        """What was expected, and the advice, with values of keys."""
+        values = _values(element)
+        return self.expected.format_map(values), self.advice.format_map(values)
+
+    def found_in(self, element: "Element") -> str:
+        """What was found, with values of keys."""
+        return self.found.format_map(_values(element))
+
+
+def rule(
+    *keys: str, expected: str, advice: str = "correct the value", found: str = "", at: str = "", placed: bool = False
+) -> Callable[[Callable[..., bool]], Rule]:
+    """Mark a method as a condition on keys of the table: where it is false there is a fault.
+
+    It is asked where none of these keys has a fault of its own.
+
+    Parameters
+    ----------
+    keys
+        The keys that it reads.
+    expected, advice
+        Texts of the message; values of keys may stand in braces.
+    found
+        What there is instead, likewise; default: the value at the key.
+    at
+        The key that the message names; default: the first one.
+    placed
+        Whether it is asked once all bodies are where they are at the start: then the method takes a `Site`, too.
+    """
+
+    def marked(holds: Callable[..., bool]) -> Rule:
+        return Rule(keys, holds, expected, advice, found, at or keys[0], placed)
+
+    return marked
+
+
+class Element(Entry):
+    """Base of elements of one's own: subclass it with keys, rules and ``build``, and call `register_element`.
+
+    The class statement names the section of scene files, and says what stands there:
+    ``class Drag(Element, section="drags", said="air drag on bodies")``.
+
+    Attributes
+    ----------
+    section, said
+        Of the class: the section, and what stands there.
+    name
+        The element's name, as seen from its scene.
+    """
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False, ignored_types=(Rule,))
+    section: ClassVar[str] = ""
+    said: ClassVar[str] = ""
+    names: ClassVar[Mapping[str, str]] = {}
+    """Keys that name elements, and of which kind."""
+    numbers: ClassVar[Mapping[str, Number]] = {}
+    """Keys that are numbers, and their dimensions."""
+    rules: ClassVar[tuple[Rule, ...]] = ()
+    _name: str = PrivateAttr("")
+
+    def __init_subclass__(cls, **_: str) -> None:
+        super().__init_subclass__()
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, *, section: str = "", said: str = "", **_: Any) -> None:
+        cls.section, cls.said = section or cls.section, said or cls.said
+        own = tuple(each for each in vars(cls).values() if isinstance(each, Rule))
+        cls.rules = (*cls.rules, *own)
+        extras = {name: _extra(field.json_schema_extra) for name, field in cls.model_fields.items()}
+        cls.names = {name: of.names for name, of in extras.items() if of.names}
+        cls.numbers = {name: _dimension(f"{cls.__name__}.{name}", of.unit) for name, of in extras.items() if of.unit}
+        cls.__doc__ = f"``[{cls.section}.NAME]``\n\n{cls.__doc__ or ''}"
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._name
+
+    @abstractmethod
+    def build(self, site: "Site") -> None:
+        """Add its boxes to the system of its scene."""
+
+    def lines(self, site: "Site") -> Iterator[tuple[str, Any, str, Any]]:
+        """What it is in pictures: from a point of a body to one of another, (3,) each in the body's frame."""
+        return iter(())
+
+    @classmethod
+    def of_table(cls, name: str, table: Mapping[str, Any]) -> Self:
+        """The element of a sound table.
+
+        Raises
+        ------
+        ValueError
+            The table is not sound.
+        """
+        try:
+            found = cls.model_validate(dict(table))
+        except ValidationError as error:
+            where, what = error.errors(include_url=False)[0]["loc"], error.errors(include_url=False)[0]["msg"]
+            raise ValueError(f"{cls.section}.{name}.{'.'.join(map(str, where))}: {what}") from None
+        return found.called(name)
+
+    def called(self, name: str) -> Self:
+        """Itself with a name."""
+        found = self.model_copy()
+        found._name = name
+        return found
+
+    def changed(self, **keys: Any) -> Self:
+        """Itself with other values at some keys, which are not checked."""
+        return self.model_copy(update=keys)
+
+    def references(self) -> Iterator[tuple[str, str, str]]:
+        """Key, kind and name of all that it names."""
+        for name, kind in type(self).names.items():
+            given = getattr(self, name, None)
+            if isinstance(given, str):
+                yield name, kind, given
+            else:
+                yield from ((f"{name}[{i}]", kind, each) for i, each in enumerate(given or ()))
+
+    def named(self, kind: str) -> tuple[str, ...]:
+        """The names of a kind to which it refers."""
+        return tuple(name for _, of, name in self.references() if of == kind)
+
+    def seen(self, path: str) -> Self:
+        """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
+        if not path:
+            return self
+        changes: dict[str, Any] = {}
+        for name, kind in type(self).names.items():
+            same, given = OUTSIDE.get(kind, frozenset[str]()), getattr(self, name)
+            if isinstance(given, str):
+                changes[name] = given if given in same else path + given
+            elif given is not None:
+                changes[name] = [each if each in same else path + each for each in given]
+        return self.changed(**changes).called(path + self.name)
+
+    def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
+        """The same in other units; ``coordinates`` are those of its joints."""
+        changes: dict[str, Any] = {}
+        for name, number in type(self).numbers.items():
+            given = getattr(self, name)
+            if given is not None:
+                unit = number.unit(length, mass, time, coordinates)
+                changes[name] = (np.asarray(given, dtype=float) * unit).tolist()
+        return self.changed(**changes)
+
+    def __str__(self) -> str:
+        """In a few words."""
+        return " – ".join(name for _, _, name in self.references()) or self.said
+
+
+def _values(element: Element) -> dict[str, Any]:
+    """Values at keys; of a faulty one None."""
+    return {name: getattr(element, name, None) for name in type(element).model_fields}
+
+
+def _extra(given: Any) -> _Hidden:
+    return given if isinstance(given, _Hidden) else _Hidden()
+
+
+def _dimension(where: str, unit: str) -> Number:
+    try:
+        return dimension(unit)
+    except ValueError as error:
+        raise ElementError("symbols", where, str(error)) from None
+
+
+def number_of(element: Element, key: str) -> Array:
+    """The number or numbers at a key; none where it is not given."""
+    given = getattr(element, key)
+    return np.zeros(0) if given is None else np.asarray(given, dtype=float)
+
+
+def register_element(kind: type[Element]) -> type[Element]:
+    """Register elements of one's own: their section is read, checked, documented and built in all scenes from now on.
+
+    It gives the class back, so that it serves as a decorator. Registering a class again after its definition was run
+    again, as in a notebook, replaces it.
+
+    Raises
+    ------
+    ElementError
+        The section is taken, or the class is malformed; a ValueError.
+    """
+    if not (isinstance(kind, type) and issubclass(kind, Element)):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise ElementError("class", getattr(kind, "__name__", "an object"), kind)
+    who = kind.__name__
+    if not kind.section.isidentifier():
+        raise ElementError("section", who, f'"{kind.section}"')
+    _check_section(kind)
+    if kind.__abstractmethods__:
+        raise ElementError("build", who, f"no {', '.join(sorted(kind.__abstractmethods__))}")
+    _check_keys(kind)
+    REGISTERED[kind.section] = kind
+    return kind
+
+
+def _check_section(kind: type[Element]) -> None:
+    from ephs.mechanics.scene.schema import FILE_KEYS
+
+    before = REGISTERED.get(kind.section)
+    again = before is not None and (before.__module__, before.__qualname__) == (kind.__module__, kind.__qualname__)
+    if kind.section in FILE_KEYS or (before is not None and not again):
+        raise ElementError("taken", kind.__name__, f'"{kind.section}"')
+
+
+def _check_keys(kind: type[Element]) -> None:
+    decorators = kind.__pydantic_decorators__
+    validators = [*decorators.model_validators, *decorators.field_validators, *decorators.validators]
+    if validators:
+        raise ElementError("validator", kind.__name__, ", ".join(validators))
+    properties = kind.model_json_schema().get("properties", {})
+    for name, field in kind.model_fields.items():
+        where = f"{kind.__name__}.{name}"
+        if name in dir(Element) or not _is_name(name):
+            raise ElementError("reserved", where, f'"{name}"')
+        if field.description is None or not isinstance(field.json_schema_extra, _Hidden):
+            raise ElementError("key", where, field.description or "no meaning")
+        forms = _forms(properties[name])
+        if not forms <= {"number", "integer", "string", "boolean", "null"} or not forms - {"null"}:
+            raise ElementError("form", where, ", ".join(sorted(forms)))
+        of = field.json_schema_extra
+        if ("number" in forms) != bool(of.unit) and not ("integer" in forms and of.unit == "1"):
+            raise ElementError("unit", where, f'unit "{of.unit}"')
+        if of.names and (of.names not in KINDS or forms - {"string", "null"}):
+            raise ElementError("names", where, f'names "{of.names}"')
+    for each in kind.rules:
+        unknown = [name for name in (*each.keys, each.at) if name not in kind.model_fields]
+        if unknown:
+            raise ElementError("rule", f"{kind.__name__}.{each.holds.__name__}", ", ".join(unknown))
+
+
+def _forms(schema: Mapping[str, Any]) -> set[str]:
+    """JSON types of what a key holds, in lists too."""
+    if "anyOf" in schema:
+        return {form for each in schema["anyOf"] for form in _forms(each)}
+    if schema.get("type") == "array" and isinstance(schema.get("items"), Mapping):
+        return _forms(schema["items"])
+    if "enum" in schema or "const" in schema:
+        values = schema.get("enum", [schema.get("const")])
+        return {"string"} if all(isinstance(each, str) for each in values) else {"integer"}
+    return {str(schema.get("type", "a table"))}
+
+
+def _is_name(text: str) -> bool:
+    try:
+        Path([text])
+    except PatternError:
+        return False
+    return True

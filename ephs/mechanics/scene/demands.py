@@ -1,0 +1,53 @@
+"""What a level of a scene connects to in its parts: bodies, thermal nodes, and joints that are driven there."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import final
+
+from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.model import Scene
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Demands:
+    """Bodies, thermal nodes and driven joints that the level above connects to, by names of this level."""
+
+    bodies: frozenset[str]
+    nodes: frozenset[str]
+    joints: set[str]
+
+    def of_part(self, part: str) -> "Demands":
+        """The same, as seen from a part."""
+        start = part + "."
+
+        def inside(names: Iterable[str]) -> set[str]:
+            return {name[len(start) :] for name in names if name.startswith(start)}
+
+        return Demands(frozenset(inside(self.bodies)), frozenset(inside(self.nodes)), inside(self.joints))
+
+
+def demands_on_parts(scene: Scene, demands: Demands) -> Demands:
+    """Ports that the level above and this level's joints, springs and conductions need from its parts."""
+    pairs = [*scene.joints.values(), *scene.springs.values()]
+    bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
+    bodies |= {body for tendon in scene.tendons.values() for body in tendon.bodies}
+    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
+        name for c in scene.conduction.values() for name in c.between
+    }
+    attached = [each for _, _, each in scene.attachments()]
+    nodes |= {tendon.heat for tendon in scene.tendons.values()}
+    nodes |= {each.heat for each in attached if each.warms}
+    turned = {name for name, j in scene.joints.items() if j.armature}
+    turned |= {name for each in attached for name in each.tied if not isinstance(each, Actuator)}
+    for of in (each for own in scene.elements.values() for each in own.values()):
+        bodies |= {*of.named("body"), *of.named("end")}
+        nodes |= {*of.named("node")}
+        turned |= {*of.named("axis")}
+    return Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
+
+
+def _touching(scene: Scene) -> set[str]:
+    """The bodies of this level's own contacts, as seen from it."""
+    surfaces = dict(scene.all_surfaces())
+    return {surfaces[name].body for c in scene.contacts.values() for name in c.surfaces}

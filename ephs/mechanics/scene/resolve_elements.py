@@ -1,0 +1,123 @@
+"""Elements of registered sections: checks of their tables, of what they name, and of their rules."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ephs.mechanics.scene.custom import AXIS, Element, Rule, number_of
+from ephs.mechanics.scene.entries import Checked, Document, shown, validate
+from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.resolve import Names
+from ephs.mechanics.scene.schema_numbers import LARGEST
+from ephs.mechanics.scene.site import trial
+from ephs.operad import PatternError
+from ephs.semantics.errors import SemanticsError
+
+
+def resolve_elements(
+    document: Document, parts: Mapping[str, Scene], names: Names, faults: list[Fault]
+) -> dict[str, dict[str, Element]]:
+    """The elements by section, checked but for what depends on where bodies are."""
+    known = {
+        kind: {*document.sections[section], *_inside(parts, section)}
+        for kind, section in (("joint", "joints"), ("tendon", "tendons"), ("surface", "surfaces"))
+    }
+    found: dict[str, dict[str, Element]] = {}
+    for section in REGISTERED:
+        for name, table in document.sections[section].items():
+            faults += check_table(table, f"{section}.{name}", names, known)
+            found.setdefault(section, {})[name] = table.entry.called(name)
+    return found
+
+
+def _inside(parts: Mapping[str, Scene], section: str) -> Iterator[str]:
+    for part, scene in parts.items():
+        yield from (f"{part}.{name}" for name, _ in scene.every(section))
+
+
+def check_table(
+    table: Checked[Element], key: str, names: Names, known: Mapping[str, Collection[str]]
+) -> Iterator[Fault]:
+    """Faults of an element's table: sizes of numbers, what it names, and its rules."""
+    entry, spoiled = table.entry, set(table.spoiled)
+    for name in type(entry).numbers:
+        if name not in spoiled and np.any(np.abs(number_of(entry, name)) > LARGEST):
+            spoiled.add(name)
+            yield fault("large", f"{key}.{name}", shown(getattr(entry, name)), most=LARGEST)
+    sound = Checked(entry, frozenset(spoiled))
+    named: list[Fault] = []
+    names.check_all(_Names(type(entry).names), sound, key, named)  # pyright: ignore[reportArgumentType]
+    for place, kind, name in _sound_references(sound):
+        of = "joint" if kind == AXIS else kind
+        if of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
+            named.append(unknown(of, f"{key}.{place}", name, known[of]))
+    yield from named
+    for each in type(entry).rules:
+        if not each.placed and sound.sound(*each.keys) and not each.holds(entry):
+            yield broken(each, entry, key)
+
+
+class _Names:
+    """What `Names.check_all` asks of a kind of element: the ends of beams are bodies here."""
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        self.names = {key: "body" if kind == "end" else kind for key, kind in names.items()}
+
+
+def _sound_references(table: Checked[Element]) -> Iterable[tuple[str, str, str]]:
+    return (each for each in table.entry.references() if table.sound(each[0].partition("[")[0]))
+
+
+def broken(of: Rule, element: Element, key: str) -> Fault:
+    """The fault of a rule that does not hold."""
+    expected, advice = of.texts(element)
+    there = of.found_in(element) if of.found else shown(getattr(element, of.at))
+    return Fault(legible(f"{key}.{of.at}"), legible(there), legible(expected), legible(advice))
+
+
+def placed_faults(scene: Scene) -> Iterator[Fault]:
+    """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
+    for section, own in scene.elements.items():
+        for name, element in own.items():
+            yield from element_faults(scene, element, f"{section}.{name}")
+
+
+def element_faults(scene: Scene, element: Element, key: str) -> Iterator[Fault]:
+    """The same of one element of a level."""
+    for place, kind, name in element.references():
+        if kind == AXIS:
+            joint = scene.joint(name)
+            if joint.dim != 1 or joint.motion is not None:
+                yield fault("motor joint", f"{key}.{place}", f"{joint.name}, {joint.kind}")
+                return
+    site, _ = trial(scene, element)
+    faults = [
+        broken(each, element, key) for each in type(element).rules if each.placed and not each.holds(element, site)
+    ]
+    if faults:
+        yield from faults
+        return
+    try:
+        element.build(site)
+    except (SemanticsError, PatternError, ValueError, ArithmeticError) as error:
+        yield fault("not built", key, str(error))
+
+
+def number_faults(element: Element, key: str) -> Iterator[Fault]:
+    """Faults of an element with other numbers: those that its table would have."""
+    values: dict[str, Any] = {name: getattr(element, name) for name in type(element).model_fields}
+    faults: list[Fault] = []
+    table = validate(type(element), values, key, faults)
+    yield from faults
+    everything = Names(_Everything(), _Everything(), set())
+    yield from check_table(table, key, everything, {})
+
+
+class _Everything(set[str]):
+    """All names: those of an element that was loaded are known."""
+
+    def __contains__(self, _: object) -> bool:
+        return True

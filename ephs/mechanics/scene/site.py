@@ -1,0 +1,186 @@
+"""Where an element of one's own stands in a scene: what it may read there, and what it adds to the scene's system."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from ephs.mechanics.elements.components import joint_momentum
+from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
+from ephs.mechanics.scene.geometry import coupling_of
+from ephs.mechanics.scene.model import IDENTITY_POSE, Scene
+from ephs.operad import Path, Quantity, junction, quantity
+from ephs.semantics.bundle import Array
+from ephs.semantics.errors import AssemblyError
+from ephs.semantics.primitives import Storage
+from ephs.semantics.spaces import SE3, translation
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.system import Filling, System
+from ephs.solve.problem import Signal
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ephs.mechanics.scene.custom import Element
+
+INPUTS = "inputs"
+"""First name of the outer ports of elements."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Level:
+    """Junctions, boxes and inputs of a level of a scene's system."""
+
+    junctions: dict[Path, Any] = field(default_factory=dict)
+    boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
+    fillings: dict[Path, Filling] = field(default_factory=dict)
+    inputs: dict[Path, Signal] = field(default_factory=dict)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Site:
+    """Where an element stands.
+
+    Attributes
+    ----------
+    scene
+        The scene or part with the element: names are as seen from there.
+    element
+        It, in the units in which it is built.
+    """
+
+    scene: Scene
+    element: "Element"
+    _level: Level
+    _exposed: tuple[frozenset[str], frozenset[str]] = (frozenset(), frozenset())
+
+    # ---- what it may read ----------------------------------------------------------------------------------------
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) in the world, m/s²."""
+        return self.scene.world.gravity
+
+    def pose(self, body: str) -> Array:
+        """(7,) of a body in the world at the start; of the ground the identity."""
+        return IDENTITY_POSE if body == GROUND else self.scene.body(body).pose
+
+    def twist(self, body: str) -> Array:
+        """(6,) of a body at the start, in its frame; of the ground 0."""
+        return np.zeros(6) if body == GROUND else self.scene.body(body).twist
+
+    def rate(self, joint: str) -> Array:
+        """(d,) u_r of a joint at the start; rad/s, m/s."""
+        return self.scene.joint(joint).rate
+
+    def point(self, body: str, at: "ArrayLike") -> Array:
+        """(3,) a point of a body in its frame, of the ground in the world, m: a part's own ground may be moved."""
+        given = np.array(at, dtype=float)
+        return SE3.compose(self.scene.origin, translation(given))[4:] if body == GROUND else given
+
+    def direction(self, along: "ArrayLike") -> Array:
+        """(3,) in the world, of a direction in world axes of the element's file: a part may be turned."""
+        return quaternion_to_matrix(self.scene.origin[:4]) @ np.array(along, dtype=float)
+
+    def in_world(self, body: str, at: "ArrayLike") -> Array:
+        """(3,) where a point, as the table has it, is in the world at the start; m."""
+        return SE3.compose(self.pose(body), translation(self.point(body, at)))[4:]
+
+    def between(self, body1: str, at1: "ArrayLike", body2: str, at2: "ArrayLike") -> Array:
+        """(7,) at the start, pose of the frame at a point of body 2 in that at a point of body 1."""
+        frames = [
+            SE3.compose(self.pose(body), translation(self.point(body, at))) for body, at in ((body1, at1), (body2, at2))
+        ]
+        return SE3.normalise(SE3.compose(SE3.inverse(frames[0]), frames[1]))
+
+    # ---- junctions -----------------------------------------------------------------------------------------------
+
+    def momentum(self, body: str) -> str:
+        """The junction of a body's momentum; the ground has one, too."""
+        if body != GROUND:
+            self._known("body", "end", name=body)
+        path = Path(["momenta", *body.split(".")])
+        self._level.junctions[path] = junction(quantity.body_momentum, exposed=body in self._exposed[0])
+        return str(path)
+
+    def entropy(self, node: str = ENVIRONMENT) -> str:
+        """The junction of a thermal node, or of the environment: heat goes there."""
+        if node != ENVIRONMENT:
+            self._known("node", name=node)
+        path = Path(["entropies", *node.split(".")])
+        self._level.junctions[path] = junction(quantity.entropy, exposed=node in self._exposed[1])
+        return str(path)
+
+    def drive(self, joint: str) -> str:
+        """The junction of the momentum of a joint that a key of kind ``axis`` names."""
+        self._known("axis", name=joint)
+        return str(Path(["drives", *joint.split(".")]))
+
+    def quantity(self, joint: str) -> Quantity:
+        """The quantity at `drive`."""
+        return joint_momentum(coupling_of(self.scene.joint(joint)).pair)
+
+    def inner(self, name: str, of: Quantity) -> str:
+        """A junction of its own."""
+        path = self._own(name)
+        self._level.junctions[path] = junction(of)
+        return str(path)
+
+    def input(self, of: Quantity, value: "ArrayLike" = 0.0, port: str = "", *, effort: bool = True) -> str:
+        """A junction that an input of runs drives, ``"SECTION.NAME"`` or with ``.PORT``.
+
+        Parameters
+        ----------
+        value
+            The effort or flow where no input is given: a number, or one for each dimension.
+        """
+        path = Path([INPUTS, *self._own(port)])
+        self._level.junctions[path] = junction(of, exposed=True)
+        given = np.broadcast_to(np.asarray(value, dtype=float), (of.space.dim,)).copy()
+        self._level.inputs[path] = Signal(given, effort=effort)
+        return str(path)
+
+    # ---- boxes ---------------------------------------------------------------------------------------------------
+
+    def add(
+        self,
+        filling: Filling,
+        ports: Mapping[str, str],
+        box: str = "",
+        *,
+        initial: "Mapping[str, ArrayLike] | None" = None,
+    ) -> None:
+        """A box ``SECTION.NAME``, or with ``.BOX`` where there are several.
+
+        Parameters
+        ----------
+        filling
+            A `System` or a component.
+        ports
+            Its ports -> junctions, as the methods above give them.
+        initial
+            States at the start by their paths in the filling: of what it does not carry, and that is not zero.
+        """
+        path = self._own(box)
+        if initial and isinstance(filling, System | Storage):
+            filling = filling.with_initial({name: np.asarray(value, dtype=float) for name, value in initial.items()})
+        self._level.boxes[path], self._level.fillings[path] = dict(ports), filling
+
+    def _own(self, name: str) -> Path:
+        return Path([self.element.section, self.element.name, *(name.split(".") if name else ())])
+
+    def _known(self, *kinds: str, name: str) -> None:
+        """Only what keys name is connected: parts expose no other junctions."""
+        named = [each for kind in kinds for each in self.element.named(kind)]
+        if name not in named:
+            expected = f"one that its keys name: {', '.join(named) or 'there is none'}"
+            raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
+
+
+def trial(scene: Scene, element: "Element") -> tuple[Site, Level]:
+    """A site whose boxes go nowhere."""
+    level = Level()
+    return Site(scene, element, level), level

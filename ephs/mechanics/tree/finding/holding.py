@@ -1,0 +1,44 @@
+"""Efforts of an attached network that no balance determines: relations that depend on states hold a rate there.
+
+Such a rate is a constraint on the rates of joints that changes with their positions, as of a rod between two points.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ephs.mechanics.tree.finding.frames import Unplaced
+from ephs.mechanics.tree.finding.network import Network
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import ComponentSlot
+from ephs.semantics.primitives import Reversible
+from ephs.semantics.verdicts.checks import random_point
+
+
+def check_determined(network: Network, components: Sequence[ComponentSlot]) -> None:
+    """Look for an unknown effort that is in none of the balances.
+
+    Raises
+    ------
+    Unplaced
+        The component there would hold a rate.
+    """
+    first = network.known
+    found = np.abs(network.skew[first:, first:])
+    for one in network.attached:
+        rows = np.abs(one.rows[:, first:])
+        found = found + rows.T @ _pattern(components[one.component], len(rows)) @ rows
+    for at in np.flatnonzero(~found.any(axis=1) & ~found.any(axis=0)).tolist():
+        owner = next((one.component for one in network.attached if one.rows[:, first + at].any()), None)
+        if owner is not None:
+            raise Unplaced(components[owner].path, "holds a rate by a relation that depends on positions")
+
+
+def _pattern(slot: ComponentSlot, size: int) -> Array:
+    """(size, size) 1 where a flow may depend on an effort or a multiplier."""
+    if not isinstance(slot.primitive, Reversible):
+        return np.ones((size, size))
+    of = slot.primitive
+    left, constraint = of.structure(random_point(of.bundle, of.reads, np.random.default_rng(1)))
+    zero = np.zeros((len(constraint), len(constraint)))
+    return (np.block([[np.asarray(left), constraint.T], [constraint, zero]]) != 0.0).astype(float)

@@ -1,0 +1,462 @@
+"""Elements that users register behave as built-in ones: reading, documents, parameters, units, parts, runs."""
+
+import json
+import re
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import ephs
+from ephs import quantity as Q
+from ephs.mechanics import Element, key, register_element, rule
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.scene.custom import ElementError
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.own_units import Units
+from ephs.mechanics.scene.parameters import names, read, varied
+from ephs.mechanics.scene.reference import scene_tables
+from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.rescaled import rescaled
+from ephs.mechanics.scene.schema import json_schema
+from ephs.mechanics.scene.soundness import check_scene
+from ephs.show.lines import lines_of
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "elements.md"
+CELLS = re.findall(r"```\{code-cell\} ipython3\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+FALL = "format = 1\n[world]\ngravity = [0.0, 0.0, -9.81]\n[bodies.ball]\nmass = 2.0\ninertia = [0.1, 0.1, 0.1]\n"
+GOOD = {"body": "ball", "coefficient": 0.5, "slow": 0.01, "heat": "box"}
+
+
+@pytest.fixture(autouse=True)
+def page(tmp_path_factory):
+    """The classes of the page, registered for one test."""
+    before, out = dict(REGISTERED), {}
+    folder = tmp_path_factory.mktemp("page")
+    for cell in CELLS:
+        classes = re.search(r"^@register_element\n(?:.*\n)*?(?=\n\nPath)", cell, re.MULTILINE)
+        imports = cell.partition("\n\n\n@register_element")[0] if "import" in cell else ""
+        if classes:
+            exec(imports.replace('sys.path.insert(0, "..")', "") + "\n" + classes[0], out)
+    yield out | {"folder": folder}
+    REGISTERED.clear()
+    REGISTERED.update(before)
+
+
+def toml(value):
+    return json.dumps(value)
+
+
+def table(section, name, keys):
+    return f"[{section}.{name}]\n" + "".join(f"{key} = {toml(value)}\n" for key, value in keys.items())
+
+
+def loaded(folder, text, name="scene.toml"):
+    file = Path(folder) / name
+    file.write_text(text, encoding="utf-8")
+    return ephs.load(file)
+
+
+def faults(folder, text):
+    with pytest.raises(ephs.SceneError) as caught:
+        loaded(folder, text)
+    return {fault.key: fault for fault in caught.value.faults}
+
+
+BOX = "[thermal.box]\ncapacity = 50.0\ntemperature = 300.0\n"
+
+
+def dragged(folder, **changes):
+    return loaded(folder, FALL + BOX + table("drags", "air", GOOD | changes))
+
+
+class Push(Element, section="pushes", said="springs on joints"):
+    """½ k q² of the integral of a joint's rate."""
+
+    joint: str = key("the joint", names="axis")
+    stiffness: float = key("stiffness", unit="N m/q²", ge=0.0)
+    stretch: float = key("at the start", 0.0, unit="q")
+    way: list[float] = key("two numbers", [0.0, 0.0], unit="m", min_length=2, max_length=2)
+    ratio: float | None = key("a ratio", None, unit="1", gt=0.0)
+    turns: int = key("a count", 1, ge=1)
+    open: bool = key("a flag", False)
+
+    @rule("stretch", expected="below 10", found="the stretch {stretch:g}")
+    def small(self) -> bool:
+        return self.stretch < 10.0
+
+    def build(self, site):
+        at, q = site.quantity(self.joint), site.inner("q", Q.displacement)
+        site.add(ephs.library.spring(k=self.stiffness), {"q": q}, "spring", initial={"q": [self.stretch]})
+        turn = ephs.gyrator({"q": Q.displacement, "p": at}, [[0.0, -1.0], [1.0, 0.0]])
+        site.add(turn, {"q": q, "p": site.drive(self.joint)}, "turn")
+
+
+SLIDER = """format = 1
+[bodies.cart]
+mass = 2.0
+inertia = [1.0, 1.0, 1.0]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "cart"]
+at = [0.0, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+"""
+
+
+def pushed(folder, **keys):
+    return loaded(folder, SLIDER + table("pushes", "s", {"joint": "rail", "stiffness": 8.0, "stretch": 0.5} | keys))
+
+
+BREAKS = {
+    "body": [("bal", '"ground" or a body', 'did you mean "ball"?'), (3, "a text in quotes", "correct the value")],
+    "coefficient": [
+        (-1.0, "a number not below 0", "correct the value"),
+        ("1", "a number", "correct the value"),
+        (1e60, "a number of at most 1e+50 in size", "check the unit"),
+        (True, "a number", "correct the value"),
+    ],
+    "slow": [(0.0, "a number above 0", "correct the value"), ([1.0], "a number", "correct the value")],
+    "heat": [("bx", '"environment" or a [thermal] name', 'did you mean "box"?')],
+}
+
+
+@pytest.mark.parametrize("key", GOOD)
+def test_each_key_that_is_broken_is_refused_by_its_path(key, tmp_path):
+    for value, expected, advice in BREAKS[key]:
+        found = faults(tmp_path, FALL + BOX + table("drags", "air", GOOD | {key: value}))
+        assert list(found) == [f"drags.air.{key}"]
+        assert (found[f"drags.air.{key}"].expected, found[f"drags.air.{key}"].advice) == (expected, advice)
+
+
+def test_all_faults_come_at_once_with_those_of_built_in_elements(tmp_path):
+    text = FALL.replace("mass = 2.0", "mass = -2.0") + table("drags", "air", {"body": "bal", "coeficient": 1.0})
+    text += table("rods", "r", {"bodies": ["ball", "ball"], "at1": [0.0, 0.0], "at2": [0.0, 0.0, 0.0]})
+    found = faults(tmp_path, text)
+    assert set(found) == {"bodies.ball.mass", "drags.air.body", "drags.air.coeficient", "rods.r.at1", "rods.r.bodies"}
+    assert found["drags.air.coeficient"].advice == 'did you mean "coefficient"?'
+    assert found["rods.r.bodies"].expected == "two different bodies"
+
+
+def test_missing_keys_and_tables_that_are_none_are_said(tmp_path):
+    assert faults(tmp_path, FALL + "[drags.air]\n")["drags.air.coefficient"].expected == "c = ½ ρ c_w A, kg/m"
+    assert faults(tmp_path, FALL.replace("format = 1\n", "format = 1\ndrags = 3\n"))["drags.NAME"].expected == "a table"
+    assert faults(tmp_path, FALL + "[drag.air]\n")["drag"].advice == 'did you mean "drags"?'
+
+
+def test_a_section_that_nobody_registered_is_an_unknown_key(tmp_path):
+    REGISTERED.pop("drags")
+    found = faults(tmp_path, FALL + "[drags.air]\n")["drags"]
+    assert found.found == "an unknown key" and "rods" in found.expected
+
+
+def test_rules_of_places_are_asked_once_bodies_are_there(tmp_path):
+    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.0, 1.0]}
+    found = faults(tmp_path, FALL + table("rods", "r", rod))
+    assert found["rods.r.at2"].expected == "a point apart from at1"
+
+
+numbers = st.floats(0.01, 9.0)
+drawn = st.fixed_dictionaries(
+    {"stiffness": numbers},
+    optional={
+        "stretch": st.floats(-1.0, 1.0),
+        "way": st.lists(numbers, min_size=2, max_size=2),
+        "ratio": numbers,
+        "turns": st.integers(1, 5),
+        "open": st.booleans(),
+    },
+)
+
+
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(drawn)
+def test_a_document_gives_the_same_element_back(tmp_path, keys):
+    register_element(Push)
+    scene = pushed(tmp_path, **keys)
+    again = scene_from_text(scene_to_text(scene))
+    check_scene(again)
+    assert again.elements == scene.elements and again.elements["pushes"]["s"].name == "s"
+    assert {key: getattr(again.elements["pushes"]["s"], key) for key in keys} == keys
+    assert again.system().initial.keys() == scene.system().initial.keys()
+    assert scene_to_text(again) == scene_to_text(scene)
+
+
+def test_documents_with_broken_elements_or_unknown_sections_are_refused(tmp_path):
+    text = scene_to_text(dragged(tmp_path))
+    for old, new, said in (
+        ('"slow": 0.01', '"slow": -1.0', "slow"),
+        ('"coefficient"', '"coeficient"', "coefficient"),
+        ('"drags"', '"dregs"', "not registered"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            scene_from_text(text.replace(old, new))
+    with pytest.raises(ValueError, match="no body nobody"):
+        check_scene(scene_from_text(text.replace('"body": "ball"', '"body": "nobody"')))
+
+
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(drawn, numbers, st.sampled_from(["stiffness", "stretch", "ratio"]))
+def test_a_parameter_is_what_the_file_would_say(tmp_path, keys, value, key):
+    register_element(Push)
+    scene, path = pushed(tmp_path, **{"ratio": 1.0} | keys), f"pushes.s.{key}"
+    assert path in names(scene) and "pushes.s.way[1]" in names(scene)
+    assert read(scene, path) == getattr(scene.elements["pushes"]["s"], key)
+    assert varied(scene, {path: value}).elements == pushed(tmp_path, **{"ratio": 1.0} | keys | {key: value}).elements
+    wrong = {"stiffness": -value, "stretch": 10.0 + value, "ratio": 0.0}[key]
+    with pytest.raises(ephs.SceneError) as said:
+        pushed(tmp_path, **keys | {key: wrong})
+    with pytest.raises(ephs.SceneError) as caught:
+        varied(scene, {path: wrong})
+    assert caught.value.faults == said.value.faults
+
+
+def test_entries_of_vectors_are_parameters(tmp_path):
+    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.0, 0.1]}
+    scene = loaded(tmp_path, FALL + table("rods", "r", rod))
+    assert read(scene, "rods.r.at1[2]") == 1.0
+    assert varied(scene, {"rods.r.at1[2]": 2.0}).elements["rods"]["r"].at1 == [0.0, 0.0, 2.0]
+
+
+def test_the_schema_and_the_page_of_keys_have_it():
+    assert "drags" in json_schema()["properties"]
+    tables = scene_tables()
+    assert "| `coefficient` | number ≥ 0 | required | c = ½ ρ c_w A, kg/m |" in tables["[drags.NAME]"]
+    assert "| `slow` | number > 0 | `0.001` |" in tables["[drags.NAME]"]
+    assert "| `bodies` | 2 texts | required |" in tables["[rods.NAME]"]
+
+
+def test_drag_falls_as_the_closed_form(tmp_path):
+    scene = loaded(tmp_path, FALL + table("drags", "air", {"body": "ball", "coefficient": 0.5, "slow": 1e-6}))
+    last = np.sqrt(2.0 * 9.81 / 0.5)
+    for options in ({"method": "rk54", "rtol": 1e-9}, {"method": "natural4", "step": 0.01}, {"method": "radau"}):
+        sol = ephs.simulate(scene, 2.0, **options)
+        assert sol.body("ball").velocity[:, 2] == pytest.approx(-last * np.tanh(9.81 / last * sol.t), abs=2e-5)
+        assert sol.heat[-1] > 1.0
+
+
+def test_a_rod_keeps_its_length_and_swings_as_a_pendulum(tmp_path):
+    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 0.0], "at2": [0.0, 0.0, 0.0]}
+    text = FALL + "position = [0.6, 0.0, -0.8]\n"
+    swing = ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 1.0, step=0.01)
+    joint = '[joints.j]\ntype = "spherical"\nbodies = ["ground", "bob"]\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n'
+    point = text.replace("ball", "bob").replace("inertia = [0.1, 0.1, 0.1]", "inertia = [1e-9, 1e-9, 1e-9]")
+    pendulum = ephs.simulate(loaded(tmp_path, point + joint), 1.0, method="rk87", rtol=1e-9)
+    assert np.linalg.norm(swing.body("ball").position, axis=1) == pytest.approx(1.0, abs=1e-13)
+    assert swing.body("ball").position[-1] == pytest.approx(pendulum.body("bob").position[-1], abs=2e-3)
+    assert ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 0.1).audit.passed
+    with pytest.raises(ephs.OptionError, match=r"rods\.r\.line\.segment1\.st holds a rate"):
+        ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 0.1, method="rk54")
+
+
+def test_runs_in_other_units_agree(tmp_path):
+    scene = dragged(tmp_path, coefficient=1.0)
+    small = rescaled(scene, 1e-6, 1e-9, 1e-3)
+    assert small.elements["drags"]["air"].coefficient == pytest.approx(1.0 * 1e-9 / 1e-6)
+    assert Units.of(small) != Units.of(scene)
+    one = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-9)
+    other = ephs.simulate(small, 1e-3, method="rk87", rtol=1e-9)
+    assert other.body("ball").position[-1] * 1e6 == pytest.approx(one.body("ball").position[-1], rel=1e-6)
+
+
+def test_a_part_does_as_its_elements_do_flat(tmp_path):
+    rod = {"bodies": ["ground", "ball"], "at1": [0.1, 0.0, 0.0], "at2": [0.0, 0.1, 0.0]}
+    text = FALL + "position = [0.6, 0.0, -0.8]\n" + BOX + table("drags", "air", GOOD) + table("rods", "r", rod)
+    flat = loaded(tmp_path, text, "part.toml")
+    place = 'format = 1\n[parts.left]\nuse = "part.toml"\nposition = [1.0, 2.0, 0.5]\n'
+    place += "rotation = { axis = [0.0, 0.0, 1.0], angle_deg = 90.0 }\n"
+    nested = loaded(
+        tmp_path, place + table("drags", "more", GOOD | {"body": "left.ball", "heat": "left.box", "coefficient": 0.0})
+    )
+    assert [(s, n, each.body) for s, n, each in nested.all_elements() if s == "drags"] == [
+        ("drags", "more", "left.ball"), ("drags", "left.air", "left.ball"),
+    ]  # fmt: skip
+    assert read(nested, "drags.left.air.coefficient") == 0.5
+    one, other = (ephs.simulate(scene, 0.5, step=0.01) for scene in (flat, nested))
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) @ one.body("ball").position[-1]
+    assert other.body("left.ball").position[-1] == pytest.approx(turned + np.array([1.0, 2.0, 0.5]), abs=1e-9)
+    again = scene_from_text(scene_to_text(nested))
+    assert problem_of_scene(again).initial.keys() == problem_of_scene(nested).initial.keys()
+    assert again.system() == nested.system()
+
+
+def test_solutions_are_saved_with_it(tmp_path):
+    sol = ephs.simulate(dragged(tmp_path), 0.5, method="rk54")
+    sol.save(tmp_path / "run.nc")
+    again = ephs.load_solution(tmp_path / "run.nc")
+    assert again.scene.elements == sol.scene.elements
+    assert again.body("ball").velocity == pytest.approx(sol.body("ball").velocity, abs=1e-12)
+    REGISTERED.pop("drags")
+    with pytest.raises(ValueError, match=r"\[drags.NAME\] is not registered"):
+        ephs.load_solution(tmp_path / "run.nc")
+
+
+def test_a_sweep_varies_it(tmp_path):
+    found = ephs.sweep(
+        dragged(tmp_path), {"drags.air.coefficient": [0.1, 1.0]}, 0.5, outputs=["thermal.box.temperature"]
+    )
+    assert found["thermal.box.temperature"].sizes["drags.air.coefficient"] == 2
+
+
+def test_an_element_on_a_joint_oscillates_for_all_methods_and_goes_on(tmp_path):
+    register_element(Push)
+    scene = loaded(tmp_path, SLIDER + table("pushes", "s", {"joint": "rail", "stiffness": 8.0, "stretch": 0.5}))
+    for options in ({"method": "rk87", "rtol": 1e-9}, {"method": "natural", "step": 0.002}, {"method": "radau"}):
+        sol = ephs.simulate(scene, 1.0, **options)
+        assert sol.joint("rail").coordinate[-1, 0] == pytest.approx(0.5 * (np.cos(2.0) - 1.0), abs=1e-4)
+    other = SLIDER.replace(
+        "[joints.rail]", "[bodies.frame]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n[joints.rail]"
+    ).replace('"prismatic"', '"spherical"')
+    found = faults(tmp_path, other + table("pushes", "s", {"joint": "rail", "stiffness": 8.0, "stretch": 0.5}))
+    assert found["pushes.s.joint"].expected == "a joint with one degree of freedom and no prescribed motion"
+    found = faults(tmp_path, SLIDER + table("pushes", "s", {"joint": "rial", "stiffness": 8.0, "stretch": 12.0}))
+    assert found["pushes.s.joint"].advice == 'did you mean "rail"?'
+    assert found["pushes.s.stretch"].found == "the stretch 12"
+
+
+class Fan(Element, section="fans", said="a voltage on a resistor on a coil"):
+    """A coil that an input drives."""
+
+    inductance: float = key("inductance", unit="H", gt=0.0)
+    voltage: float = key("without an input", 0.0, unit="V")
+
+    def build(self, site):
+        at, coil = site.input(Q.charge, self.voltage), site.inner("b", Q.flux_linkage)
+        inductance = self.inductance
+        site.add(ephs.storage({"b": Q.flux_linkage}, lambda b: 0.5 * b**2 / inductance), {"b": coil}, "coil")
+        site.add(
+            ephs.gyrator({"q": Q.charge, "b": Q.flux_linkage}, [[0.0, 1.0], [-1.0, 0.0]]), {"q": at, "b": coil}, "emc"
+        )
+
+
+def test_inputs_drive_it_in_parts_and_far_from_metres_too(tmp_path):
+    register_element(Fan)
+    fan = table("fans", "f", {"inductance": 2.0, "voltage": 3.0})
+    loaded(tmp_path, SLIDER + fan, "part.toml")
+    nested = loaded(tmp_path, 'format = 1\n[parts.left]\nuse = "part.toml"\n')
+    flux = "parts.left.fans.f.coil.b"
+    assert abs(ephs.simulate(nested, 2.0, step=0.1)[flux][-1]) == pytest.approx(6.0)
+    driven = {"fans.left.f": lambda t: [5.0 * t]}
+    assert abs(ephs.simulate(nested, 2.0, step=0.1, inputs=driven)[flux][-1]) == pytest.approx(10.0)
+    small = rescaled(nested, 1e-6, 1e-9, 1e-3)
+    unit = 1e-9 * 1e-12 / 1e-6
+    assert Units.of(small) != Units.of(nested)
+    assert abs(ephs.simulate(small, 2e-3, step=1e-4)[flux][-1]) == pytest.approx(6.0 * unit * 1e-3)
+
+
+def malformed():
+    class NoSection(Element):
+        def build(self, site):
+            pass
+
+    class Taken(Element, section="bodies"):
+        def build(self, site):
+            pass
+
+    class NoBuild(Element, section="unbuilt"):
+        size: float = key("size", unit="m")
+
+    class NoKey(Element, section="unkeyed"):
+        size: float = 1.0
+
+        def build(self, site):
+            pass
+
+    class NoUnit(Element, section="unmeasured"):
+        size: float = key("size")
+
+        def build(self, site):
+            pass
+
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # pydantic says that names are shadowed
+
+        class Reserved(Element, section="reserved"):
+            name: float = key("size", unit="m")
+
+            def build(self, site):
+                pass
+
+    class OddNames(Element, section="odd"):
+        part: str = key("part", names="bodys")
+
+        def build(self, site):
+            pass
+
+    class OddForm(Element, section="formed"):
+        part: dict[str, str] = key("part")
+
+        def build(self, site):
+            pass
+
+    class OddRule(Element, section="ruled"):
+        size: float = key("size", unit="m")
+
+        @rule("sice", expected="nothing")
+        def fits(self):
+            return True
+
+        def build(self, site):
+            pass
+
+    return {
+        NoSection: "section=",
+        Taken: "do not have yet",
+        NoBuild: r"build\(self, site\)",
+        NoKey: "a key made by key",
+        NoUnit: "unit= of each number",
+        Reserved: "not an attribute",
+        OddNames: "names= one of",
+        OddForm: "a number, a text",
+        OddRule: "a rule of keys of this class",
+    }
+
+
+def test_malformed_classes_are_refused_with_one_error():
+    for kind, said in malformed().items():
+        with pytest.raises(ElementError, match=said):
+            register_element(kind)
+    with pytest.raises(ElementError, match="a subclass"):
+        register_element(Path)
+    with pytest.raises(ElementError, match=r"odd.*known symbols"):
+        type("Odd", (Element,), {"__annotations__": {"odd": float}, "odd": key("size", unit="ft")})
+
+
+def test_a_section_is_registered_once_but_a_class_may_be_defined_again():
+    class Drag(Element, section="drags"):
+        def build(self, site):
+            pass
+
+    with pytest.raises(ElementError, match="do not have yet"):
+        register_element(Drag)
+    register_element(Push)
+    assert register_element(Push) is REGISTERED["pushes"]
+
+
+def test_only_what_keys_name_is_connected(tmp_path):
+    class Sneaky(Element, section="sneaky", said="what names nothing"):
+        def build(self, site):
+            site.momentum("ball")
+
+    register_element(Sneaky)
+    found = faults(tmp_path, FALL + "[sneaky.x]\n")["sneaky.x"]
+    assert "the body ball" in found.found and found.expected == "an element that can be built"
+
+
+def test_its_lines_are_drawn_in_parts_too(tmp_path):
+    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.0, 0.1]}
+    loaded(tmp_path, FALL + table("rods", "r", rod), "part.toml")
+    nested = loaded(tmp_path, 'format = 1\n[parts.left]\nuse = "part.toml"\nposition = [1.0, 0.0, 0.0]\n')
+    line = lines_of(nested)["rods.left.r-1"]
+    assert (line.body1, line.body2) == ("ground", "left.ball")
+    assert line.at1.tolist() == [1.0, 0.0, 1.0] and line.at2.tolist() == [0.0, 0.0, 0.1]
+
+
+def test_another_scene_is_untouched_by_changes(tmp_path):
+    scene = dragged(tmp_path)
+    moved = scene.with_state(coordinates={"ball": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]})
+    assert moved.elements == scene.elements
+    assert replace(scene, name="other").elements == scene.elements
