@@ -41,13 +41,14 @@ demo: $(VENV)/.installed-viz
 	$(BIN)/ephs run scenes/$(SCENE).toml --until $(UNTIL) --out out/$(SCENE) --replace
 	@echo 'The report: out/$(SCENE)/report.html (open it in a browser; it needs no network)'
 
-# The short tests are run by programs that are compiled in a tenth of the time and run slower; those that look at
-# optimised code itself, and the long ones, by programs as users have them.
+# Tests are run by programs that are compiled in a tenth of the time and run slower. Those marked optimised run programs
+# as users have them, and hold their bits against the float run, so that all other laws hold for these, too.
 test: $(VENV)/.installed-dev
 	EPHS_LLVM_LEVEL=0 $(PYTEST) -n $(CORES) -m 'not long and not optimised'
 
 laws: $(VENV)/.installed-dev
-	$(PYTEST) -n $(CORES) -m 'long or optimised' --durations=30
+	$(PYTEST) -n $(CORES) -m optimised $$(grep -rl --include='test_*.py' 'mark\.optimised' tests)
+	EPHS_LLVM_LEVEL=0 $(PYTEST) -n $(CORES) -m 'long and not optimised' --durations=30
 
 real: $(VENV)/.installed-real
 	$(PYTEST) -n $(CORES) tests_real

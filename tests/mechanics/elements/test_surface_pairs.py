@@ -97,7 +97,7 @@ def flying(rng, pair, before):
     if resting:
         turns[0], way = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
     near, far, distance = 0.0, FAR, distance_of(pair, sizes)
-    for _ in range(50):
+    for _ in range(30):  # to 1e-9 m
         middle = 0.5 * (near + far)
         ends = [np.concatenate([turns[0], np.zeros(3)]), np.concatenate([turns[1], aside + middle * way])]
         near, far = (near, middle) if distance(*ends) > 0.0 else (middle, far)
@@ -181,9 +181,9 @@ def push(scene):
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 def test_those_drawn_meet(pair):
-    """Nearly all, within the time of `blow`, had they nothing but their flight."""
+    """Within the time of `blow`, had they nothing but their flight."""
     deep = []
-    for seed in range(20):
+    for seed in range(8):
         sizes, poses, twists = flying(np.random.default_rng(seed), pair, 1.5 * STEP)
         distance, ends = distance_of(pair, sizes), []
         for time in (0.0, 4.0 * STEP):
@@ -193,18 +193,18 @@ def test_those_drawn_meet(pair):
             ]
             ends.append(distance(*at))
         deep.append(ends[0] > 0.0 > ends[1])
-    assert sum(deep) >= 19
+    assert all(deep)
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
-@settings(max_examples=3)
+@settings(max_examples=1)
 @given(seed=SEEDS)
 def test_hard_blows_keep_both_laws_and_all_momenta(pair, seed, tmp_path_factory):
     blow(scene_of(tmp_path_factory, seed, pair, hard=True, before=1.5 * STEP))
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
-@settings(max_examples=3)
+@settings(max_examples=1)
 @given(seed=SEEDS)
 def test_elastic_blows_keep_both_laws_and_all_momenta(pair, seed, tmp_path_factory):
     scene = scene_of(tmp_path_factory, seed, pair, hard=False, before=STEP)
@@ -216,7 +216,7 @@ def test_elastic_blows_keep_both_laws_and_all_momenta(pair, seed, tmp_path_facto
 
 
 @pytest.mark.parametrize("pair", [pair for pair in PAIRS if "plane" not in pair], ids="-".join)
-@settings(max_examples=3)
+@settings(max_examples=1)
 @given(seed=SEEDS)
 def test_elastic_forces_keep_all_momenta(pair, seed, tmp_path_factory):
     """By themselves: no step corrects momenta here."""

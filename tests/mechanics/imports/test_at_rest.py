@@ -10,7 +10,7 @@ import pytest
 import ephs
 from ephs.mechanics.imports.collisions import SINKING, SLIP
 
-ROBOTS = ("hopper", "half_cheetah", "walker2d", "ant", "humanoid", "humanoidstandup")
+ROBOTS = ("hopper", "half_cheetah", "ant", "humanoid")
 
 
 @pytest.mark.parametrize("name", ROBOTS)
