@@ -123,8 +123,7 @@ def simulate(
         ``"paper"``: the flat system, for natural methods; ``"folded"``: the same without transformers and the
         junctions behind them, for natural methods; ``"reduced"``, the default: the smallest form of the method.
     events
-        `ephs.Event` values or functions f(t, state) -> number, whose zeros are located, recorded in ``sol.events``,
-        and end the run if they are terminal.
+        `ephs.Event` values or functions f(t, state) -> number, whose zeros are located; terminal ones end the run.
     options
         Options of the method, such as ``{"keep": "energy and momenta"}``.
     inputs
@@ -141,8 +140,7 @@ def simulate(
     progress
         Called as progress(t, until, stats) a few times a second.
     journal
-        A file that records the run while it is running. After an interruption the same call resumes the run, with the
-        same numbers as an uninterrupted run; `load_solution` reads the file.
+        File that records the run; after an interruption the same call resumes it, to the same numbers.
     audit
         Treatment of findings of the run's audit: ``"fail"`` raises an `AuditError`, ``"warn"`` gives an
         `AuditWarning`, ``"off"`` only records them in ``sol.audit`` and the summary.
@@ -197,10 +195,8 @@ def simulate(
     for one in held:
         if one.sampled.period < control.least * unit:
             raise OptionError("min_step", min_step, f"at most the period of {one.name}, {one.sampled.period!r} s")
-    functions = asked_of(problem, inputs)
-    breakpoints = Breakpoints(
-        start / unit, end / unit, declared / unit, functions, [Sampling(one, problem) for one in held]
-    )
+    functions, sampled = asked_of(problem, inputs), [Sampling(one, problem) for one in held]
+    breakpoints = Breakpoints(start / unit, end / unit, declared / unit, functions, sampled)
     with failing_at(start):
         breakpoints.enter(start / unit, lambda: problem.initial)
         problem.inputs(start / unit, problem.initial)
