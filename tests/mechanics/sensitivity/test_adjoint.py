@@ -152,7 +152,7 @@ def test_through_a_contact_that_slips_as_tangents_say(tmp_path):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"method": "natural"}, "rk54 or rk87"),
+        ({"method": "natural"}, "rk54, rk87 or an ephs.Method"),
         ({"times": [0.2, 0.1]}, "ascending"),
         ({"parameters": []}, "at least one"),
         ({"weights": {"bodies.coupler.position": [1.0]}}, "joint of the tree"),
