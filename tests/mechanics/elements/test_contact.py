@@ -198,7 +198,8 @@ limit_loss = 0.4
 
 
 @pytest.mark.parametrize(
-    ("name", "rate", "lower"), [*((name, -1.0, -0.05) for name in SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)]
+    ("name", "rate", "lower"),
+    [*((name, -1.0, -0.05) for name in SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)],
 )
 def test_a_stop_is_an_impact(name, rate, lower, tmp_path):
     scene = scene_of(tmp_path, STOPPED, rate=rate, lower=lower, upper=0.05)
