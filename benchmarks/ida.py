@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.registry import METHODS, Method, on_joints, register_method
+from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -152,7 +152,7 @@ def _unlogged() -> Generator[None, None, None]:
         del os.environ[LOG]
 
 
-IDA = Method("ida", 5, True, False, False, True, "IDA of SUNDIALS", on_joints(Ida))
+IDA = MethodEntry("ida", 5, True, False, False, True, "IDA of SUNDIALS", on_joints(Ida))
 
 
 def register() -> None:
