@@ -8,12 +8,6 @@ Expr: TypeAlias = Any
 """An expression of SymPy."""
 
 
-def python_code(expression: Expr) -> str:
-    """An expression as Python, with functions of `math`."""
-    printer: Any = import_module("sympy.printing.pycode").PythonCodePrinter({"fully_qualified_modules": True})
-    return str(printer.doprint(expression))
-
-
 def text_of(expression: Expr) -> str:
     """An expression as text; compositions of operators are written side by side."""
     return str(_Text().doprint(expression))

@@ -1,8 +1,7 @@
-"""SymPy's counterparts of `ephs.semantics.special`: derivatives, signs, and printing as code."""
+"""SymPy's counterparts of `ephs.semantics.special`: derivatives, signs, and printing."""
 
 from typing import Any
 
-from ephs.semantics.special import SHORT
 from ephs.semantics.symbols.algebra import Expr, sp
 
 _Function: Any = sp.Function
@@ -37,11 +36,6 @@ class Sinhc(_Function):
     def _eval_rewrite_as_sinh(self, z: Expr, **_: Any) -> Expr:
         return sp.sinh(z) / z
 
-    def _pythoncode(self, printer: Any) -> str:
-        z = printer._print(self.args[0])
-        short = f"1.0 + ({z})**2/6.0*(1.0 + ({z})**2/20.0*(1.0 + ({z})**2/42.0))"
-        return f"(({short}) if abs({z}) < {SHORT} else math.sinh({z})/({z}))"
-
     def _latex(self, printer: Any, **_: Any) -> str:
         return rf"\operatorname{{sinhc}}\left({printer._print(self.args[0])}\right)"
 
@@ -70,8 +64,3 @@ class SinhcSlope(_Function):
     def _eval_evalf(self, prec: int) -> Expr:
         z = self.args[0]._eval_evalf(prec)
         return (sp.cosh(z) - sp.sinh(z) / z) / z
-
-    def _pythoncode(self, printer: Any) -> str:
-        z = printer._print(self.args[0])
-        short = f"({z})/3.0*(1.0 + ({z})**2/10.0*(1.0 + ({z})**2/28.0))"
-        return f"(({short}) if abs({z}) < {SHORT} else (math.cosh({z}) - math.sinh({z})/({z}))/({z}))"
