@@ -112,7 +112,7 @@ def gyrator(
     matrix: Matrix,
     *,
     domain: Bounds | None = None,
-    reversed_field: bool = False,
+    external_field: bool = False,
     name: str = "gyrator",
 ) -> Reversible:
     """Reversible f = L(x) e with L skew.
@@ -125,7 +125,7 @@ def gyrator(
         L (n, n) over the power ports in their order; or a function of the read states, by name, that gives it.
     domain
         Of the read states, as of a `storage`.
-    reversed_field
+    external_field
         An external field turns around with time, as a magnet's or the rotation of a frame: L may join quantities of
         equal parity, as in a permanent-magnet motor, a circulator, or for the Lorentz force.
 
@@ -138,13 +138,13 @@ def gyrator(
     n = Bundle.of(interface).size
     if not callable(matrix) and not domain:
         skew = finite_matrix(name, matrix, n, n)
-        return structures.constant_structure(name, interface, skew, np.zeros((0, n)), reversed_field=reversed_field)
+        return structures.constant_structure(name, interface, skew, np.zeros((0, n)), external_field=external_field)
     given, read = _reader(name, interface, matrix, n, n)
 
     def called(x: Point) -> tuple[Array, Array]:
         return finite_matrix(name, read(x), n, n), np.zeros((0, n))
 
-    return reversible(name, interface, called, Formula(_both(given, None)), 0, domain, reversed_field)
+    return reversible(name, interface, called, Formula(_both(given, None)), 0, domain, external_field)
 
 
 def transformer(
@@ -152,7 +152,7 @@ def transformer(
     matrix: Matrix,
     *,
     domain: Bounds | None = None,
-    reversed_field: bool = False,
+    external_field: bool = False,
     name: str = "transformer",
 ) -> Reversible:
     """Reversible e₂ = g(x) e₁, f₁ = −g(x)* f₂ from the first power port to the others.
@@ -163,7 +163,7 @@ def transformer(
         Port name -> quantity; ``"~name"`` for a state port, which the matrix may read.
     matrix
         g (n₂, n₁); or a function of the read states, by name, that gives it.
-    domain, reversed_field
+    domain, external_field
         As of a `gyrator`.
     """
     interface = _interface(name, ports)
@@ -180,7 +180,7 @@ def transformer(
     if not callable(matrix) and not domain:
         zero = np.zeros((bundle.size, bundle.size))
         rows = whole(finite_matrix(name, matrix, k, first))
-        return structures.constant_structure(name, interface, zero, rows, reversed_field=reversed_field)
+        return structures.constant_structure(name, interface, zero, rows, external_field=external_field)
     given, read = _reader(name, interface, matrix, k, first)
     right = np.eye(k).astype(object)
 
@@ -190,7 +190,7 @@ def transformer(
     def called(x: Point) -> tuple[Array, Array]:
         return np.zeros((bundle.size, bundle.size)), whole(finite_matrix(name, read(x), k, first))
 
-    return reversible(name, interface, called, Formula(_both(None, beside)), k, domain, reversed_field)
+    return reversible(name, interface, called, Formula(_both(None, beside)), k, domain, external_field)
 
 
 def constraint(
@@ -199,7 +199,7 @@ def constraint(
     *,
     multipliers: int | None = None,
     domain: Bounds | None = None,
-    reversed_field: bool = False,
+    external_field: bool = False,
     name: str = "constraint",
 ) -> Reversible:
     """Reversible f = C(x)* λ, 0 = C(x) e.
@@ -212,7 +212,7 @@ def constraint(
         C (k, n) over the power ports in their order; or a function of the read states, by name, that gives it.
     multipliers
         k; where None and the matrix is a function, its rows are counted at a random state.
-    domain, reversed_field
+    domain, external_field
         As of a `gyrator`.
     """
     interface = _interface(name, ports)
@@ -222,14 +222,14 @@ def constraint(
         given: Any = matrix
         k = len(given) if np.ndim(given) == 2 else 1
         rows = finite_matrix(name, np.atleast_2d(given), k, n)
-        return structures.constant_structure(name, interface, zero, rows, reversed_field=reversed_field)
+        return structures.constant_structure(name, interface, zero, rows, external_field=external_field)
     given, read = _reader(name, interface, matrix, multipliers, n)
     k = _rows(interface, read) if multipliers is None else multipliers
 
     def called(x: Point) -> tuple[Array, Array]:
         return zero, finite_matrix(name, read(x), k, n)
 
-    return reversible(name, interface, called, Formula(_both(None, given)), k, domain, reversed_field)
+    return reversible(name, interface, called, Formula(_both(None, given)), k, domain, external_field)
 
 
 def irreversible(
@@ -301,7 +301,7 @@ def reversible(
     formula: Formula,
     multipliers: int,
     domain: Bounds | None,
-    reversed_field: bool = False,
+    external_field: bool = False,
 ) -> Reversible:
     """A structure that reads states: that of its formula's record, else that of a function, ``called`` back.
 
@@ -327,7 +327,7 @@ def reversible(
         kernel=kernel,
         formula=formula,
         domain=bounds,
-        reversed_field=reversed_field,
+        external_field=external_field,
     )
 
 

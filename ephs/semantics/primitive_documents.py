@@ -27,7 +27,7 @@ from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, recor
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.proving import proof_of, replay
 
-FLAGS = {"reversible": "reversed_field", "irreversible": "one_sided"}
+FLAGS = {"reversible": "external_field", "irreversible": "one_sided"}
 """Key that says that a structure need not be invariant under time reversal, by kind."""
 KINDS = ("part", "storage", "reversible", "irreversible")
 AGREEMENT = 1e-9
@@ -189,7 +189,7 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
     if skew is not None and len(skew.rows) != n:
         reader.refuse(f"{where}.L", f"{len(skew.rows)} rows", f"{n}")
     zero, k = np.zeros((n, n)), 0 if constraint is None else len(constraint.rows)
-    reversed_field = bool(found["reversed_field"])
+    external_field = bool(found["external_field"])
 
     def structure(x: Point) -> tuple[Array, Array]:
         values = {str(port): float(v[0]) if v.size == 1 else v for port, v in x.items()}
@@ -199,9 +199,9 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
 
     def make() -> Primitive:
         if not domain and all(part is None or part.numbers for part in (skew, constraint)):
-            return structures.constant_structure(name, ports, *structure({}), reversed_field=reversed_field)
+            return structures.constant_structure(name, ports, *structure({}), external_field=external_field)
         formula = Formula(Structure(skew, constraint))
-        return constructors.reversible(name, ports, structure, formula, k, domain, reversed_field)
+        return constructors.reversible(name, ports, structure, formula, k, domain, external_field)
 
     return make
 

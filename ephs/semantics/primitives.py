@@ -272,7 +272,7 @@ class Reversible(_Structure):
     working
         Whether its discrete relation does work, C_h e ≠ F: over a step it is no Dirac structure. The work is booked as
         supplied, and component by component.
-    reversed_field
+    external_field
         Whether an external field turns around with time, as a magnet's or the rotation of a frame: then the structure
         need not be invariant under time reversal of its quantities alone.
     domain, proof, trusted, support
@@ -293,7 +293,7 @@ class Reversible(_Structure):
     proof: Proof | None = field(default=None, compare=False, repr=False)
     trusted: bool = field(default=False, compare=False, repr=False)
     working: bool = False
-    reversed_field: bool = field(default=False, compare=False, repr=False)
+    external_field: bool = field(default=False, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -66,7 +66,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
         rows = constraint @ whole
         made = whole.T @ skew @ whole
         return structures.constant_structure(
-            process.name, interface, made, rows, entries, trusted=sound, reversed_field=process.reversed_field
+            process.name, interface, made, rows, entries, trusted=sound, external_field=process.external_field
         )
     kernel = _kernel(process, maps)
     if isinstance(process, Irreversible):
@@ -110,7 +110,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
         proof=proof,
         trusted=sound,
         working=inner.working,
-        reversed_field=inner.reversed_field,
+        external_field=inner.external_field,
     )
 
 

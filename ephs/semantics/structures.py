@@ -94,9 +94,9 @@ def constant_structure(
     formula: Formula | None = None,
     *,
     trusted: bool = False,
-    reversed_field: bool = False,
+    external_field: bool = False,
 ) -> Reversible:
-    """A Dirac structure that does not depend on states: L (n, n), C (k, n); `reversed_field` as of a `Reversible`."""
+    """A Dirac structure that does not depend on states: L (n, n), C (k, n); `external_field` as of a `Reversible`."""
     n, k = skew.shape[0], constraint.shape[0]
     entries = [*skew.ravel().tolist(), *constraint.reshape(k, n).ravel().tolist()]
     return Reversible(
@@ -108,7 +108,7 @@ def constant_structure(
         kernel=Kernel("constant_structure", Linear("constant_structure"), tuple(entry or 0.0 for entry in entries)),
         formula=formula or Formula(lambda: (skew, constraint)),
         trusted=trusted,
-        reversed_field=reversed_field,
+        external_field=external_field,
     )
 
 

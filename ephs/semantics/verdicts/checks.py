@@ -47,7 +47,7 @@ MIRRORED = {"irreversible": STATEMENTS["irreversible"][4], "reversible": STATEME
 """Conditions that one-sided components and those in a reversed field need not satisfy."""
 FLAGS = {
     "irreversible": "one_sided=True if it depends on the direction of the flow, as a valve does",
-    "reversible": "reversed_field=True if an external field turns around with time, as a magnet's or a rotating frame",
+    "reversible": "external_field=True if an external field turns around with time, as a magnet's or a rotating frame",
 }
 """What to declare where parity does not hold and need not."""
 
@@ -210,7 +210,7 @@ def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
     # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
     there = reversible.structure(_reversed(bundle, x))
     found = _apart((-parity[:, None] * skew * parity, constraint * parity), there) if _finite(*there) else 0.0
-    if not reversible.reversed_field and not found <= SAME:
+    if not reversible.external_field and not found <= SAME:
         raise _fail("parity", reversible, trial, found, flag=FLAGS["reversible"])
     for port, opposite in _opposite(bundle, x):
         found = _apart((skew, constraint), reversible.structure({**x, port: opposite}))

@@ -52,7 +52,7 @@ def decided(reversible: "Reversible") -> tuple[Condition, ...]:
         found[isotropic] = _searched(reversible, isotropic, "isotropy", skew + skew.T, np.maximum(beside, beside.T))
     if conserved not in found:
         found[conserved] = _conservation(reversible, conserved, skew, constraint)
-    if mirrored not in found and not reversible.reversed_field:
+    if mirrored not in found and not reversible.external_field:
         found[mirrored] = _parity(reversible, mirrored, skew, constraint)
     return tuple(found[statement] for statement in STATEMENTS["reversible"] if statement in found)
 

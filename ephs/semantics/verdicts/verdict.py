@@ -134,7 +134,7 @@ def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[C
     from ephs.semantics.verdicts.checks import MIRRORED
 
     free = (primitive.kind == "irreversible" and primitive.one_sided) or (
-        primitive.kind == "reversible" and primitive.reversed_field
+        primitive.kind == "reversible" and primitive.external_field
     )
     return tuple(each for each in conditions if not free or each.statement != MIRRORED[primitive.kind])
 

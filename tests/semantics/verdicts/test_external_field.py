@@ -33,9 +33,9 @@ RAYS = {"p": Q.momentum, "s": Q.entropy}
 
 @pytest.mark.parametrize("name", PARTS)
 def test_it_is_proved_with_the_flag_and_refused_without_by_its_name(name):
-    verdict = PARTS[name](reversed_field=True).verdict
+    verdict = PARTS[name](external_field=True).verdict
     assert verdict == "proved" and "D(ϵx) = ϵD(x)" not in verdict.text
-    with pytest.raises(StructureError, match=r"time reversal.*declare reversed_field=True"):
+    with pytest.raises(StructureError, match=r"time reversal.*declare external_field=True"):
         PARTS[name]()
 
 
@@ -47,7 +47,7 @@ def test_what_depends_on_the_direction_names_its_own_flag():
 @given(st.floats(1e-6, 1e6), st.sampled_from([1e-9, 1e-3, 2.0]))
 def test_the_flag_excuses_nothing_else(size, leak):
     with pytest.raises(StructureError, match="not reversible"):
-        ephs.gyrator(ODD, size * np.array([[0.0, 1.0], [-1.0 + leak, 0.0]]), reversed_field=True)
+        ephs.gyrator(ODD, size * np.array([[0.0, 1.0], [-1.0 + leak, 0.0]]), external_field=True)
 
 
 def valve(one_sided=True):
@@ -57,20 +57,20 @@ def valve(one_sided=True):
     return ephs.irreversible(RAYS, matrix, one_sided=one_sided)
 
 
-@pytest.mark.parametrize("make", [*(lambda p=p: p(reversed_field=True) for p in PARTS.values()), valve])
+@pytest.mark.parametrize("make", [*(lambda p=p: p(external_field=True) for p in PARTS.values()), valve])
 def test_documents_keep_both(make):
     part = make()
     text = alone(part).to_json()
     VALID.validate(json.loads(text))
     ((_, again),) = ephs.System.from_json(text).leaves()
     assert again.verdict == part.verdict
-    flag = "one_sided" if part.kind == "irreversible" else "reversed_field"
+    flag = "one_sided" if part.kind == "irreversible" else "external_field"
     assert getattr(again, flag)
 
 
 def test_folding_keeps_both():
-    single = Map(np.array([[3.0]]), PARTS["rotating frame"](reversed_field=True).interface[Path.of("x")])
-    assert pull_back(PARTS["rotating frame"](reversed_field=True), {Path.of("x"): single}).reversed_field
+    single = Map(np.array([[3.0]]), PARTS["rotating frame"](external_field=True).interface[Path.of("x")])
+    assert pull_back(PARTS["rotating frame"](external_field=True), {Path.of("x"): single}).external_field
     assert pull_back(valve(), {Path.of("p"): Map(np.array([[2.0]]), valve().interface[Path.of("p")])}).one_sided
 
 
@@ -78,7 +78,7 @@ def test_a_charge_in_a_magnetic_field_runs_on_a_circle():
     """A mass of 1 kg on a force of 2 N s/m times its velocity, turned by 90°: 2 rad/s, the speed kept."""
     pattern = Pattern.from_text("x: momentum; y: momentum; a(p=x); b(p=y); g(x, y)")
     mass = library.point_mass(m=1.0)
-    system = pattern(a=mass, b=mass, g=PARTS["rotating frame"](reversed_field=True))
+    system = pattern(a=mass, b=mass, g=PARTS["rotating frame"](external_field=True))
     found = ephs.simulate(system, 1.0, initial={"a.p": 1.0, "b.p": 0.0}, method="rk87", rtol=1e-10, atol=1e-12)
     end = np.array([found["a.p"].ravel()[-1], abs(found["b.p"].ravel()[-1])])
     assert np.allclose(end, [np.cos(2.0), np.sin(2.0)], atol=1e-8)
