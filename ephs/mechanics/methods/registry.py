@@ -73,6 +73,8 @@ class Method:
         error of constant steps; None for other methods.
     impacts
         Whether the method accepts hard contacts: its steps may begin and end at any time.
+    posed
+        Whether the method needs bodies: systems whose states are numbers are refused.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Method:
     lawful: bool = False
     undamped: Callable[[Model], ComponentMethod] | None = None
     impacts: bool = False
+    posed: bool = False
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
@@ -289,6 +292,7 @@ for _method in (
         "losses implicit, all else explicit",
         on_joints(_corrected(_semi)),
         ("keep",),
+        posed=True,
     ),
 ):
     register_method(_method)
@@ -331,6 +335,8 @@ def chosen(name: str | Method, problem: Problem, *, step: float | None) -> tuple
     name = method.name
     if problem.scene is not None and not method.scenes:
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
+    if method.posed and problem.scene is None and _flat(problem):
+        raise OptionError("method", name, "radau, which took its place for systems without bodies")
     if hard is not None and not method.impacts:
         known = ", ".join(m.name for m in (*METHODS.values(), AUTO) if m.impacts)
         raise OptionError("method", name, f"{known}: {hard} acts by impulses")
