@@ -105,6 +105,8 @@ def measure(cell: Cell, asked: Asked) -> dict[str, Any]:
         # what has no bodies has no momenta to be kept
         options = KEPT if asked.options and not isinstance(cell.of, str) else asked.options
         sol = ephs.simulate(model, cell.until, method=asked.method, options=options, initial=start, audit="off", **pace)
+    except ephs.OptionError:  # the method needs bodies
+        return row | {"failed": "–"}
     except ephs.SimulationError as error:
         return row | {"failed": error.outcome.value}
     plain = sol.stats.get("plain_defect", {}).get("largest")

@@ -12,7 +12,7 @@ from ephs.mechanics.methods.registry import METHODS
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
-@pytest.mark.parametrize("name", ["bricard", "slider-crank", "hot-brake", "heavy-top"])
+@pytest.mark.parametrize("name", ["bricard", "slider-crank", "hot-brake"])
 def test_it_comes_to_the_same_motion_and_keeps_the_balance(name):
     """Its steps are good to a hundredth of the tolerance; errors of a few hundred of them add up."""
     scene = ephs.load(SCENES / f"{name}.toml")

@@ -193,6 +193,13 @@ def test_bad_options_are_refused_by_name(options, words):
         ephs.simulate(scene, **{"until": 1.0, **options})
 
 
+def test_systems_without_bodies_are_left_to_radau():
+    with pytest.raises(ephs.OptionError, match="method is 'semi', expected radau, which took its place for systems wi"):
+        ephs.simulate(OSCILLATOR, 1.0, initial={"pe.q": 1.0}, method="semi", step=0.1)
+    sol = ephs.simulate(OSCILLATOR, 1.0, initial={"pe.q": 1.0}, method="radau", step=0.1)
+    assert sol["pe.q"][-1] == pytest.approx(np.cos(1.0), abs=1e-6)
+
+
 @pytest.mark.parametrize("method", OF_SCENES)
 def test_initial_states_off_the_joints_are_refused(method):
     scene = ephs.load(ROOT / "scenes/slider-crank.toml")

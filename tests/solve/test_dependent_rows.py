@@ -153,7 +153,7 @@ def test_an_effort_too_small_beside_its_row_makes_no_row_independent():
     assert list(entangled(csr_array(rows))) == [0, 1]
 
 
-METHODS = ("natural", "natural4", "rk54", "rk87", "semi", "radau", "auto", "variational")
+METHODS = ("natural", "natural4", "rk54", "rk87", "radau", "auto", "variational")
 
 
 def oscillator(row=None):

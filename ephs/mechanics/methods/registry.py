@@ -75,6 +75,8 @@ class MethodEntry:
         error of constant steps; None for other methods.
     impacts
         Whether the method accepts hard contacts: its steps may begin and end at any time.
+    posed
+        Whether the method needs bodies: systems whose states are numbers are refused.
     """
 
     name: str
@@ -90,6 +92,7 @@ class MethodEntry:
     lawful: bool = False
     undamped: Callable[[Model], ComponentMethod] | None = None
     impacts: bool = False
+    posed: bool = False
 
 
 def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
@@ -307,6 +310,7 @@ for _method in (
         "losses implicit, all else explicit",
         on_joints(_corrected(_semi)),
         ("keep",),
+        posed=True,
     ),
 ):
     register_method(_method)
@@ -351,6 +355,8 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
     name = method.name
     if problem.scene is not None and not method.scenes:
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
+    if method.posed and problem.scene is None and _flat(problem):
+        raise OptionError("method", name, "radau, which took its place for systems without bodies")
     if hard is not None and not method.impacts:
         known = ", ".join(m.name for m in (*METHODS.values(), AUTO) if m.impacts)
         raise OptionError("method", name, f"{known}: {hard} acts by impulses")
