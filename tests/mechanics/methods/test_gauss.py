@@ -17,6 +17,7 @@ from ephs.solve.control import Control, Tolerance
 from ephs.solve.errors import SolveError
 from tests.mechanics.methods.test_loops import five_bar
 from tests.mechanics.torsion import torsion
+from tests.written import scene_of_text
 
 NAMES = tuple(ORDERS)
 CONTROL = Control(Tolerance(1e-9, {}), Tolerance(1e-12, {}), 1e-2, 0.0, math.inf, None)
@@ -76,10 +77,8 @@ def test_first_guesses_and_estimates_vanish_on_polynomials_as_far_as_they_can(na
 
 
 @pytest.mark.parametrize("name", [*NAMES, "rk87", "radau"])
-def test_a_step_back_leads_to_the_start_by_symmetric_methods_only(name, tmp_path):
-    file = tmp_path / "spring.toml"
-    file.write_text(torsion(0.5, 3.0, -1.1, rest=-0.3), encoding="utf-8")
-    eq = Equations(problem_of_scene(ephs.load(file)), 0.0)
+def test_a_step_back_leads_to_the_start_by_symmetric_methods_only(name):
+    eq = Equations(problem_of_scene(scene_of_text(torsion(0.5, 3.0, -1.1, rest=-0.3))), 0.0)
     made, start = stepper(eq, name), eq.start(0.0)
     back = made.step(made.anew(made.step(start, 0.5).end), -0.5).end
     assert (apart(back, start) <= 1e-13) == (name in NAMES)
@@ -149,10 +148,8 @@ def test_chosen_steps_are_left_to_radau_where_a_brake_is_stiff(name, tmp_path):
     assert not ephs.simulate(ephs.load(file), 1e-6, method=name, rtol=1e-6, atol=1e-6).stats["switches"]
 
 
-def test_sweeps_that_do_not_contract_end_a_step(tmp_path):
-    file = tmp_path / "stiff.toml"
-    file.write_text(torsion(0.5, 2e4, -1.1, rest=-0.3), encoding="utf-8")
-    eq = Equations(problem_of_scene(ephs.load(file)), 0.0)
+def test_sweeps_that_do_not_contract_end_a_step():
+    eq = Equations(problem_of_scene(scene_of_text(torsion(0.5, 2e4, -1.1, rest=-0.3))), 0.0)
     for steady in (True, False):
         eq.steady = steady
         with pytest.raises(SolveError, match="stages"):
