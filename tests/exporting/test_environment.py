@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 import ephs
 from ephs.exporting.environment import Environment, Environments, Task
+from tests.written import scene_of_text
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -87,13 +88,15 @@ def test_it_is_an_environment_of_gymnasium(task):
     assert isinstance(Environments(task, 2), gymnasium.vector.VectorEnv)
 
 
-def test_actions_of_actuators_have_their_ranges(tmp_path):
-    file = tmp_path / "arm.toml"
-    file.write_text(
-        'format = 1\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.h]\ntype = "revolute"\n'
-        'bodies = ["ground", "arm"]\nat = [0.5, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n'
-        '[actuators.push]\njoints = ["h"]\nratio = 3.0\nlimits = [-0.5, 2.0]\n[actuators.free]\njoints = ["h"]\n'
-    )
+def test_actions_of_actuators_have_their_ranges():
     names = ["actuators.push", "actuators.free", "joints.h"]
-    found = Task(ephs.load(file), inputs=names, reward=lambda *_: 0.0).action_space
+    found = Task(
+        scene_of_text(
+            'format = 1\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.h]\ntype = "revolute"\n'
+            'bodies = ["ground", "arm"]\nat = [0.5, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n'
+            '[actuators.push]\njoints = ["h"]\nratio = 3.0\nlimits = [-0.5, 2.0]\n[actuators.free]\njoints = ["h"]\n'
+        ),
+        inputs=names,
+        reward=lambda *_: 0.0,
+    ).action_space
     assert (found.low.tolist(), found.high.tolist()) == ([-0.5, -1.0, -1.0], [2.0, 1.0, 1.0])

@@ -14,6 +14,7 @@ from ephs.exporting.image import image_of
 from ephs.exporting.module import exported
 from ephs.mechanics.scene.parameters import varied
 from tests.exporting.runs import Run
+from tests.written import scene_of_text
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = """
@@ -213,9 +214,8 @@ CONTROLLED["tendon"] = (
 
 @pytest.mark.parametrize("way", CONTROLLED)
 @pytest.mark.parametrize("controls", [(1.0, 0.05), (5.0, -7.0), (-3.0, 0.0)])
-def test_controls_of_actuators_are_inputs(way, controls, tmp_path):
-    (tmp_path / "arm.toml").write_text(CONTROLLED[way])
-    model, names = ephs.load(tmp_path / "arm.toml"), ["actuators.push", "actuators.both"]
+def test_controls_of_actuators_are_inputs(way, controls):
+    model, names = scene_of_text(CONTROLLED[way]), ["actuators.push", "actuators.both"]
     run = Run(exported(image_of(model, inputs=names, until=0.2), "made"))
     run.call("inputs", None, np.array(controls))
     assert run.call("advance", ctypes.c_int64, 0.2) == 0
@@ -225,9 +225,11 @@ def test_controls_of_actuators_are_inputs(way, controls, tmp_path):
         assert found[f"joints.{joint}.rate"] == pytest.approx(same.joint(joint).rate[-1, 0], rel=1e-7)
 
 
-def test_a_parameter_of_an_actuator_that_is_an_input_is_refused(tmp_path):
-    (tmp_path / "arm.toml").write_text(CONTROLLED["joints"])
+def test_a_parameter_of_an_actuator_that_is_an_input_is_refused():
     with pytest.raises(ephs.ExportError, match=r"actuators\.push\.ratio"):
         image_of(
-            ephs.load(tmp_path / "arm.toml"), inputs=["actuators.push"], parameters=["actuators.push.ratio"], until=0.2
+            scene_of_text(CONTROLLED["joints"]),
+            inputs=["actuators.push"],
+            parameters=["actuators.push.ratio"],
+            until=0.2,
         )

@@ -5,6 +5,7 @@ import pytest
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.running import Course
+from tests.written import scene_of_text
 
 CHAIN = """
 format = 1
@@ -33,10 +34,8 @@ STOP = "limits = [-3.0, 0.5]\nlimit_restitution = 0.5\n"
 
 
 @pytest.fixture(params=["", STOP], ids=["free", "stopped"])
-def chain(request, tmp_path):
-    file = tmp_path / "chain.toml"
-    file.write_text(CHAIN + request.param)
-    return ephs.load(file)
+def chain(request):
+    return scene_of_text(CHAIN + request.param)
 
 
 def accepts(scene, method):

@@ -133,8 +133,15 @@ def cart(law, end):
     return state
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("method", "form"),
+    [
+        (name, form)
+        for name in METHODS
+        for form in FORMS
+        if name in ("rk87", "natural") or "times" in form
+    ],
+)
 def test_pendulum_on_a_led_cart_by_every_method(method, form):
     scene, law, end = loaded(CART.replace("{motion}", form)), FORMS[form], 1.2
     own = METHODS[method]

@@ -1,6 +1,7 @@
 """Motions of mechanisms: the laws of every step, by the compiled natural method."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path as File
 
 import numpy as np
@@ -21,6 +22,7 @@ from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 SCENES = sorted((File(__file__).parents[2] / "scenes").glob("*.toml"))
 # what is slow is compiled once: the first example
@@ -29,7 +31,7 @@ calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, Heal
 
 
 @pytest.mark.parametrize(("method", "step"), [("natural", 0.005), ("natural4", 0.02)])
-@settings(calm, max_examples=60)
+@settings(calm, max_examples=20)
 @given(scene=mechanisms())
 def test_energy_positions_and_entropy_of_any_mechanism(method, step, scene):
     """Energy to rounding, joints closed to rounding, no entropy destroyed, in each of some steps."""
@@ -91,19 +93,25 @@ STEPS = {2: (0.01, 0.005), 3: (0.01, 0.005), 4: (0.04, 0.02), 5: (0.05, 0.025), 
 LAWLESS = ("variational",)  # unless it is asked to
 
 
+def end(sol):
+    return np.concatenate([sol.body(name).position[-1] for name in sol.scene.bodies])
+
+
+@cache
+def rubbing(kind):
+    """One body on another on the ground, rubbing, heating a node; and where they are after 0.2 s."""
+    # A search for one example, however long: `find` has no law to be slow at.
+    quick = settings(max_examples=500, database=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    scenes = mechanisms(max_bodies=2, kinds=(kind,), loops=False)
+    scene = find(scenes, lambda s: len(s.bodies) == 2 and bool(s.thermal) and np.any(s.springs), settings=quick)
+    return scene, end(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13))
+
+
 @pytest.mark.parametrize("method", [m.name for m in METHODS.values() if m.fixed and m.scenes])
 @pytest.mark.parametrize("kind", [*PAIRS, "universal"])
 def test_every_pair_with_every_method(kind, method):
-    """One body on another on the ground, rubbing, heating a node: balances, closure, and the method's order."""
-    scenes = mechanisms(max_bodies=2, kinds=(kind,), loops=False)
-    # A search for one example, however long: `find` has no law to be slow at.
-    quick = settings(max_examples=500, database=None, derandomize=True, suppress_health_check=list(HealthCheck))
-    scene = find(scenes, lambda s: len(s.bodies) == 2 and bool(s.thermal) and np.any(s.springs), settings=quick)
-
-    def end(sol):
-        return np.concatenate([sol.body(name).position[-1] for name in scene.bodies])
-
-    exact = end(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13))
+    """Balances, closure, and the method's order."""
+    scene, exact = rubbing(kind)
     order, errors = METHODS[method].order, []
     for h in STEPS[order]:
         sol = ephs.simulate(scene, 0.2, method=method, step=h)
@@ -246,15 +254,17 @@ def test_a_step_of_more_than_half_a_turn_does_not_end_well():
         ephs.simulate(case.scene(), 1.0, step=0.03)
 
 
-def test_a_motion_that_nothing_determines_is_refused_by_name(tmp_path):
+def test_a_motion_that_nothing_determines_is_refused_by_name():
     """A massless frame that turns freely: no equation gives its rate."""
-    file = tmp_path / "frame.toml"
-    file.write_text(
-        "format = 1\n[bodies.frame]\nmass = 0.0\ninertia = [0.0, 0.0, 0.0]\n"
-        '[joints.pin]\ntype = "revolute"\nbodies = ["ground", "frame"]\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n'
-    )
     with pytest.raises(ephs.SimulationError, match=r"the motion is not determined.*(frame|pin)") as caught:
-        ephs.simulate(ephs.load(file), 1.0)
+        ephs.simulate(
+            scene_of_text(
+                "format = 1\n[bodies.frame]\nmass = 0.0\ninertia = [0.0, 0.0, 0.0]\n"
+                '[joints.pin]\ntype = "revolute"\nbodies = ["ground", "frame"]\n'
+                "at = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n"
+            ),
+            1.0,
+        )
     assert caught.value.partial.t.tolist() == [0.0]
 
 
@@ -345,11 +355,9 @@ ROUNDING = 8 * np.finfo(float).eps * 100.0 * 0.01
 """Of the entropy that a conductance of 100 W/K passes on in a step of 0.01 s, in J/K."""
 
 
-def test_what_comes_to_rest_stays_there(tmp_path):
+def test_what_comes_to_rest_stays_there():
     """Damping makes the square of a rate that is all rounding, conduction the difference of equal temperatures."""
-    file = tmp_path / "resting.toml"
-    file.write_text(RESTING, encoding="utf-8")
-    sol = ephs.simulate(ephs.load(file), 5.0, step=0.01, audit="off")  # conduction is too fast for such steps
+    sol = ephs.simulate(scene_of_text(RESTING), 5.0, step=0.01, audit="off")  # conduction is too fast for such steps
     warm = [sol.summary()["thermal"][name]["temperature"] for name in "ab"]
     assert warm[0] == pytest.approx(warm[1], rel=1e-12)
     assert np.abs(sol.body("block").position - [0.5, 0.3, 0.2]).max() <= 1e-14

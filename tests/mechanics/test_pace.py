@@ -13,6 +13,7 @@ from ephs.mechanics.runs.pace import TIMES, TURN, longest_step
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from examples.failing import four_bar
 from tests.mechanics.methods.test_by_hand import four_bar as four_bar_by_hand
+from tests.written import scene_of_text
 
 ROOT = Path(__file__).resolve().parents[2]
 SLIDE = """
@@ -36,11 +37,11 @@ motion = { rate = RATE }
 """
 
 
-def test_a_joint_moves_by_a_tenth_of_a_turn_or_of_the_extent_at_most(tmp_path):
+def test_a_joint_moves_by_a_tenth_of_a_turn_or_of_the_extent_at_most():
     for rate, expected in (("-2.0", TURN * 5.0 / 2.0), ("0.0", np.inf)):
-        file = tmp_path / "slide.toml"
-        file.write_text(SLIDE.replace("RATE", rate))
-        assert longest_step(problem_of_scene(ephs.load(file)), 8, 1e-6, (0.0, 1.0)) == expected
+        assert (
+            longest_step(problem_of_scene(scene_of_text(SLIDE.replace("RATE", rate))), 8, 1e-6, (0.0, 1.0)) == expected
+        )
     assert longest_step(problem_of_scene(four_bar(2.5)), 2, 0.0, (0.0, 1.0)) == TURN
     assert longest_step(problem_of_scene(four_bar(2.5)), 2, 1e-6, (0.0, 1.0)) == pytest.approx(0.01)
 
@@ -63,11 +64,9 @@ def test_no_step_leaps_over_what_a_linkage_cannot_reach(method):
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "auto"])
-def test_the_work_of_what_is_prescribed_is_as_good_as_the_rest(method, tmp_path):
+def test_the_work_of_what_is_prescribed_is_as_good_as_the_rest(method):
     text = (ROOT / "scenes/slider-crank.toml").read_text()
-    file = tmp_path / "turned.toml"
-    file.write_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }"))
-    scene = ephs.load(file)
+    scene = scene_of_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }"))
     sol = ephs.simulate(scene, 1.0, method=method)
     assert sol.energy_error.max() < 1e-6
     assert sol.stats["longest_step"] <= TURN / 10.0
@@ -76,7 +75,7 @@ def test_the_work_of_what_is_prescribed_is_as_good_as_the_rest(method, tmp_path)
 
 @pytest.mark.parametrize("joint", ["shoulder", "elbow"])
 @pytest.mark.parametrize("turned", [False, True], ids=["planar", "spatial"])
-def test_what_drives_a_joint_outweighs_friction_and_springs_in_it(joint, turned, tmp_path):
+def test_what_drives_a_joint_outweighs_friction_and_springs_in_it(joint, turned):
     text = (ROOT / "ephs/templates/double-pendulum.toml").read_text()
     more = "motion = { rate = 1.5 }\nrate = 1.5\nfriction = 0.4\nstiffness = 3.0\nrest = 0.2\n"
     text = text.replace(f"[joints.{joint}]\n", f"[joints.{joint}]\n{more}")
@@ -85,9 +84,7 @@ def test_what_drives_a_joint_outweighs_friction_and_springs_in_it(joint, turned,
             "0.5], rotation = [0.7071067811865476, 0.0, 0.7071067811865476, 0.0] }\ncoordinate = 0.5",
             "0.5], rotation = [0.8, 0.0, 0.6, 0.0] }\ncoordinate = 0.5",
         )
-    file = tmp_path / "driven.toml"
-    file.write_text(text)
-    scene = ephs.load(file)
+    scene = scene_of_text(text)
     natural = ephs.simulate(scene, 1.0, method="natural", step=1e-3)
     explicit = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-10, atol=1e-12)
     assert explicit.energy_error.max() < 1e-8

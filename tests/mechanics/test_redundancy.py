@@ -17,6 +17,7 @@ from ephs.mechanics.scene.model import GROUND
 from ephs.semantics.spaces import SE3
 from ephs.solve.instant import instant, mobility
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = sorted([*(ROOT / "scenes").glob("*.toml"), *(ROOT / "benchmarks" / "scenes").glob("*.toml")])
@@ -55,10 +56,9 @@ def planar_loop(*corners, pairs=("revolute",) * 4):
 
 
 @pytest.fixture
-def scene(tmp_path):
+def scene():
     def from_text(text):
-        (tmp_path / "test.toml").write_text(HEAD + text)
-        return ephs.load(tmp_path / "test.toml")
+        return scene_of_text(HEAD + text)
 
     return from_text
 

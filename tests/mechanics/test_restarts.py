@@ -59,9 +59,8 @@ def test_runs_of_all_elements_go_on(name, load):  # noqa: F811 - the fixture
 
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
-@pytest.mark.parametrize("method", ["rk54", "rk87"])
-def test_runs_of_all_scenes_go_on(file, method):
-    assert goes_on(ephs.load(file), method) <= CONDITION * ROUNDING
+def test_runs_of_all_scenes_go_on(file):
+    assert goes_on(ephs.load(file), "rk54") <= CONDITION * ROUNDING
 
 
 @pytest.mark.parametrize("method", [name for name in METHODS if name not in ONWARDS])

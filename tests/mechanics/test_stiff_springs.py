@@ -14,17 +14,17 @@ from ephs import quantity as Q
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.solve.oscillations import oscillations
 from tests.solve.conftest import oscillator
+from tests.written import scene_of_text
 
 INERTIA = 0.1 + 1.0 * 0.5**2
 """About the pin, in kg m²."""
 MANY = st.floats(-20.0, 20.0).map(lambda power: 10.0**power)
 
 
-def pendulum(tmp_path, stiffness, **more):
+def pendulum(stiffness, **more):
     """A body of 1 kg, 0.5 m beside its pin, held level by a spring in the pin."""
-    file = tmp_path / "pendulum.toml"
     given = "\n".join(f"{key} = {value!r}" for key, value in {"stiffness": stiffness, **more}.items())
-    file.write_text(f"""
+    return scene_of_text(f"""
 format = 1
 [bodies.arm]
 mass = 1.0
@@ -37,7 +37,6 @@ at = [0.0, 0.0, 0.0]
 axis = [0.0, 1.0, 0.0]
 {given}
 """)
-    return ephs.load(file)
 
 
 def found_in(problem):
@@ -70,8 +69,8 @@ def test_two_masses_on_one_spring_swing_against_each_other(k, m):
 
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e10, 1e20, 1e30])
-def test_a_spring_in_a_pin_acts_on_all_that_turns_about_it(tmp_path, stiffness):
-    found = found_in(problem_of_scene(pendulum(tmp_path, stiffness, rate=1.0)))
+def test_a_spring_in_a_pin_acts_on_all_that_turns_about_it(stiffness):
+    found = found_in(problem_of_scene(pendulum(stiffness, rate=1.0)))
     assert found.rates[-1] == pytest.approx(np.sqrt(stiffness / INERTIA), rel=1e-12)
     static = 0.5 * (9.81 * 0.5) ** 2 / stiffness
     assert found.energies[-1] == pytest.approx(0.5 * INERTIA + static, rel=1e-9)
@@ -81,9 +80,9 @@ def test_a_spring_in_a_pin_acts_on_all_that_turns_about_it(tmp_path, stiffness):
 @pytest.mark.parametrize("by_hand", [False, True], ids=["scene", "system"])
 @pytest.mark.parametrize("stiffness", [1e17, 1e20, 1e30])
 @pytest.mark.parametrize(("method", "step"), [("natural", 0.01), ("natural4", 0.01), ("natural", None)])
-def test_steps_do_not_pass_over_an_oscillation_without_a_finding(tmp_path, by_hand, stiffness, method, step):
+def test_steps_do_not_pass_over_an_oscillation_without_a_finding(by_hand, stiffness, method, step):
     """The rate is cos ω t with ω up to 1.7e15 rad/s; results have 1 or −1 at every instant, and keep the energy."""
-    scene = pendulum(tmp_path, stiffness, rate=1.0)
+    scene = pendulum(stiffness, rate=1.0)
     model = scene.system() if by_hand else scene
     with pytest.raises(ephs.SimulationError) as failed, warnings.catch_warnings():
         warnings.simplefilter("ignore", ephs.CostWarning)
@@ -97,9 +96,9 @@ def test_steps_do_not_pass_over_an_oscillation_without_a_finding(tmp_path, by_ha
 
 @pytest.mark.parametrize("stiffness", [1e13, 1e17, 1e30])
 @pytest.mark.parametrize(("method", "step"), [("natural", 0.01), ("natural4", 0.01)])
-def test_what_hardly_swings_is_at_rest(tmp_path, stiffness, method, step):
+def test_what_hardly_swings_is_at_rest(stiffness, method, step):
     """The weight turns the pin by 4.9/k rad: the result is right to 1e-12 rad."""
-    sol = ephs.simulate(pendulum(tmp_path, stiffness), 1.0, method=method, step=step)
+    sol = ephs.simulate(pendulum(stiffness), 1.0, method=method, step=step)
     assert not sol.audit.findings
     assert np.abs(sol.joint("pin").coordinate).max() <= 2.0 * 9.81 * 0.5 / stiffness * (1.0 + 1e-6)
 
@@ -117,8 +116,8 @@ def test_what_hardly_swings_is_at_rest(tmp_path, stiffness, method, step):
     ],
     ids=lambda given: "-".join(map(str, given.values())) if isinstance(given, dict) else f"{given:g}",
 )
-def test_runs_that_fail_at_an_oscillation_name_its_spring_and_frequency(tmp_path, by_hand, stiffness, options):
-    scene = pendulum(tmp_path, stiffness, rate=1.0)
+def test_runs_that_fail_at_an_oscillation_name_its_spring_and_frequency(by_hand, stiffness, options):
+    scene = pendulum(stiffness, rate=1.0)
     with pytest.raises(ephs.SimulationError) as failed:
         ephs.simulate(scene.system() if by_hand else scene, 1.0, **options)
     rate = np.sqrt(stiffness / INERTIA)
@@ -126,7 +125,7 @@ def test_runs_that_fail_at_an_oscillation_name_its_spring_and_frequency(tmp_path
     assert "make joints.pin.pe softer, or rigid" in failed.value.advice
 
 
-def test_runs_that_fail_without_a_fast_oscillation_name_none(tmp_path):
+def test_runs_that_fail_without_a_fast_oscillation_name_none():
     with pytest.raises(ephs.SimulationError) as failed:
-        ephs.simulate(pendulum(tmp_path, 1e3, rate=1.0), 1.0, method="rk54", max_steps=3)
+        ephs.simulate(pendulum(1e3, rate=1.0), 1.0, method="rk54", max_steps=3)
     assert "oscillation" not in str(failed.value)

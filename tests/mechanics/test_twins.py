@@ -12,6 +12,7 @@ from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.mechanics.elements import components
 from ephs.mechanics.scene.build import component_path
+from tests.written import scene_of_text
 
 NO_COMPONENTS = {"Inside", "body_pattern", "joint_pattern", "mbs_pattern", "stabilised"}
 GRAVITY = [0.3, -9.81, 0.2]
@@ -201,11 +202,9 @@ def by_hand(twin):
 
 
 @pytest.fixture
-def load(tmp_path):
+def load():
     def load(text):
-        file = tmp_path / "twin.toml"
-        file.write_text(SCENE + text, encoding="utf-8")
-        return ephs.load(file)
+        return scene_of_text(SCENE + text)
 
     return load
 

@@ -10,6 +10,7 @@ import ephs
 from ephs.mechanics.motion.views import Names
 from ephs.semantics.errors import AssemblyError
 from tests.mechanics.dynamics.drawn import moving
+from tests.written import scene_of_text
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 ROUNDING = 1e-11
@@ -64,10 +65,8 @@ temperature = 320.0
 
 
 @pytest.fixture
-def followers(tmp_path):
-    file = tmp_path / "followers.toml"
-    file.write_text(FOLLOWERS)
-    return ephs.load(file)
+def followers():
+    return scene_of_text(FOLLOWERS)
 
 
 def same(found, expected):

@@ -10,6 +10,7 @@ from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.solve.instant import instant
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 
 def of_descriptor(sol: ephs.Solution, name: str, i: int) -> np.ndarray:
@@ -47,7 +48,7 @@ def test_wrenches_are_those_of_the_descriptor_form(scene, driven, seed):
         assert np.nanmax(np.abs(found - expected), initial=0.0) < 1e-9 * scale
 
 
-def test_a_prescribed_motion_takes_the_force_that_it_needs(tmp_path):
+def test_a_prescribed_motion_takes_the_force_that_it_needs():
     """A wheel with an eccentric weight, turned evenly: the moment about its axis is what holds the weight up."""
     text = """
     format = 1
@@ -67,8 +68,7 @@ def test_a_prescribed_motion_takes_the_force_that_it_needs(tmp_path):
     axis = [0.0, 0.0, 1.0]
     motion = { rate = 2.0 }
     """
-    (tmp_path / "wheel.toml").write_text(text)
-    sol = ephs.simulate(ephs.load(tmp_path / "wheel.toml"), 1.0, step=0.01)
+    sol = ephs.simulate(scene_of_text(text), 1.0, step=0.01)
     wrench = sol.joint("pin").wrench
     assert np.allclose(wrench[:, 2], 20.0 * 0.3 * np.cos(2.0 * sol.t), atol=1e-10)
     assert np.allclose(wrench[0, 3:], [-2.0 * 0.3 * 4.0, 20.0, 0.0], atol=1e-10)
@@ -76,7 +76,7 @@ def test_a_prescribed_motion_takes_the_force_that_it_needs(tmp_path):
 
 @pytest.mark.parametrize("kind", ["revolute", "cylindrical", "spherical"])
 @pytest.mark.filterwarnings("ignore::ephs.SceneWarning")
-def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_descriptor_form(kind, tmp_path):
+def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_descriptor_form(kind):
     """A scene may keep an inertia that no body has: its equations have a solution all the same."""
     place = "" if kind == "spherical" else "axis = [0.0, 1.0, 0.2]"
     text = f"""
@@ -106,14 +106,13 @@ def test_wrenches_of_bodies_with_a_negative_principal_moment_are_those_of_the_de
     at = [0.8, 0.1, 0.0]
     axis = [1.0, 1.0, 0.2]
     """
-    (tmp_path / "odd.toml").write_text(text)
-    sol = ephs.simulate(ephs.load(tmp_path / "odd.toml"), 0.1, method="rk87", rtol=1e-9, atol=1e-9)
+    sol = ephs.simulate(scene_of_text(text), 0.1, method="rk87", rtol=1e-9, atol=1e-9)
     for name in ("pin", "elbow"):
         found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
         assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
 
 
-def test_a_weld_transmits_what_the_body_behind_it_needs(tmp_path):
+def test_a_weld_transmits_what_the_body_behind_it_needs():
     """Bodies that are fixed to each other are one link of the methods, and two where wrenches are read."""
     text = """
     format = 1
@@ -136,8 +135,7 @@ def test_a_weld_transmits_what_the_body_behind_it_needs(tmp_path):
     bodies = ["rod", "bob"]
     at = [0.8, 0.1, 0.0]
     """
-    (tmp_path / "welded.toml").write_text(text)
-    sol = ephs.simulate(ephs.load(tmp_path / "welded.toml"), 0.1, method="rk87")
+    sol = ephs.simulate(scene_of_text(text), 0.1, method="rk87")
     for name in ("pin", "weld"):
         found, expected = sol.joint(name).wrench[-1], of_descriptor(sol, name, len(sol) - 1)
         assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()

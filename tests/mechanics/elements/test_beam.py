@@ -15,6 +15,7 @@ from ephs.operad import Path
 from ephs.semantics.errors import StructureError
 from ephs.semantics.spaces import SE3
 from ephs.testing import check_primitive
+from tests.written import scene_of_text
 
 EPS = float(np.finfo(float).eps)
 STIFFNESS = np.array([500.0, 400.0, 600.0, 1e4, 8e3, 9e3])
@@ -36,14 +37,8 @@ section = {section}
 """
 
 
-def scene_of(text, tmp_path):
-    file = tmp_path / "rod.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file)
-
-
-def rod(tmp_path, more=""):
-    return scene_of(ROD.format(section=SECTION, more=more), tmp_path)
+def rod(more=""):
+    return scene_of_text(ROD.format(section=SECTION, more=more))
 
 
 def pose(rng, size):
@@ -220,11 +215,11 @@ def test_an_element_joins_two_bodies_by_hand():
 # ---- scenes ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_beam_through_points_of_a_circle_is_the_circle(tmp_path):
+def test_a_beam_through_points_of_a_circle_is_the_circle():
     radius, at = 3.0, np.linspace(0.0, 0.5 * np.pi, 3)
     points = [[radius * float(np.sin(a)), radius * float(1.0 - np.cos(a)), 0.0] for a in at]
     text = ROD.format(section=SECTION, more="").replace("from = [0.0, 0.0, 0.0]\nto = [6.0, 8.0, 0.0]", f"{points = }")
-    scene = scene_of(text, tmp_path)
+    scene = scene_of_text(text)
     for i, angle in enumerate(np.linspace(0.0, 0.5 * np.pi, 5)):
         expected = [radius * np.sin(angle), radius * (1.0 - np.cos(angle)), 0.0]
         assert np.abs(scene.body(f"rod.{i}").pose[4:] - expected).max() <= 64 * EPS * radius
@@ -237,20 +232,20 @@ def test_a_beam_through_points_of_a_circle_is_the_circle(tmp_path):
 
 @pytest.mark.parametrize("elements", [1, 2, 3, 4, 7])
 @pytest.mark.parametrize("order", [2, 4])
-def test_nodes_at_order_4_have_the_inertia_of_the_rod(order, elements, tmp_path):
+def test_nodes_at_order_4_have_the_inertia_of_the_rod(order, elements):
     """Mass, centre of mass and moment of inertia about it; at order 2 the last is wrong by the square of a length."""
     more = f"order = {order}"
     text = ROD.format(section=SECTION, more=more).replace("elements = 4", f"elements = {elements}")
-    nodes = [body for _, body in scene_of(text, tmp_path).all_bodies()]
+    nodes = [body for _, body in scene_of_text(text).all_bodies()]
     mass, x = np.array([b.mass for b in nodes]), np.array([np.linalg.norm(b.pose[4:]) for b in nodes])
     moments = [mass.sum() / 10.0, mass @ x / 50.0, (mass @ (x - 5.0) ** 2 * 12.0) / 1000.0]
     right = np.abs(np.array(moments) - 1.0) <= 16 * EPS
     assert mass.min() > 0.0 and right.tolist() == [True, True, order == 4 and elements > 1]
 
 
-def test_scenes_with_beams_come_back_from_text(tmp_path):
+def test_scenes_with_beams_come_back_from_text():
     more = 'ends = ["ground"]\norder = 4\ndamping = 0.1\nstrain = [0.0, 0.1, 0.0, 0.01, 0.0, 0.0]\n'
-    scene = rod(tmp_path, more + '[loads.tip]\nbody = "rod.4"\nforce = [0.0, 0.0, 6.0]\nramp = 2.0\n')
+    scene = rod(more + '[loads.tip]\nbody = "rod.4"\nforce = [0.0, 0.0, 6.0]\nramp = 2.0\n')
     text = scene_to_text(scene)
     again = scene_from_text(text)
     assert scene_to_text(again) == text
@@ -277,9 +272,9 @@ def test_scenes_with_beams_come_back_from_text(tmp_path):
         ("10.0] }", "10.0] }\n[bodies.rod]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]", "bodies.rod"),
     ],
 )
-def test_faults_name_the_key(old, new, key, tmp_path):
+def test_faults_name_the_key(old, new, key):
     with pytest.raises(ephs.SceneError) as caught:
-        scene_of(ROD.format(section=SECTION, more="").replace(old, new, 1), tmp_path)
+        scene_of_text(ROD.format(section=SECTION, more="").replace(old, new, 1))
     assert [fault.key for fault in caught.value.faults] == [key]
 
 
@@ -293,9 +288,9 @@ def test_faults_name_the_key(old, new, key, tmp_path):
         ("tube = [2.0, 1.0]", [7.5 * np.pi, 3.75 * np.pi, 3.75 * np.pi, 3.0 * np.pi]),
     ],
 )
-def test_sections_of_shapes_have_their_moments(shape, expected, tmp_path):
+def test_sections_of_shapes_have_their_moments(shape, expected):
     section = f"{{ {shape}, E = 1.0, nu = 0.0, rho = 1.0 }}"
-    found = scene_of(ROD.format(section=section, more=""), tmp_path).joint("rod-1").strain.stiffness
+    found = scene_of_text(ROD.format(section=section, more="")).joint("rod-1").strain.stiffness
     assert found[:4] * [2.0, 1.0, 1.0, 1.0] == pytest.approx(expected, rel=2e-3)
 
 
@@ -320,9 +315,9 @@ CONSTANT = ("natural", "natural4", "variational")
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
-def test_a_flying_rod_keeps_what_its_method_keeps(name, tmp_path):
+def test_a_flying_rod_keeps_what_its_method_keeps(name):
     steps = {"step": 2.0**-6} if name in CONSTANT else {"rtol": 1e-7, "atol": 1e-9}
-    sol = ephs.simulate(rod(tmp_path, STRUCK), 0.5, method=name, audit="off", **steps)
+    sol = ephs.simulate(rod(STRUCK), 0.5, method=name, audit="off", **steps)
     energy, kept = sol.energy, momenta(sol)
     drift = np.abs(kept - kept[0]).max() / np.abs(kept).max()
     lost = float(np.ptp(energy) / np.abs(energy).max())
@@ -331,29 +326,29 @@ def test_a_flying_rod_keeps_what_its_method_keeps(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["natural", "variational"])
-def test_a_flying_rod_keeps_its_energy_or_its_momenta_for_five_seconds(name, tmp_path):
+def test_a_flying_rod_keeps_its_energy_or_its_momenta_for_five_seconds(name):
     """After 5 s in which it bends, twists and tumbles: energy by `natural`, both momenta by `variational`."""
-    sol = ephs.simulate(rod(tmp_path, STRUCK), 5.0, method=name, step=2.0**-5, audit="off")
+    sol = ephs.simulate(rod(STRUCK), 5.0, method=name, step=2.0**-5, audit="off")
     kept = sol.energy[:, None] if name == "natural" else momenta(sol)
     assert np.abs(kept - kept[0]).max() <= 1e-11 * np.abs(kept).max()
     assert np.ptp(sol.beam("rod").energy.sum(axis=1)) > 1e-3 * sol.energy[0]
 
 
 @pytest.mark.parametrize("order", [2, 4])
-def test_damping_turns_into_heat_what_the_motion_loses(order, tmp_path):
+def test_damping_turns_into_heat_what_the_motion_loses(order):
     heat = 'damping = 0.02\nheat = "core"\n[thermal.core]\ncapacity = 10.0\ntemperature = 300.0\n'
-    sol = ephs.simulate(rod(tmp_path, STRUCK + f"order = {order}\n" + heat), 0.5, method="natural", step=2.0**-6)
+    sol = ephs.simulate(rod(STRUCK + f"order = {order}\n" + heat), 0.5, method="natural", step=2.0**-6)
     summary = sol.summary()
     assert summary["heat"] > 1.0
     assert summary["max_energy_error"] <= 1e-12 and summary["min_entropy_production"] >= 0.0
     assert summary["thermal"]["core"]["temperature"] == pytest.approx(300.0 + summary["heat"] / 10.0, rel=1e-12)
 
 
-def test_a_beam_tells_its_strain_and_its_support_what_it_holds(tmp_path):
+def test_a_beam_tells_its_strain_and_its_support_what_it_holds():
     """A cantilever at rest under a load on its end: in every section the load, and its moment about it."""
     load = 'ends = ["ground"]\n[loads.tip]\nbody = "rod.4"\nforce = [0.0, 0.0, 2.0]\n'
     text = ROD.format(section=SECTION, more=load).replace("[6.0, 8.0, 0.0]", "[10.0, 0.0, 0.0]")
-    rest = ephs.equilibrium(scene_of(text, tmp_path)).model
+    rest = ephs.equilibrium(scene_of_text(text)).model
     sol = ephs.simulate(rest, 2.0**-6, method="natural", step=2.0**-7)
     rod, wrench = sol.beam("rod"), sol.joint("rod-start").wrench[-1]
     tip = rod.position[-1, -1]

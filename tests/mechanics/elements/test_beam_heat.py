@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from ephs.show.stage import stage_of
+from tests.written import scene_of_text
 
 ELEMENTS, LENGTH, CAPACITY, CONDUCTION, COLD = 6, 0.6, 40.0, 5.0, 300.0
 ROD = """
@@ -24,10 +25,8 @@ ends = ["ground", "free"]
 WARM = "thermal = { capacity = 40.0, conduction = 5.0, temperature = 300.0 }"
 
 
-def rod(tmp_path, heat=WARM, gravity=0.0, more=""):
-    file = tmp_path / "rod.toml"
-    file.write_text(ROD.format(gravity=gravity, heat=heat) + more, encoding="utf-8")
-    return ephs.load(file)
+def rod(heat=WARM, gravity=0.0, more=""):
+    return scene_of_text(ROD.format(gravity=gravity, heat=heat) + more)
 
 
 def temperatures(sol):
@@ -35,20 +34,20 @@ def temperatures(sol):
 
 
 @pytest.mark.parametrize("method", ["radau", "natural4"])
-def test_a_rod_cools_by_the_modes_of_its_cells(method, tmp_path):
+def test_a_rod_cools_by_the_modes_of_its_cells(method):
     """ΔT of the first mode of n cells of length Δ falls as exp(−k/(c Δ²) (2 − 2 cos(π/n)) t), k and c per length."""
     first = 20.0 * np.cos(np.pi * (np.arange(ELEMENTS) + 0.5) / ELEMENTS)
     cell = LENGTH / ELEMENTS
     initial = {f"thermal.rod-{i + 1}.s": CAPACITY * cell * np.log1p(first[i] / COLD) for i in range(ELEMENTS)}
     options = {"rtol": 1e-10} if method == "radau" else {"step": 0.01}
-    sol = ephs.simulate(rod(tmp_path), 0.5, initial=initial, method=method, **options)
+    sol = ephs.simulate(rod(), 0.5, initial=initial, method=method, **options)
     rate = CONDUCTION / (CAPACITY * cell**2) * (2.0 - 2.0 * np.cos(np.pi / ELEMENTS))
     wanted = COLD + first[:, None] * np.exp(-rate * sol.t)
     np.testing.assert_allclose(temperatures(sol), wanted, atol=1e-6 * 20.0)
 
 
-def test_what_damps_a_rod_warms_it_where_it_bends(tmp_path):
-    sol = ephs.simulate(rod(tmp_path, gravity=-9.81), 0.4, method="radau", rtol=1e-6)
+def test_what_damps_a_rod_warms_it_where_it_bends():
+    sol = ephs.simulate(rod(gravity=-9.81), 0.4, method="radau", rtol=1e-6)
     warmed = temperatures(sol)[:, -1] - COLD
     assert CAPACITY * LENGTH / ELEMENTS * warmed.sum() == pytest.approx(sol.heat[-1], rel=1e-9)
     assert np.all(np.diff(warmed) < 0.0) and warmed[-1] > 0.0  # most at the wall
@@ -56,8 +55,8 @@ def test_what_damps_a_rod_warms_it_where_it_bends(tmp_path):
     assert sol.stats["least_production"] >= 0.0
 
 
-def test_strain_energy_is_a_colour(tmp_path):
-    sol = ephs.simulate(rod(tmp_path, gravity=-9.81), 0.1, method="radau", rtol=1e-4)
+def test_strain_energy_is_a_colour():
+    sol = ephs.simulate(rod(gravity=-9.81), 0.1, method="radau", rtol=1e-4)
     shown = stage_of(sol, wrenches=False, heat=False, strain=True, fps=20.0, duration=None).heat
     wanted = sol.beam("rod").energy[-1] / (LENGTH / ELEMENTS)
     found = shown.temperatures
@@ -81,7 +80,7 @@ def test_strain_energy_is_a_colour(tmp_path):
         ("thermal = { capacity = 0.0, temperature = 300.0 }", "", "beams.rod.thermal.capacity", "above 0"),
     ],
 )
-def test_faults_name_the_key(heat, more, key, words, tmp_path):
+def test_faults_name_the_key(heat, more, key, words):
     with pytest.raises(ephs.SceneError) as caught:
-        rod(tmp_path, heat, more=more)
+        rod(heat, more=more)
     assert key in str(caught.value) and words in str(caught.value)

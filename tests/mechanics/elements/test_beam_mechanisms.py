@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
+from tests.written import scene_of_text
 
 SPINNING = """format = 1
 name = "arm"
@@ -72,24 +73,18 @@ axis = [1.0, 0.0, 0.0]
 RADIUS, LENGTH, SPEED, TURN = 0.15, 0.3, 50.0, 2.0 * np.pi / 50.0
 
 
-def scene_of(text, tmp_path):
-    file = tmp_path / "scene.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file)
-
-
-def test_a_spinning_arm_stretches_by_its_closed_form(tmp_path):
+def test_a_spinning_arm_stretches_by_its_closed_form():
     """Simo and Vu-Quoc's arm at 6 rad/s: ρA ω² L³/(3 EA) = 5.143e-4 m longer, after its damped waves are gone."""
-    sol = ephs.simulate(scene_of(SPINNING, tmp_path), 2.0, method="natural", step=0.02, audit="off")
+    sol = ephs.simulate(scene_of_text(SPINNING), 2.0, method="natural", step=0.02, audit="off")
     tip = np.linalg.norm(sol.body("arm.8").position[-1])
     exact = 1.2 * 6.0**2 * 10.0**3 / (3.0 * 2.8e7)
     assert tip - 10.0 == pytest.approx(exact, rel=1e-2)
 
 
-def crank(tmp_path, young, elements=4, until=0.5 * TURN, steps=200):
+def crank(young, elements=4, until=0.5 * TURN, steps=200):
     reach = float(np.sqrt(LENGTH**2 - RADIUS**2))
     text = CRANK.format(reach=reach, young=young, elements=elements)
-    return ephs.simulate(scene_of(text, tmp_path), until, method="natural", step=until / steps, audit="off")
+    return ephs.simulate(scene_of_text(text), until, method="natural", step=until / steps, audit="off")
 
 
 def sag(sol, elements):
@@ -98,19 +93,19 @@ def sag(sol, elements):
     return np.linalg.norm(ends[1] - 0.5 * (ends[0] + ends[2]), axis=1)
 
 
-def test_an_elastic_slider_crank_comes_to_a_refined_run_by_order_4(tmp_path):
-    runs = [crank(tmp_path, 2e10, elements, 0.25 * TURN) for elements in (4, 8, 16)]
+def test_an_elastic_slider_crank_comes_to_a_refined_run_by_order_4():
+    runs = [crank(2e10, elements, 0.25 * TURN) for elements in (4, 8, 16)]
     found = [sag(sol, elements) for sol, elements in zip(runs, (4, 8, 16), strict=True)]
     off = [float(np.abs(each - found[2]).max() / found[2].max()) for each in found[:2]]
     assert found[2].max() > 3e-3
     assert off[1] <= 0.01 and off[0] >= 10.0 * off[1]
 
 
-def test_stiff_rods_come_to_the_rigid_mechanism(tmp_path):
+def test_stiff_rods_come_to_the_rigid_mechanism():
     """The slider leaves r cos φ + √(l² − r² sin² φ) by less and less, in proportion to 1/E."""
     off = []
     for young in (2e10, 2e11, 2e12):
-        sol = crank(tmp_path, young)
+        sol = crank(young)
         angle = 0.5 * np.pi - SPEED * sol.t
         rigid = RADIUS * np.cos(angle) + np.sqrt(LENGTH**2 - (RADIUS * np.sin(angle)) ** 2)
         off.append(float(np.abs(sol.body("slider").position[:, 0] - rigid).max()))
@@ -165,7 +160,7 @@ axis = [0.0, 0.0, 1.0]
 """
 
 
-def four_bar(tmp_path, elements):
+def four_bar(elements):
     """A crank of 0.1 m upright at 20 rad/s, a coupler, a rocker of 0.3 m about (0.4, 0): a fifth of a turn."""
     one, pivot, two = np.array([0.0, 0.1, 0.0]), np.array([0.4, 0.0, 0.0]), np.array([0.4, 0.3, 0.0])
     z, rate = np.array([0.0, 0.0, 1.0]), 20.0
@@ -179,13 +174,13 @@ def four_bar(tmp_path, elements):
         turning=float(turning), rocking=float(rocking), velocity=np.cross(rocking * z, middle - pivot).tolist(),
     )  # fmt: skip
     until = 0.2 * 2.0 * np.pi / rate
-    return ephs.simulate(scene_of(text, tmp_path), until, method="natural", step=until / 100, audit="off")
+    return ephs.simulate(scene_of_text(text), until, method="natural", step=until / 100, audit="off")
 
 
-def test_an_elastic_four_bar_comes_to_a_refined_run_by_order_4(tmp_path):
+def test_an_elastic_four_bar_comes_to_a_refined_run_by_order_4():
     found, energy = [], []
     for elements in (4, 8, 16):
-        sol = four_bar(tmp_path, elements)
+        sol = four_bar(elements)
         ends = [sol.body(f"coupler.{i}").position for i in (0, elements // 2, elements)]
         found.append(ends[1] - 0.5 * (ends[0] + ends[2]))
         energy.append(sol.summary()["max_energy_error"])

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ephs
+from tests.written import scene_of_text
 
 ELEMENTS, LENGTH, MASS, EA, CAPACITY, CONDUCTION, EXPANSION = 4, 1.0, 0.1, 1000.0, 20.0, 0.5, 1e-3
 WARM, REFERENCE = 320.0, 300.0
@@ -29,14 +30,12 @@ thermal = {{ capacity = 20.0, conduction = 0.5, temperature = {warm}, expansion 
 """
 
 
-def rod(tmp_path, **changed):
+def rod(**changed):
     given = {
         "gravity": 0.0, "order": 2, "GJ": 5.0, "EI": 6.0, "ends": '["ground"]', "damping": 0.0, "rod": "reissner",
         "warm": WARM,
     }  # fmt: skip
-    file = tmp_path / "rod.toml"
-    file.write_text(ROD.format(**(given | changed)), encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text(ROD.format(**(given | changed)))
 
 
 def axial(t, y):
@@ -56,9 +55,9 @@ def by_hand():
     return solve_ivp(axial, (0.0, 0.1), start, method="DOP853", rtol=1e-12, atol=1e-13, t_eval=[0.05, 0.1])
 
 
-def swung(tmp_path, method, **options):
+def swung(method, **options):
     """(8, 2) displacements in m and temperatures in K of a warm rod at two instants."""
-    sol = ephs.simulate(rod(tmp_path), 0.1, method=method, save_at=[0.0, 0.05, 0.1], **options)
+    sol = ephs.simulate(rod(), 0.1, method=method, save_at=[0.0, 0.05, 0.1], **options)
     at = [sol.body(f"rod.{i + 1}").position[1:, 0] - CELL * (i + 1) for i in range(ELEMENTS)]
     return np.array([*at, *(sol.thermal(f"rod-{i + 1}").temperature[1:] for i in range(ELEMENTS))])
 
@@ -71,25 +70,25 @@ def gap(found, wanted):
 
 
 @pytest.mark.parametrize(("method", "near"), [("rk54", 1e-8), ("rk87", 1e-8), ("radau", 1e-7)])
-def test_a_warm_rod_swings_as_the_equations_by_hand(method, near, by_hand, tmp_path):
-    assert gap(swung(tmp_path, method, rtol=1e-10), by_hand.y) < near
+def test_a_warm_rod_swings_as_the_equations_by_hand(method, near, by_hand):
+    assert gap(swung(method, rtol=1e-10), by_hand.y) < near
 
 
 @pytest.mark.parametrize(
     ("method", "step", "order"),
     [("natural", 2e-4, 2), ("variational", 5e-4, 2), ("natural4", 1e-3, 4)],
 )
-def test_constant_steps_have_their_order(method, step, order, by_hand, tmp_path):
-    coarse, fine = (gap(swung(tmp_path, method, step=h), by_hand.y) for h in (step, 0.5 * step))
+def test_constant_steps_have_their_order(method, step, order, by_hand):
+    coarse, fine = (gap(swung(method, step=h), by_hand.y) for h in (step, 0.5 * step))
     assert fine < coarse < 0.5 and coarse / fine > 0.7 * 2.0**order
 
 
-def test_modes_are_those_of_the_linear_equations(tmp_path):
+def test_modes_are_those_of_the_linear_equations():
     """Of waves that cool what they stretch, and of heat that conducts."""
     about = np.concatenate([np.zeros(2 * ELEMENTS), np.full(ELEMENTS, REFERENCE)])
     columns = [(axial(0.0, about + 1e-4 * unit) - axial(0.0, about - 1e-4 * unit)) / 2e-4 for unit in np.eye(12)]
     wanted = np.linalg.eigvals(np.array(columns).T)
-    found = np.linalg.eigvals(ephs.linearize(rod(tmp_path, warm=REFERENCE)).A)
+    found = np.linalg.eigvals(ephs.linearize(rod(warm=REFERENCE)).A)
     for value in wanted:
         assert np.abs(found - value).min() < 1e-6 * np.abs(wanted).max()
     swift = EA / CELL + PULL**2 * REFERENCE / (CAPACITY * CELL)  # no time to conduct
@@ -111,11 +110,9 @@ ends = ["ground", "ground"]
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau"])
-def test_what_is_equally_warm_all_along_loses_no_entropy(method, tmp_path):
+def test_what_is_equally_warm_all_along_loses_no_entropy(method):
     """Differences of its temperatures are near rounding, and so is the heat that they conduct."""
-    file = tmp_path / "steel.toml"
-    file.write_text(STEEL, encoding="utf-8")
-    sol = ephs.simulate(ephs.load(file), 5e-4, method=method)
+    sol = ephs.simulate(scene_of_text(STEEL), 5e-4, method=method)
     assert sol.stats["least_production"] >= -1e-30
 
 
@@ -125,31 +122,31 @@ def test_a_warm_rod_between_walls_is_at_rest(method, damping, tmp_path):
     file = tmp_path / "steel.toml"
     file.write_text(STEEL + damping + "[world]\ngravity = [0.0, 0.0, 0.0]\n", encoding="utf-8")
     assert ephs.simulate(ephs.load(file), 1e-2, method=method, step=1e-3).audit.passed
-    swinging = ephs.simulate(rod(tmp_path), 0.1, method=method, step=2e-2, audit="off")
+    swinging = ephs.simulate(rod(), 0.1, method=method, step=2e-2, audit="off")
     assert "accuracy" in [finding.law for finding in swinging.audit.findings], "the control: one end is free"
 
 
 @pytest.mark.parametrize("order", [2, 4])
-def test_a_rod_held_at_both_ends_presses_when_it_is_warm(order, tmp_path):
-    scene = rod(tmp_path, ends='["ground", "ground"]', order=order)
+def test_a_rod_held_at_both_ends_presses_when_it_is_warm(order):
+    scene = rod(ends='["ground", "ground"]', order=order)
     beam = ephs.simulate(scene, 0.01).beam("rod")
     np.testing.assert_allclose(beam.force[-1, :, 0], -PULL * (WARM - REFERENCE), rtol=1e-12)
     np.testing.assert_allclose(beam.energy, 0.0, atol=1e-20)
 
 
-def test_a_free_rod_comes_to_rest_longer(tmp_path):
-    rest = ephs.equilibrium(rod(tmp_path))
+def test_a_free_rod_comes_to_rest_longer():
+    rest = ephs.equilibrium(rod())
     tip = dict(rest.model.all_bodies())["rod.4"].pose
     assert tip[4] == pytest.approx(LENGTH * (1.0 + EXPANSION * (WARM - REFERENCE)), rel=1e-12)
 
 
-def test_it_buckles_by_heat_at_four_pi_squared(tmp_path):
+def test_it_buckles_by_heat_at_four_pi_squared():
     """Clamped at both ends, at EA α Δθ = 4 π² EI/L², which the elements of order 4 have to a few per cent."""
     bend = 0.3
     critical = 4.0 * np.pi**2 * bend / LENGTH**2 / PULL
 
     def fastest(part):
-        scene = rod(tmp_path, ends='["ground", "ground"]', order=4, EI=bend, warm=REFERENCE + part * critical)
+        scene = rod(ends='["ground", "ground"]', order=4, EI=bend, warm=REFERENCE + part * critical)
         return np.linalg.eigvals(ephs.linearize(scene).A).real.max()
 
     assert fastest(0.9) < 1e-3 < fastest(1.1)
@@ -158,8 +155,8 @@ def test_it_buckles_by_heat_at_four_pi_squared(tmp_path):
 @pytest.mark.parametrize(
     ("method", "options"), [("rk87", {"rtol": 1e-8}), ("natural4", {"step": 2e-3}), ("radau", {"rtol": 1e-6})]
 )
-def test_both_laws_hold_where_it_bends_far(method, options, tmp_path):
-    scene = rod(tmp_path, gravity=-9.81, damping=2e-3, EI=0.02, GJ=0.02)
+def test_both_laws_hold_where_it_bends_far(method, options):
+    scene = rod(gravity=-9.81, damping=2e-3, EI=0.02, GJ=0.02)
     sol = ephs.simulate(scene, 0.3, method=method, **options)
     tip = sol.body("rod.4").position[-1]
     assert tip[2] < -0.2
@@ -167,9 +164,9 @@ def test_both_laws_hold_where_it_bends_far(method, options, tmp_path):
     assert sol.stats["least_production"] >= -1e-18
 
 
-def test_explicit_and_implicit_steps_meet(tmp_path):
+def test_explicit_and_implicit_steps_meet():
     """Where it bends far: the lengthening of an element depends on all of its pose."""
-    scene = rod(tmp_path, gravity=-9.81, EI=0.02)
+    scene = rod(gravity=-9.81, EI=0.02)
     ends = [
         ephs.simulate(scene, 0.15, method=method, rtol=1e-9).body("rod.4").position[-1] for method in ("rk87", "radau")
     ]
@@ -177,7 +174,7 @@ def test_explicit_and_implicit_steps_meet(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["kirchhoff", "string"])
-def test_rods_that_do_not_stretch_do_not_expand(kind, tmp_path):
+def test_rods_that_do_not_stretch_do_not_expand(kind):
     with pytest.raises(ephs.SceneError) as caught:
-        rod(tmp_path, rod=kind)
+        rod(rod=kind)
     assert "beams.rod.thermal.expansion" in str(caught.value) and "inextensible" in str(caught.value)

@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from tests.written import scene_of_text
 
 LOOP = """format = 1
 [world]
@@ -26,30 +27,28 @@ STIFFNESS, RADIUS = 1e3, 0.005
 SOFT = "surface = { stiffness = 2e3, loss = 0.1, friction = 0.3 }"
 
 
-def loop(tmp_path, surface, elements=8, more=""):
-    file = tmp_path / "loop.toml"
-    file.write_text(LOOP.format(surface=surface, elements=elements) + more, encoding="utf-8")
-    return ephs.load(file)
+def loop(surface, elements=8, more=""):
+    return scene_of_text(LOOP.format(surface=surface, elements=elements) + more)
 
 
-def test_a_loop_that_is_pressed_together_touches_itself(tmp_path):
+def test_a_loop_that_is_pressed_together_touches_itself():
     """Two forces close a loop. Its ends overlap by δ at most, ½ k δ² being the work of the forces till then; both
     surfaces have the stiffness 2 k, in series k."""
     pace = {"method": "rk54", "rtol": 1e-4, "atol": 1e-6, "audit": "off"}
-    sol = ephs.simulate(loop(tmp_path, SOFT), 0.1, **pace)
+    sol = ephs.simulate(loop(SOFT), 0.1, **pace)
     ends = [sol.body(name).position for name in ("rod.0", "rod.8")]
     apart = np.linalg.norm(ends[1] - ends[0], axis=1)
     work = 0.1 * (ends[0][:, 1] - ends[1][:, 1] + 0.1)
     assert 2.0 * RADIUS - np.sqrt(2.0 * work.max() / STIFFNESS) <= apart.min() < 2.0 * RADIUS
     assert sol.energy_error.max() <= 1e-11 and sol.stats["least_production"] >= 0.0
-    through = ephs.simulate(loop(tmp_path, ""), 0.1, **pace)
+    through = ephs.simulate(loop(""), 0.1, **pace)
     ends = [through.body(name).position[:, 1] for name in ("rod.0", "rod.8")]
     assert (ends[1] - ends[0]).min() < 0.0  # nothing stops them without a surface
 
 
-def test_pieces_near_one_another_along_the_rod_do_not_touch(tmp_path):
+def test_pieces_near_one_another_along_the_rod_do_not_touch():
     """A rod of radius r that is bent to a circle of radius r meets itself π r further on, and not before."""
-    scene = loop(tmp_path, SOFT, 16)
+    scene = loop(SOFT, 16)
     length = {name: s.shape["capsule"][1] for name, s in scene.all_surfaces()}
     pairs = {tuple(int(s.removeprefix("rod.")) for s in c.surfaces) for _, c in scene.all_contacts()}
     for i in range(17):
@@ -59,9 +58,9 @@ def test_pieces_near_one_another_along_the_rod_do_not_touch(tmp_path):
     assert sum(length.values()) == pytest.approx(sum(j.strain.length for _, j in scene.all_joints()), rel=1e-12)
 
 
-def test_rods_meet_other_surfaces(tmp_path):
+def test_rods_meet_other_surfaces():
     floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\nposition = [0.0, 0.0, -0.1]\nstiffness = 1e4\n'
-    scene = loop(tmp_path, SOFT, more=floor)
+    scene = loop(SOFT, more=floor)
     assert sum("floor" in contact.surfaces for _, contact in scene.all_contacts()) == 9
     assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
 
@@ -74,14 +73,12 @@ def test_rods_meet_other_surfaces(tmp_path):
         ("surface = { friction = 0.3 }", "surfaces.rod.0 and surfaces.rod.2"),
     ],
 )
-def test_faults_name_the_key(surface, key, tmp_path):
+def test_faults_name_the_key(surface, key):
     with pytest.raises(ephs.SceneError, match=key):
-        loop(tmp_path, surface)
+        loop(surface)
 
 
-def test_a_section_that_is_not_round_needs_a_radius(tmp_path):
+def test_a_section_that_is_not_round_needs_a_radius():
     text = LOOP.format(surface=SOFT, elements=8).replace("circle = 0.005", "rectangle = [0.01, 0.01]")
-    file = tmp_path / "loop.toml"
-    file.write_text(text, encoding="utf-8")
     with pytest.raises(ephs.SceneError, match=r"beams\.rod\.surface\.radius"):
-        ephs.load(file)
+        scene_of_text(text)

@@ -28,6 +28,7 @@ from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import check_primitive
+from tests.written import scene_of_text
 
 SCENES = [name for name, method in METHODS.items() if method.scenes]
 GAPS = (
@@ -128,9 +129,9 @@ def test_below_its_support_a_gap_above_a_plane_may_be_closed(gap, turn):
     [(BALL, 0.25, ["ball_floor"]), (BALL + BLOCK, 0.1, ["floor_lower", "lower_upper"])],
     ids=["plane", "boxes"],
 )
-def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching, tmp_path, monkeypatch):
+def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching, monkeypatch):
     options = {"height": 0.15, "along": 1.0, "gravity": -9.81, "loss": 0.3, "friction": 0.4}
-    found = run(scene_of(tmp_path, text, **options), until)
+    found = run(scene_of(text, **options), until)
     called = []
 
     def everywhere(*_):
@@ -138,7 +139,7 @@ def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching,
         return 0, [0.0] * 9
 
     monkeypatch.setattr(mechanism, "_support", everywhere)
-    oracle = run(scene_of(tmp_path, text, **options), until)
+    oracle = run(scene_of(text, **options), until)
     for name in touching:
         assert called and found.contact(name).gap.min() < 0.0 < found.contact(name).gap.max()
     for name, _ in found.scene.all_bodies():
@@ -146,10 +147,8 @@ def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching,
     assert np.array_equal(found.heat, oracle.heat)
 
 
-def scene_of(tmp_path, text, **numbers):
-    file = tmp_path / "touching.toml"
-    file.write_text((HEAD + text).format(**(USUAL | numbers)), encoding="utf-8")
-    return ephs.load(file)
+def scene_of(text, **numbers):
+    return scene_of_text((HEAD + text).format(**(USUAL | numbers)))
 
 
 def run(scene, until, method="rk87", step=None, **options):
@@ -170,8 +169,8 @@ def rebound(speed, loss):
 
 
 @pytest.mark.parametrize(("name", "exponent"), [*((name, 1.5) for name in SCENES), ("rk87", 1.0), ("natural", 1.0)])
-def test_an_impact_loses_what_hunt_and_crossley_say(name, exponent, tmp_path):
-    scene = scene_of(tmp_path, BALL, speed=-1.0, loss=0.4, exponent=exponent)
+def test_an_impact_loses_what_hunt_and_crossley_say(name, exponent):
+    scene = scene_of(BALL, speed=-1.0, loss=0.4, exponent=exponent)
     fixed = METHODS[name].fixed
     sol = run(scene, 0.125, name, step=2.0**-13 if fixed else None)
     speed = float(sol.body("ball").velocity[-1, 2])
@@ -201,17 +200,17 @@ limit_loss = 0.4
     ("name", "rate", "lower"),
     [*((name, -1.0, -0.05) for name in SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)],
 )
-def test_a_stop_is_an_impact(name, rate, lower, tmp_path):
-    scene = scene_of(tmp_path, STOPPED, rate=rate, lower=lower, upper=0.05)
+def test_a_stop_is_an_impact(name, rate, lower):
+    scene = scene_of(STOPPED, rate=rate, lower=lower, upper=0.05)
     fixed = METHODS[name].fixed
     sol = run(scene, 0.0859375, name, step=2.0**-13 if fixed else None)
     assert sol.joint("rail").rate[-1, 0] == pytest.approx(-rate * rebound(1.0, 0.4), abs=2e-3 if fixed else 1e-5)
 
 
-def test_without_loss_a_ball_comes_back(tmp_path):
+def test_without_loss_a_ball_comes_back():
     """An arc of an oscillator between two parabolas, and every joule is there."""
     m, g, k, fall = 2.0, 9.81, 1e5, 0.05
-    scene = scene_of(tmp_path, BALL, gravity=-g, stiffness=k)
+    scene = scene_of(BALL, gravity=-g, stiffness=k)
     down, rate, speed = np.sqrt(2.0 * fall / g), np.sqrt(k / m), np.sqrt(2.0 * g * fall)
     touching = (np.pi + 2.0 * np.arctan(g / rate / speed)) / rate
     for name, error in (("rk87", 1e-7), ("radau", 1e-6)):
@@ -222,11 +221,11 @@ def test_without_loss_a_ball_comes_back(tmp_path):
     assert np.abs(sol.energy_error).max() <= 1e-12
 
 
-def test_a_sphere_slides_until_it_rolls(tmp_path):
+def test_a_sphere_slides_until_it_rolls():
     """v = 5/7 v₀ from 2 v₀/(7 μ g) on, and 2/7 of the energy are heat; what slips on is of the size of `slip`."""
     m, g, mu, v0, k, slip = 2.0, 9.81, 0.3, 1.0, 1e5, 1e-4
     rest = 0.1 - m * g / k
-    scene = scene_of(tmp_path, BALL, gravity=-g, height=rest, along=v0, stiffness=k, friction=mu, slip=slip)
+    scene = scene_of(BALL, gravity=-g, height=rest, along=v0, stiffness=k, friction=mu, slip=slip)
     until = 2.0 * v0 / (7.0 * mu * g)
     sol = run(scene, 1.5 * until, save_at=[0.5 * until, 1.5 * until])
     assert sol.body("ball").velocity[0, 0] == pytest.approx(v0 - 0.5 * mu * g * until, abs=10.0 * slip)
@@ -259,9 +258,9 @@ def test_the_energy_has_an_exact_slope(gap):
     assert touched >= 5
 
 
-def test_forces_are_those_that_move_the_ball(tmp_path):
+def test_forces_are_those_that_move_the_ball():
     times = np.linspace(0.09, 0.12, 601)
-    sol = run(scene_of(tmp_path, BALL, gravity=-9.81, loss=0.3), 0.12, save_at=times)
+    sol = run(scene_of(BALL, gravity=-9.81, loss=0.3), 0.12, save_at=times)
     contact, pushed = sol.contact("ball_floor"), np.gradient(sol.body("ball").velocity[:, 2], times)
     assert contact.gap.min() < 0.0 < contact.gap.max()
     assert contact.force[1:-1, 2] == pytest.approx(2.0 * (pushed + 9.81)[1:-1], abs=0.02 * contact.force.max())
@@ -269,9 +268,9 @@ def test_forces_are_those_that_move_the_ball(tmp_path):
     assert heat[-1] == pytest.approx(sol.heat[-1] - sol.heat[0], rel=1e-3)
 
 
-def test_contacts_survive_files(tmp_path):
+def test_contacts_survive_files():
     for text, numbers in ((BALL, {"loss": 0.25}), (STOPPED, {"rate": 1.0, "lower": "nan", "upper": 0.5})):
-        scene = scene_of(tmp_path, text, **numbers)
+        scene = scene_of(text, **numbers)
         again = scene_from_text(scene_to_text(scene))
         assert scene_to_text(again) == scene_to_text(scene)
         assert [c.law for _, c in again.all_contacts()] == [c.law for _, c in scene.all_contacts()]
@@ -303,7 +302,7 @@ SHAPES = ("sphere = 0.1", "capsule = [0.05, 0.2]", "cylinder = [0.1, 0.1]", "box
 @pytest.mark.parametrize("method", ["rk54", "radau", "auto"])
 @given(seed=st.integers(0, 2**20), shape=st.sampled_from(SHAPES), rtol=st.sampled_from([1e-2, 1e-3]))
 @settings(max_examples=8)
-def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol, tmp_path_factory):
+def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol):
     rng = np.random.default_rng(seed)
     rotation = rng.normal(size=4)
     rotation /= np.linalg.norm(rotation)
@@ -313,7 +312,7 @@ def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol, tmp_path_fact
         "exponent": float(rng.choice([1.0, 1.5])), "loss": float(rng.uniform(0.0, 2.0)),
         "friction": float(rng.uniform(0.0, 1.0)), "rolling": float(rng.choice([0.0, 1e-2])), "gravity": -9.81,
     }  # fmt: skip
-    scene = scene_of(tmp_path_factory.mktemp("thrown"), THROWN, **numbers)
+    scene = scene_of(THROWN, **numbers)
     sol = ephs.simulate(scene, 0.5, method=method, rtol=rtol, audit="off")
     assert np.abs(sol.energy_error).max() <= 1e-11
     assert sol.stats["least_production"] >= 0.0
@@ -321,12 +320,10 @@ def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol, tmp_path_fact
 
 
 @pytest.mark.parametrize("limits", ["[0.5, 0.1]", "[0.1]", '["a", 1.0]', "[inf, 1.0]"])
-def test_limits_ascend(limits, tmp_path):
-    file = tmp_path / "wrong.toml"
+def test_limits_ascend(limits):
     text = (HEAD + STOPPED).format(**USUAL, rate=1.0, lower=0.0, upper=1.0).replace("[0.0, 1.0]", limits)
-    file.write_text(text, encoding="utf-8")
     with pytest.raises(ephs.SceneError, match="lower < upper"):
-        ephs.load(file)
+        scene_of_text(text)
 
 
 PLATE = """
@@ -347,17 +344,13 @@ shape = { box = [2.0, 2.0, 0.001] }
 
 @pytest.mark.parametrize("name", [name for name in SCENES if METHODS[name].adaptive])
 @pytest.mark.filterwarnings("ignore::ephs.CostWarning")
-def test_no_step_leaps_over_a_thin_plate(name, tmp_path, monkeypatch):
-    file = tmp_path / "plate.toml"
-    file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
-    scene = ephs.load(file)
+def test_no_step_leaps_over_a_thin_plate(name, monkeypatch):
+    scene = scene_of_text(HEAD.format(gravity=0.0) + PLATE)
     assert ephs.simulate(scene, 0.2, method=name, rtol=1e-3, audit="off").body("bullet").velocity[-1, 2] > 30.0
     monkeypatch.setattr(pace, "_contact_step", lambda _: np.inf)
     assert ephs.simulate(scene, 0.2, method=name, rtol=1e-3, audit="off").body("bullet").velocity[-1, 2] == -40.0
 
 
-def test_the_limit_is_half_the_way_through(tmp_path):
-    file = tmp_path / "plate.toml"
-    file.write_text(HEAD.format(gravity=0.0) + PLATE, encoding="utf-8")
-    longest = pace.longest_step(problem_of_scene(ephs.load(file)), 5, 1e-3, (0.0, 1.0))
+def test_the_limit_is_half_the_way_through():
+    longest = pace.longest_step(problem_of_scene(scene_of_text(HEAD.format(gravity=0.0) + PLATE)), 5, 1e-3, (0.0, 1.0))
     assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from tests.mechanics.elements.test_contact import HEAD, run, scene_of
+from tests.written import scene_of_text
 
 CRADLE = """
 [bodies.{name}]
@@ -36,13 +37,11 @@ def chain(exponent):
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
-def test_a_cradle_is_a_chain_of_springs(exponent, tmp_path):
+def test_a_cradle_is_a_chain_of_springs(exponent):
     """Of springs by Hertz the last ball takes nearly all; of hard balls with one coefficient it would take 2/3."""
     balls = zip("abc", (0.0, 0.2, 0.4), (1.0, 0.0, 0.0), strict=True)
     text = "".join(CRADLE.format(name=name, x=x, speed=v, exponent=exponent) for name, x, v in balls)
-    file = tmp_path / "cradle.toml"
-    file.write_text(HEAD.format(gravity=0.0) + text, encoding="utf-8")
-    sol = run(ephs.load(file), 0.05)
+    sol = run(scene_of_text(HEAD.format(gravity=0.0) + text), 0.05)
     found = [sol.body(name).velocity[-1, 0] for name in "abc"]
     assert found == pytest.approx(chain(exponent), abs=1e-5)
     assert found[2] > (0.9 if exponent == 1.0 else 0.98)
@@ -70,12 +69,12 @@ rotation = [{c}, 0.0, {s}, 0.0]
 
 
 @pytest.mark.parametrize(("mu", "sliding"), [(0.2, True), (0.6, False)])
-def test_a_block_on_a_slope_slides_or_sticks(mu, sliding, tmp_path):
+def test_a_block_on_a_slope_slides_or_sticks(mu, sliding):
     m, g, theta = 2.0, 9.81, 0.3
     sunk = 0.01 - m * g * np.cos(theta) / 4e5  # four corners carry it
     up = np.array([np.sin(theta), 0.0, np.cos(theta)])
     x, _, z = sunk * up
-    scene = scene_of(tmp_path, BLOCK, gravity=-g, mu=mu, x=x, z=z, c=np.cos(theta / 2.0), s=np.sin(theta / 2.0))
+    scene = scene_of(BLOCK, gravity=-g, mu=mu, x=x, z=z, c=np.cos(theta / 2.0), s=np.sin(theta / 2.0))
     sol = run(scene, 0.4, rtol=1e-7, save_at=[0.2, 0.4])
     down = np.array([np.cos(theta), 0.0, -np.sin(theta)])
     speed = sol.body("block").velocity @ down
@@ -105,14 +104,14 @@ shape = {{ plane = {{}} }}
 """
 
 
-def test_a_rocking_block_loses_what_housner_says(tmp_path):
+def test_a_rocking_block_loses_what_housner_says():
     """About one edge, then about the other: of its energy (1 − 3/2 sin² α)² is left, p² = 3 g/(4 R)."""
     m, g, b, h = 2.0, 9.81, 0.1, 0.3
     r, alpha = np.hypot(b, h), np.arctan(b / h)
     rate, tilt = np.sqrt(0.75 * g / r), 0.5 * alpha
     c, s = np.cos(tilt), np.sin(tilt)
     place = {"x": h * s - b * c, "z": b * s + h * c - m * g / 2e7, "c": np.cos(tilt / 2.0), "s": np.sin(tilt / 2.0)}
-    scene = scene_of(tmp_path, ROCKING, gravity=-g, inertia=m / 3.0 * r**2, **place)
+    scene = scene_of(ROCKING, gravity=-g, inertia=m / 3.0 * r**2, **place)
     quarter = np.arccosh(1.0 / (1.0 - tilt / alpha)) / rate
     sol = run(scene, 1.2 * quarter, "radau", rtol=1e-6, atol=1e-8, save_at=[0.5 * quarter, 1.2 * quarter])
     rotation = sol.body("block").quaternion[:, [0, 2]]
@@ -179,12 +178,12 @@ def vectors(size):
 )
 @example(thrown=WHEEL, method="rk54", rtol=1e-2)
 @example(thrown=WHEEL, method="rk54", rtol=1e-1)
-def test_coarse_steps_make_no_energy(thrown, method, rtol, tmp_path_factory):
+def test_coarse_steps_make_no_energy(thrown, method, rtol):
     """A step over a whole bounce may miss more energy than the motion holds: it is refused, and tried shorter.
 
     What is left is the energy of a motion by one tolerance, 2 rtol of it, in the mean of six directions.
     """
-    file = tmp_path_factory.mktemp("thrown") / "thrown.toml"
-    file.write_text(HEAD.format(gravity=-9.81) + THROWN.format(**thrown), encoding="utf-8")
-    sol = ephs.simulate(ephs.load(file), 1.0, method=method, rtol=rtol, audit="off")
+    sol = ephs.simulate(
+        scene_of_text(HEAD.format(gravity=-9.81) + THROWN.format(**thrown)), 1.0, method=method, rtol=rtol, audit="off"
+    )
     assert np.abs(sol.energy_error).max() <= 2.0 * np.sqrt(6.0) * rtol

@@ -11,6 +11,7 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.semantics.spaces import SE3
+from tests.written import scene_of_text
 
 HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
 KIRCHHOFF = "{ GJ = 0.8, EI = [1.0, 2.0], rhoA = 1.0, rhoI = [2e-4, 1e-4, 1e-4] }"
@@ -21,12 +22,6 @@ def rod(points, elements, kind="kirchhoff", section=KIRCHHOFF, more='ends = ["gr
     points = [[float(x) for x in point] for point in points]
     place = f"points = {points}\nelements = {elements}\nup = [0.0, 1.0, 0.0]\n"
     return HEAD.format(gravity=gravity) + f'[beams.rod]\n{place}rod = "{kind}"\nsection = {section}\n{more}\n'
-
-
-def scene_of(text, tmp_path):
-    file = tmp_path / "rods.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file)
 
 
 def along(length):
@@ -49,17 +44,17 @@ def assert_of_order_2(found, exact):
 
 @pytest.mark.parametrize("elements", [3, 8])
 @pytest.mark.parametrize("axis", [1, 2])
-def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, axis, tmp_path):
+def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, axis):
     """About either axis of the section, the stiffer one too; the pieces are then a regular polygon."""
     moment = [0.0, 0.0, 0.0]
     moment[3 - axis] = 2.0 * np.pi * axis  # the world's z is the section's axis 3, its y axis 2
     text = rod(along(1.0), elements) + load(elements, moment=moment)
     text = text.replace("EI = [1.0, 2.0]", "EI = [2.0, 1.0]")
-    rest = ephs.equilibrium(scene_of(text, tmp_path))
+    rest = ephs.equilibrium(scene_of_text(text))
     assert np.abs(rest.model.body(f"rod.{elements}").pose[4:]).max() <= 1e-11
 
 
-def test_a_rod_is_the_elastica(tmp_path):
+def test_a_rod_is_the_elastica():
     """A cantilever under a dead load across its end, 5 EI/L², by elliptic integrals."""
     number, root = 5.0, np.sqrt(5.0)
 
@@ -70,13 +65,13 @@ def test_a_rod_is_the_elastica(tmp_path):
     low = 1.0 - 2.0 * (ellipe(k * k) - ellipeinc(np.arcsin(1.0 / (k * np.sqrt(2.0))), k * k)) / root
     found = []
     for elements in (6, 12, 24):
-        scene = scene_of(rod(along(1.0), elements) + load(elements, force=[0.0, 0.0, number]), tmp_path)
+        scene = scene_of_text(rod(along(1.0), elements) + load(elements, force=[0.0, 0.0, number]))
         found.append(ephs.equilibrium(scene).model.body(f"rod.{elements}").pose[6])
     assert_of_order_2(found, low)
 
 
 @pytest.mark.parametrize(("degrees", "y", "z"), [(30, 10.112, 79.39), (60, 6.605, 129.89)])
-def test_the_princeton_beam_goes_where_its_table_says(degrees, y, z, tmp_path):
+def test_the_princeton_beam_goes_where_its_table_says(degrees, y, z):
     """Bent about both axes and twisted, with stiffnesses that are 15 and 4 times apart."""
     length, h, w, young = 0.508, 12.3777e-3, 3.2024e-3, 71.7e9
     strong, weak = w * h**3 / 12.0, h * w**3 / 12.0
@@ -84,16 +79,16 @@ def test_the_princeton_beam_goes_where_its_table_says(degrees, y, z, tmp_path):
     section = f"{{ GJ = {twist}, EI = [{young * weak}, {young * strong}], rhoA = 0.1, rhoI = [2e-6, 1e-6, 1e-6] }}"
     force = [0.0, float(8.896 * np.cos(np.radians(degrees))), float(8.896 * np.sin(np.radians(degrees)))]
     text = rod(along(length), 12, section=section) + load(12, force=force)
-    found = 1e3 * ephs.equilibrium(scene_of(text, tmp_path)).model.body("rod.12").pose[5:]
+    found = 1e3 * ephs.equilibrium(scene_of_text(text)).model.body("rod.12").pose[5:]
     assert np.abs(found - [y, z]).max() <= 0.01 * max(y, z)
 
 
-def test_a_string_hangs_as_a_catenary(tmp_path):
+def test_a_string_hangs_as_a_catenary():
     lowest = []
     for elements in (4, 8, 16):
         points = [(-0.5, 0.0, 0.0), (0.0, 0.0, -0.4), (0.5, 0.0, 0.0)]
         ends = 'ends = ["ground", "ground"]'
-        scene = scene_of(rod(points, elements, "string", STRING, ends, gravity=-9.81), tmp_path)
+        scene = scene_of_text(rod(points, elements, "string", STRING, ends, gravity=-9.81))
         lowest.append(ephs.equilibrium(scene).model.body(f"rod.{elements // 2}").pose[6])
     length = sum(scene.beams["rod"].lengths)
     a = brentq(lambda a: 2.0 * a * np.sinh(0.5 / a) - length, 0.05, 10.0)
@@ -103,11 +98,11 @@ def test_a_string_hangs_as_a_catenary(tmp_path):
 # ---- motion ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_hanging_string_swings_at_the_zeros_of_bessel_functions(tmp_path):
+def test_a_hanging_string_swings_at_the_zeros_of_bessel_functions():
     found = []
     for elements in (8, 16, 32):
         down = [(0.0, 0.0, 0.0), (0.0, 0.0, -1.0)]
-        modes = ephs.linearize(scene_of(rod(down, elements, "string", STRING, gravity=-9.81), tmp_path)).modes
+        modes = ephs.linearize(scene_of_text(rod(down, elements, "string", STRING, gravity=-9.81))).modes
         all_ = np.sort([mode.frequency for mode in modes if mode.frequency > 1e-3])
         found.append(all_[[0, 2]])  # every one twice, in both planes
     for i, zero in enumerate(jn_zeros(0, 2)):
@@ -117,20 +112,20 @@ def test_a_hanging_string_swings_at_the_zeros_of_bessel_functions(tmp_path):
 @pytest.mark.parametrize(
     ("ends", "first"), [('ends = ["ground"]', 1.8751040687), ("", 4.7300407449)], ids=["cantilever", "free-free"]
 )
-def test_rods_swing_at_the_frequencies_of_thin_beams(ends, first, tmp_path):
+def test_rods_swing_at_the_frequencies_of_thin_beams(ends, first):
     found = []
     for elements in (8, 16, 32):
         text = rod(along(1.0), elements, more=ends).replace("[2e-4, 1e-4, 1e-4]", "[2e-9, 1e-9, 1e-9]")
-        modes = ephs.linearize(scene_of(text, tmp_path)).modes
+        modes = ephs.linearize(scene_of_text(text)).modes
         found.append(min(mode.frequency for mode in modes if mode.frequency > 1e-3))
     assert_of_order_2(found, first**2 / (2.0 * np.pi))  # about the softer axis
 
 
-def test_a_rod_twists_by_its_closed_form(tmp_path):
+def test_a_rod_twists_by_its_closed_form():
     """Torsion of a clamped rod: the lowest frequency is √(GJ/ρI₁)/4L."""
     found = []
     for elements in (4, 8, 16):
-        modes = ephs.linearize(scene_of(rod(along(1.0), elements), tmp_path)).modes
+        modes = ephs.linearize(scene_of_text(rod(along(1.0), elements))).modes
         exact = np.sqrt(0.8 / 2e-4) / 4.0
         found.append(min((mode.frequency for mode in modes), key=lambda f: abs(f - exact)))
     assert_of_order_2(found, exact)
@@ -142,11 +137,11 @@ CONSTANT = ("natural", "natural4", "variational")
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
-def test_a_flying_rod_keeps_its_energy_and_its_momenta(name, tmp_path):
+def test_a_flying_rod_keeps_its_energy_and_its_momenta(name):
     """To rounding what the method keeps, else by its accuracy; a bent rod stays in one piece by every method."""
     steps = {"step": 2.0**-8} if name in CONSTANT else {"rtol": 1e-7, "atol": 1e-9}
     sol = ephs.simulate(
-        scene_of(rod(along(1.0), 4, section=THICK, more=STRUCK), tmp_path), 0.25, method=name, audit="off", **steps
+        scene_of_text(rod(along(1.0), 4, section=THICK, more=STRUCK)), 0.25, method=name, audit="off", **steps
     )
     momentum = np.zeros((len(sol.t), 3))
     for i in range(5):
@@ -159,23 +154,23 @@ def test_a_flying_rod_keeps_its_energy_and_its_momenta(name, tmp_path):
     assert np.abs(np.linalg.norm(np.diff(sol.beam("rod").position, axis=1), axis=2) - 0.25).max() <= 0.01
 
 
-def test_damping_turns_into_heat_what_the_motion_loses(tmp_path):
+def test_damping_turns_into_heat_what_the_motion_loses():
     heat = 'damping = 0.02\nheat = "core"\n[thermal.core]\ncapacity = 1.0\ntemperature = 300.0\n'
-    scene = scene_of(rod(along(1.0), 6, section=THICK, more=STRUCK + heat), tmp_path)
+    scene = scene_of_text(rod(along(1.0), 6, section=THICK, more=STRUCK + heat))
     summary = ephs.simulate(scene, 0.25, method="natural", step=2.0**-8).summary()
     assert summary["heat"] > 0.05
     assert summary["max_energy_error"] <= 1e-11 and summary["min_entropy_production"] >= 0.0
     assert summary["thermal"]["core"]["temperature"] == pytest.approx(300.0 + summary["heat"], rel=1e-12)
 
 
-def test_stiff_beams_come_to_the_rod(tmp_path):
+def test_stiff_beams_come_to_the_rod():
     """The energies of stretch and shear made 100 and 10 000 times larger: the difference goes with them."""
-    scene = scene_of(rod(along(1.0), 8) + load(8, force=[0.0, 0.0, 2.0]), tmp_path)
+    scene = scene_of_text(rod(along(1.0), 8) + load(8, force=[0.0, 0.0, 2.0]))
     limit = ephs.equilibrium(scene).model.body("rod.8").pose[4:]
     off = []
     for stiff in (1e3, 1e5, 1e7):
         text = rod(along(1.0), 8, "reissner", KIRCHHOFF.replace("GJ", f"EA = {stiff}, GA = [{stiff}, {stiff}], GJ"))
-        found = ephs.equilibrium(scene_of(text + load(8, force=[0.0, 0.0, 2.0]), tmp_path)).model.body("rod.8")
+        found = ephs.equilibrium(scene_of_text(text + load(8, force=[0.0, 0.0, 2.0]))).model.body("rod.8")
         off.append(found.pose[4:] - limit)
     assert np.linalg.norm(off[0] - off[2] - 100.0 * (off[1] - off[2])) <= 0.02 * np.linalg.norm(off[0] - off[2])
     assert np.linalg.norm(off[2]) <= 2e-3  # what 8 elements of either kind differ by
@@ -184,9 +179,9 @@ def test_stiff_beams_come_to_the_rod(tmp_path):
 # ---- readings and files ---------------------------------------------------------------------------------------------
 
 
-def test_a_rod_tells_its_strain_and_what_holds_its_pieces(tmp_path):
+def test_a_rod_tells_its_strain_and_what_holds_its_pieces():
     """A cantilever at rest under a load on its end: the load in every section, and its moment about it."""
-    rest = ephs.equilibrium(scene_of(rod(along(1.0), 8) + load(8, force=[0.3, 0.0, 2.0]), tmp_path)).model
+    rest = ephs.equilibrium(scene_of_text(rod(along(1.0), 8) + load(8, force=[0.3, 0.0, 2.0]))).model
     found = ephs.simulate(rest, 2.0**-8, method="natural", step=2.0**-9).beam("rod")
     assert np.linalg.norm(found.force[-1], axis=1) == pytest.approx(np.hypot(0.3, 2.0), rel=1e-6)
     middle = [(rest.joint(f"rod-{i}"), rest.body(f"rod.{i}").pose) for i in range(1, 9)]
@@ -200,12 +195,12 @@ def test_a_rod_tells_its_strain_and_what_holds_its_pieces(tmp_path):
 
 @settings(deadline=None, max_examples=10)
 @given(st.integers(0, 2**32 - 1))
-def test_scenes_with_rods_come_back_from_text(tmp_path_factory, seed):
+def test_scenes_with_rods_come_back_from_text(seed):
     rng = np.random.default_rng(seed)
     kind = ("kirchhoff", "string")[seed % 2]
     more = STRUCK if kind == "kirchhoff" else ""
     text = rod([(0.0, 0.0, 0.0), (1.0, *(0.3 * rng.standard_normal(2)))], 1 + seed % 5, kind, more=more)
-    scene = scene_of(text, tmp_path_factory.mktemp("rods"))
+    scene = scene_of_text(text)
     again = scene_from_text(scene_to_text(scene))
     assert again.beams == scene.beams and scene_to_text(again) == scene_to_text(scene)
 
@@ -221,6 +216,6 @@ def test_scenes_with_rods_come_back_from_text(tmp_path_factory, seed):
         ("reissner", "", "beams.rod.section"),
     ],
 )
-def test_faults_name_the_key(kind, more, key, tmp_path):
+def test_faults_name_the_key(kind, more, key):
     with pytest.raises(ephs.SceneError, match=key):
-        scene_of(rod(along(1.0), 4, kind, more=more), tmp_path)
+        scene_of_text(rod(along(1.0), 4, kind, more=more))

@@ -14,6 +14,7 @@ from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.written import scene_of_text
 
 CORNERS = np.array([[-0.08, -0.06, -0.05], [0.09, -0.05, -0.05], [0.0, 0.1, -0.05], [0.0, 0.0, 0.11]])
 DRAWN = {
@@ -114,14 +115,12 @@ def moved(pose, twist, time):
     return np.concatenate([pose[:4], pose[4:] + time * twist[3:]])
 
 
-def scene_of(folder, seed, pair, *, hard, before):
+def scene_of(seed, pair, *, hard, before):
     rng, parts = np.random.default_rng(seed), [HEAD]
     for name, kind, size, pose, twist in zip("ab", pair, *flying(rng, pair, before), strict=True):
         parts += [] if kind == "plane" else [body_of(rng, name, pose, twist)]
         parts.append(surface_of(rng, name, kind, size, hard=hard))
-    file = folder.mktemp("pair") / "pair.toml"
-    file.write_text("".join(parts), encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text("".join(parts))
 
 
 def lawful(sol):
@@ -199,15 +198,15 @@ def test_those_drawn_meet(pair):
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 @settings(max_examples=1)
 @given(seed=SEEDS)
-def test_hard_blows_keep_both_laws_and_all_momenta(pair, seed, tmp_path_factory):
-    blow(scene_of(tmp_path_factory, seed, pair, hard=True, before=1.5 * STEP))
+def test_hard_blows_keep_both_laws_and_all_momenta(pair, seed):
+    blow(scene_of(seed, pair, hard=True, before=1.5 * STEP))
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 @settings(max_examples=1)
 @given(seed=SEEDS)
-def test_elastic_blows_keep_both_laws_and_all_momenta(pair, seed, tmp_path_factory):
-    scene = scene_of(tmp_path_factory, seed, pair, hard=False, before=STEP)
+def test_elastic_blows_keep_both_laws_and_all_momenta(pair, seed):
+    scene = scene_of(seed, pair, hard=False, before=STEP)
     keep = "energy" if "plane" in pair else "energy and momenta"
     sol = ephs.simulate(scene, 8.0 * STEP, rtol=1e-3, options={"keep": keep}, audit="off")
     lawful(sol)
@@ -218,18 +217,18 @@ def test_elastic_blows_keep_both_laws_and_all_momenta(pair, seed, tmp_path_facto
 @pytest.mark.parametrize("pair", [pair for pair in PAIRS if "plane" not in pair], ids="-".join)
 @settings(max_examples=1)
 @given(seed=SEEDS)
-def test_elastic_forces_keep_all_momenta(pair, seed, tmp_path_factory):
+def test_elastic_forces_keep_all_momenta(pair, seed):
     """By themselves: no step corrects momenta here."""
-    push(scene_of(tmp_path_factory, seed, pair, hard=False, before=-0.125 * STEP))
+    push(scene_of(seed, pair, hard=False, before=-0.125 * STEP))
 
 
-def test_an_instant_of_an_overlap_changes_each_body(tmp_path_factory):
+def test_an_instant_of_an_overlap_changes_each_body():
     """The control of what is compared with rounding."""
-    assert push(scene_of(tmp_path_factory, 0, ("capsule", "sphere"), hard=False, before=-0.125 * STEP)) > 1e3 * ROUNDING
+    assert push(scene_of(0, ("capsule", "sphere"), hard=False, before=-0.125 * STEP)) > 1e3 * ROUNDING
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_blow_on_one_side_is_found(seed, tmp_path_factory, monkeypatch):
+def test_a_blow_on_one_side_is_found(seed, monkeypatch):
     """One body gets a thousandth more of the impulse than the other."""
 
     def lopsided(equations, state, rows):
@@ -240,4 +239,4 @@ def test_a_blow_on_one_side_is_found(seed, tmp_path_factory, monkeypatch):
     stepping_answer = stepping.answer
     monkeypatch.setattr(stepping, "answer", lopsided)
     with pytest.raises(AssertionError):
-        blow(scene_of(tmp_path_factory, seed, ("box", "sphere"), hard=True, before=1.5 * STEP))
+        blow(scene_of(seed, ("box", "sphere"), hard=True, before=1.5 * STEP))

@@ -18,6 +18,7 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
+from tests.written import scene_of_text
 
 entry = st.floats(-1.0, 1.0)
 AWAY = np.array([0.0, 0.0, 0.0, 2.0, 0.0, 0.0])
@@ -44,11 +45,9 @@ length = {length}
 FALL, MASS, STIFFNESS = 9.81, 2.0, 80.0
 
 
-def weight(folder, bodies, points, length, z=0.0, rate=0.0, more=""):
-    file = folder / "weight.toml"
+def weight(bodies, points, length, z=0.0, rate=0.0, more=""):
     named = "[" + ", ".join(f'"{body}"' for body in bodies) + "]"
-    file.write_text(WEIGHT.format(bodies=named, points=points, length=length, z=z, rate=rate, more=more))
-    return ephs.load(file)
+    return scene_of_text(WEIGHT.format(bodies=named, points=points, length=length, z=z, rate=rate, more=more))
 
 
 # ---- the box --------------------------------------------------------------------------------------------------------
@@ -112,8 +111,8 @@ METHODS = [
 
 
 @pytest.mark.parametrize(("method", "options", "near"), METHODS)
-def test_a_mass_on_a_tendon_over_two_points_swings_as_a_cosine(tmp_path, method, options, near):
-    scene = weight(tmp_path, ("ground", "ground", "load"), [[3.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]], 4.5)
+def test_a_mass_on_a_tendon_over_two_points_swings_as_a_cosine(method, options, near):
+    scene = weight(("ground", "ground", "load"), [[3.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]], 4.5)
     sol = ephs.simulate(scene, 1.0, method=method, save_at=[0.0, 0.5, 1.0], audit="off", **options)
     rest = np.sqrt(10.0) + 2.0 - 4.5 - MASS * FALL / STIFFNESS  # where weight and tension balance
     exact = rest * (1.0 - np.cos(np.sqrt(STIFFNESS / MASS) * sol.t))
@@ -131,9 +130,9 @@ def swinging(t, y):
 
 
 @pytest.mark.parametrize(("method", "options", "near"), METHODS)
-def test_a_bob_across_a_damped_tendon_moves_as_equations_by_hand_say(tmp_path, method, options, near):
+def test_a_bob_across_a_damped_tendon_moves_as_equations_by_hand_say(method, options, near):
     points = [[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
-    scene = weight(tmp_path, ("ground", "load", "ground"), points, 1.8, 0.3, 1.0, "damping = 0.7")
+    scene = weight(("ground", "load", "ground"), points, 1.8, 0.3, 1.0, "damping = 0.7")
     sol = ephs.simulate(scene, 1.0, method=method, save_at=[0.0, 1.0], audit="off", **options)
     z, v, heat = solve_ivp(swinging, (0.0, 1.0), [0.3, 1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     rail = sol.joint("rail")
@@ -143,9 +142,9 @@ def test_a_bob_across_a_damped_tendon_moves_as_equations_by_hand_say(tmp_path, m
     assert sol.energy_error.max() < 1e-10
 
 
-def test_a_cable_only_pulls(tmp_path):
+def test_a_cable_only_pulls():
     """A body is thrown up on a cable: free until it is taut, then held back."""
-    scene = weight(tmp_path, ("ground", "load"), [[0.0, 0.0, -0.5], [0.0, 0.0, 0.0]], 1.0, 0.0, 4.0, "slack = true")
+    scene = weight(("ground", "load"), [[0.0, 0.0, -0.5], [0.0, 0.0, 0.0]], 1.0, 0.0, 4.0, "slack = true")
     taut = (4.0 - np.sqrt(16.0 - 2.0 * FALL * 0.5)) / FALL
     times = np.array([0.0, 0.5 * taut, taut, taut + 0.2])
     for method, options in (("rk87", {"rtol": 1e-10}), ("natural", {"step": 1e-3}), ("radau", {"rtol": 1e-9})):
@@ -159,14 +158,13 @@ def test_a_cable_only_pulls(tmp_path):
         assert sol.energy_error.max() < 1e-9
 
 
-def test_a_body_on_tendons_alone_moves_as_a_free_one(tmp_path):
+def test_a_body_on_tendons_alone_moves_as_a_free_one():
     """A ball between four tendons: its free joint is that of its name, and momentum changes by the tensions."""
     text = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n[bodies.ball]\nmass = 0.5\ninertia = [0.1, 0.2, 0.3]\n"
     for k, (x, y) in enumerate(((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))):
         text += f"[tendons.t{k}]\nbodies = ['ground', 'ball']\nstiffness = 10.0\n"
         text += f"points = [[{x}, {y}, 0.3], [{0.1 * x}, {0.1 * y}, 0.0]]\nlength = 1.0\n"
-    (tmp_path / "ball.toml").write_text(text)
-    scene = ephs.load(tmp_path / "ball.toml").with_state(rates={"ball": [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]})
+    scene = scene_of_text(text).with_state(rates={"ball": [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]})
     eq = Equations(problem_of_scene(scene), 0.0)
     assert eq.layout.joints == ("ball",)
     assert eq.reduced.tables.rows.sum() == 0

@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
+from tests.written import scene_of_text
 
 HARD = [name for name, method in METHODS.items() if method.impacts]
 RUNS = [*((name, 2.0**-5) for name in HARD), ("rk87", None)]
@@ -42,12 +43,10 @@ def body(name, **given):
     return BODY.format(name=name, **(USUAL | given))
 
 
-def scene_of(tmp_path, *parts, gravity=G, floor=UPRIGHT):
-    file = tmp_path / "hard.toml"
+def scene_of(*parts, gravity=G, floor=UPRIGHT):
     head = f'format = 1\nname = "hard"\n[world]\ngravity = [0.0, 0.0, {-gravity}]\n'
     end = FLOOR.format(rotation=floor) if floor else ""
-    file.write_text(head + "".join(parts) + end, encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text(head + "".join(parts) + end)
 
 
 def lawful(sol):
@@ -62,10 +61,10 @@ def run(scene, until, method="rk87", step=None, **options):
 
 
 @pytest.mark.parametrize(("method", "step"), RUNS)
-def test_a_ball_bounces_until_it_rests(method, step, tmp_path):
+def test_a_ball_bounces_until_it_rests(method, step):
     """Infinitely many bounces end at √(2H/g)(1 + e)/(1 − e), and all of the energy is heat."""
     fall, e = 0.2, 0.5
-    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.1 + fall], restitution=e))
+    scene = scene_of(body("ball", position=[0.0, 0.0, 0.1 + fall], restitution=e))
     last = np.sqrt(2.0 * fall / G) * (1.0 + e) / (1.0 - e)
     sol = run(scene, 1.2 * last, method, step, save_at=[0.9 * last, last, 1.1 * last, 1.2 * last])
     assert sol.heat[0] < 2.0 * G * fall * (1.0 - 1e-5)
@@ -75,33 +74,31 @@ def test_a_ball_bounces_until_it_rests(method, step, tmp_path):
 
 
 @pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
-def test_a_bounce_gives_back_the_square_of_its_coefficient(e, tmp_path):
-    scene = scene_of(
-        tmp_path, body("ball", position=[0.0, 0.0, 0.15], velocity=[0.0, 0.0, -1.0], restitution=e), gravity=0.0
-    )
+def test_a_bounce_gives_back_the_square_of_its_coefficient(e):
+    scene = scene_of(body("ball", position=[0.0, 0.0, 0.15], velocity=[0.0, 0.0, -1.0], restitution=e), gravity=0.0)
     sol = run(scene, 0.1)
     assert sol.body("ball").velocity[-1, 2] == pytest.approx(e, abs=1e-14)
     assert sol.heat[-1] == pytest.approx(1.0 - e * e, abs=1e-14)
 
 
 @pytest.mark.parametrize("method", HARD)
-def test_three_hard_balls_share_a_blow_by_one_coefficient(method, tmp_path):
+def test_three_hard_balls_share_a_blow_by_one_coefficient(method):
     """Moreau's law: (−1/3, 2/3, 2/3), where elastic balls would come to nearly (0, 0, 1)."""
     balls = [
         body(name, position=[x, 0.0, 0.0], velocity=[v, 0.0, 0.0], restitution=1.0)
         for name, x, v in (("a", -0.05, 1.0), ("b", 0.2, 0.0), ("c", 0.4, 0.0))
     ]
-    sol = run(scene_of(tmp_path, *balls, gravity=0.0, floor=None), 0.2, method, 2.0**-5)
+    sol = run(scene_of(*balls, gravity=0.0, floor=None), 0.2, method, 2.0**-5)
     found = [sol.body(name).velocity[-1, 0] for name in "abc"]
     assert found == pytest.approx([-1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0], abs=1e-12)
     assert abs(sol.heat[-1]) <= 1e-12
 
 
 @pytest.mark.parametrize(("method", "step"), RUNS)
-def test_a_sphere_slides_until_it_rolls(method, step, tmp_path):
+def test_a_sphere_slides_until_it_rolls(method, step):
     """v = 5/7 v₀ from 2 v₀/(7 μ g) on, and 2/7 of the energy are heat."""
     m, mu, v0 = 2.0, 0.3, 1.0
-    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.1], velocity=[v0, 0.0, 0.0], friction=mu))
+    scene = scene_of(body("ball", position=[0.0, 0.0, 0.1], velocity=[v0, 0.0, 0.0], friction=mu))
     until = 2.0 * v0 / (7.0 * mu * G)
     times = [0.5 * until, until, 1.5 * until]
     sol = run(scene, times[-1], method, step, save_at=times)
@@ -115,7 +112,7 @@ def test_a_sphere_slides_until_it_rolls(method, step, tmp_path):
 
 
 @pytest.mark.parametrize(("mu", "sliding"), [(0.2, True), (0.6, False)])
-def test_a_block_on_a_slope_slides_or_stays_where_it_is(mu, sliding, tmp_path):
+def test_a_block_on_a_slope_slides_or_stays_where_it_is(mu, sliding):
     theta, until = 0.3, 0.4
     turn = [float(np.cos(theta / 2.0)), 0.0, float(np.sin(theta / 2.0)), 0.0]
     up, down = np.array([np.sin(theta), 0.0, np.cos(theta)]), np.array([np.cos(theta), 0.0, -np.sin(theta)])
@@ -123,7 +120,7 @@ def test_a_block_on_a_slope_slides_or_stays_where_it_is(mu, sliding, tmp_path):
         "block", position=(0.01 * up).tolist(), rotation=turn, inertia=[0.01] * 3, shape="box = [0.4, 0.3, 0.02]",
         friction=mu,
     )  # fmt: skip
-    sol = ephs.simulate(scene_of(tmp_path, block, floor=turn), until, method="rk54", step=2.0**-5)
+    sol = ephs.simulate(scene_of(block, floor=turn), until, method="rk54", step=2.0**-5)
     way = (sol.body("block").position[-1] - 0.01 * up) @ down
     falling = G * (np.sin(theta) - mu * np.cos(theta)) if sliding else 0.0
     assert sol.body("block").velocity[-1] @ down == pytest.approx(falling * until, abs=1e-12)
@@ -134,7 +131,7 @@ def test_a_block_on_a_slope_slides_or_stays_where_it_is(mu, sliding, tmp_path):
     assert pressed == pytest.approx(2.0 * G * (np.cos(theta) * up - friction * down), abs=1e-4)
 
 
-def test_a_rocking_block_loses_by_its_slenderness(tmp_path):
+def test_a_rocking_block_loses_by_its_slenderness():
     """Housner: an impact on the other edge leaves (1 − 3/2 sin² α)² of the kinetic energy; a quarter of the period is
     arcosh(1/(1 − θ₀/α))/p for slender blocks, p² = 3 g/4R."""
     b, h, thick, m = 0.02, 0.2, 0.1, 2.0
@@ -151,17 +148,17 @@ def test_a_rocking_block_loses_by_its_slenderness(tmp_path):
         friction=5.0,
     )  # fmt: skip
     quarter = np.arccosh(1.0 / (1.0 - tilt / alpha)) / np.sqrt(3.0 * G / (4.0 * radius))
-    sol = run(scene_of(tmp_path, block), 1.5 * quarter, "rk54", 2.0**-8, save_at=[0.98 * quarter, 1.02 * quarter])
+    sol = run(scene_of(block), 1.5 * quarter, "rk54", 2.0**-8, save_at=[0.98 * quarter, 1.02 * quarter])
     energy = m * G * radius * (np.cos(alpha - tilt) - np.cos(alpha))
     assert sol.heat[0] == pytest.approx(0.0, abs=1e-4 * energy)
     assert sol.heat[1] / energy == pytest.approx(1.0 - (1.0 - 1.5 * np.sin(alpha) ** 2) ** 2, rel=1e-3)
 
 
 @pytest.mark.parametrize(("method", "step"), RUNS)
-def test_impacts_are_events(method, step, tmp_path):
+def test_impacts_are_events(method, step):
     """Bounces happen at √(2H/g) (1 + 2e + … + 2eᵏ), and each once; afterwards the ball rests."""
     fall, e = 0.2, 0.5
-    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.1 + fall], restitution=e))
+    scene = scene_of(body("ball", position=[0.0, 0.0, 0.1 + fall], restitution=e))
     sol = run(scene, 1.0, method, step, save_at=np.linspace(0.0, 1.0, 7))
     name, first = "contacts.ball_floor", np.sqrt(2.0 * fall / G)
     strikes = [event.t for event in sol.events if event.name == f"{name} strikes"]
@@ -173,9 +170,9 @@ def test_impacts_are_events(method, step, tmp_path):
     assert last.state["bodies.ball.pe.q"][6] == pytest.approx(0.1, abs=1e-9)
 
 
-def test_the_end_of_a_slip_is_an_event(tmp_path):
+def test_the_end_of_a_slip_is_an_event():
     mu, v0 = 0.3, 1.0
-    scene = scene_of(tmp_path, body("ball", position=[0.0, 0.0, 0.1], velocity=[v0, 0.0, 0.0], friction=mu))
+    scene = scene_of(body("ball", position=[0.0, 0.0, 0.1], velocity=[v0, 0.0, 0.0], friction=mu))
     until = 2.0 * v0 / (7.0 * mu * G)
     (event,) = run(scene, 2.0 * until, "rk87").events
     assert (event.name, event.t) == ("contacts.ball_floor sticks", pytest.approx(until, abs=1e-6))
@@ -185,18 +182,18 @@ BALL = {"position": [0.0, 0.0, 0.3], "restitution": 0.5}
 
 
 @pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes and not method.impacts])
-def test_methods_without_impacts_say_which_have_them(name, tmp_path):
+def test_methods_without_impacts_say_which_have_them(name):
     step = 0.01 if METHODS[name].fixed else None
     with pytest.raises(ephs.OptionError, match=r"rk54, rk87.*contacts\.ball_floor.* acts by impulses"):
-        ephs.simulate(scene_of(tmp_path, body("ball", **BALL)), 0.1, method=name, step=step)
+        ephs.simulate(scene_of(body("ball", **BALL)), 0.1, method=name, step=step)
 
 
-def test_impacts_do_not_run_backward(tmp_path):
+def test_impacts_do_not_run_backward():
     with pytest.raises(ephs.OptionError, match="does not run backward"):
-        ephs.simulate(scene_of(tmp_path, body("ball", **BALL)), -0.1)
+        ephs.simulate(scene_of(body("ball", **BALL)), -0.1)
 
 
-def test_a_hard_surface_meets_an_elastic_one_elastically(tmp_path):
+def test_a_hard_surface_meets_an_elastic_one_elastically():
     soft = body("ball", **BALL).replace("restitution = 0.5", "stiffness = 1e5")
-    scene = scene_of(tmp_path, soft)
+    scene = scene_of(soft)
     assert scene.contacts["ball_floor"].law.stiffness == 1e5

@@ -8,6 +8,7 @@ from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.shapes.impact import Impact
 from ephs.semantics.errors import StructureError
+from tests.written import scene_of_text
 
 HARD = [name for name, method in METHODS.items() if method.impacts]
 G = 9.81
@@ -38,15 +39,13 @@ axis = [0.0, 1.0, 0.0]
 """
 
 
-def scene_of(tmp_path, *parts, gravity=0.0):
-    file = tmp_path / "stops.toml"
-    file.write_text(HEAD.format(gravity=-gravity) + "".join(parts), encoding="utf-8")
-    return ephs.load(file)
+def scene_of(*parts, gravity=0.0):
+    return scene_of_text(HEAD.format(gravity=-gravity) + "".join(parts))
 
 
-def sliding(tmp_path, keys, *, coordinate=0.0, rate=0.0, gravity=0.0):
+def sliding(keys, *, coordinate=0.0, rate=0.0, gravity=0.0):
     block = BODY.format(name="block", position=[0.0, 0.0, coordinate])
-    return scene_of(tmp_path, block, SLIDE.format(coordinate=coordinate, rate=rate, keys=keys), gravity=gravity)
+    return scene_of(block, SLIDE.format(coordinate=coordinate, rate=rate, keys=keys), gravity=gravity)
 
 
 def run(scene, until, method="rk87", step=None, **options):
@@ -57,10 +56,10 @@ def run(scene, until, method="rk87", step=None, **options):
 
 
 @pytest.mark.parametrize(("method", "step"), [*((name, 2.0**-5) for name in HARD), ("rk87", None)])
-def test_what_falls_on_a_stop_rests_after_the_last_bounce(method, step, tmp_path):
+def test_what_falls_on_a_stop_rests_after_the_last_bounce(method, step):
     """Infinitely many bounces end at √(2H/g)(1 + e)/(1 − e), and all of the energy is heat."""
     fall, e = 0.2, 0.5
-    scene = sliding(tmp_path, f"limits = [{-fall}, nan]\nlimit_restitution = {e}", gravity=G)
+    scene = sliding(f"limits = [{-fall}, nan]\nlimit_restitution = {e}", gravity=G)
     last = np.sqrt(2.0 * fall / G) * (1.0 + e) / (1.0 - e)
     sol = run(scene, 1.2 * last, method, step, save_at=[0.9 * last, last, 1.2 * last])
     assert sol.heat[0] < 2.0 * G * fall * (1.0 - 1e-5)
@@ -70,20 +69,20 @@ def test_what_falls_on_a_stop_rests_after_the_last_bounce(method, step, tmp_path
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
-def test_a_bounce_off_a_stop_beside_viscous_friction(e, side, tmp_path):
+def test_a_bounce_off_a_stop_beside_viscous_friction(e, side):
     """A block that slides loses v = c x/m of its speed on a way x, and 1 − e of what is left at the stop."""
     way, damping, speed = 0.1, 3.0, 1.0
     limits = f"limits = [{-way}, {way}]\nlimit_restitution = {e}\nfriction = {damping}"
-    sol = run(sliding(tmp_path, limits, rate=side * speed), 0.2, rtol=1e-10, atol=1e-13)
+    sol = run(sliding(limits, rate=side * speed), 0.2, rtol=1e-10, atol=1e-13)
     before = speed - damping * way / 2.0
     rest = 0.2 + 2.0 / damping * np.log(1.0 - damping * way / (2.0 * speed))
     assert sol.joint("slide").rate[-1, 0] == pytest.approx(-side * e * before * np.exp(-damping * rest / 2.0), abs=1e-9)
     assert sol.heat[-1] == pytest.approx(1.0 - sol.joint("slide").rate[-1, 0] ** 2, abs=1e-9)
 
 
-def test_a_block_goes_to_and_fro_between_two_stops(tmp_path):
+def test_a_block_goes_to_and_fro_between_two_stops():
     """With e = 1 for ever: after 4 ways and a quarter it is where a quarter of a way takes it."""
-    scene = sliding(tmp_path, "limits = [-0.1, 0.1]\nlimit_restitution = 1.0", rate=2.0)
+    scene = sliding("limits = [-0.1, 0.1]\nlimit_restitution = 1.0", rate=2.0)
     sol = run(scene, 0.425, "rk54", 2.0**-6)
     assert sol.joint("slide").coordinate[-1, 0] == pytest.approx(0.05, abs=1e-9)
     assert [event.name for event in sol.events] == ["joints.slide strikes"] * 4
@@ -91,7 +90,7 @@ def test_a_block_goes_to_and_fro_between_two_stops(tmp_path):
     assert abs(sol.heat[-1]) <= 1e-12
 
 
-def parallelogram(tmp_path, stopped):
+def parallelogram(stopped):
     """Two cranks that hang from the ground and a coupler between them: all four joints turn by one angle."""
     keys = "limits = [-0.2, nan]\nlimit_restitution = 0.6\n"
     signs = {"first": "", "second": "", "third": "", "fourth": ""} | {stopped: keys}
@@ -106,20 +105,20 @@ def parallelogram(tmp_path, stopped):
     hinges = [
         HINGE.format(name=name, bodies=str(on).replace("'", '"'), at=at, keys=signs[name]) for name, on, at in joints
     ]
-    scene = scene_of(tmp_path, *parts, *hinges, gravity=G)
+    scene = scene_of(*parts, *hinges, gravity=G)
     return scene.with_state({"first": 0.5}, {"first": 0.0}, adjust=True)
 
 
-def test_a_stop_acts_in_whichever_joint_of_a_loop_it_is(tmp_path):
+def test_a_stop_acts_in_whichever_joint_of_a_loop_it_is():
     ends = [
-        run(parallelogram(tmp_path, stopped), 1.0, rtol=1e-9, atol=1e-11).joint("first").coordinate[-1, 0]
+        run(parallelogram(stopped), 1.0, rtol=1e-9, atol=1e-11).joint("first").coordinate[-1, 0]
         for stopped in ("first", "second", "third", "fourth")
     ]
     assert ends == pytest.approx([ends[0]] * 4, abs=1e-7)
     assert ends[0] >= -0.2
 
 
-def test_a_stop_and_a_contact_are_one_island(tmp_path):
+def test_a_stop_and_a_contact_are_one_island():
     """A ball that strikes a block at rest on its stop with e = 1 comes back as from a wall; with e = 0 all is heat."""
     surface = '[surfaces.{name}]\nbody = "{name}"\nshape = {{ {shape} }}\nrestitution = {e}\n'
     for e in (1.0, 0.0):
@@ -129,7 +128,7 @@ def test_a_stop_and_a_contact_are_one_island(tmp_path):
             SLIDE.format(coordinate=0.0, rate=0.0, keys=f"limits = [0.0, nan]\nlimit_restitution = {e}"),
             *(surface.format(name=name, shape="sphere = 0.1", e=e) for name in ("block", "ball")),
         ]
-        sol = run(scene_of(tmp_path, *parts), 0.2, "rk54", 2.0**-5)
+        sol = run(scene_of(*parts), 0.2, "rk54", 2.0**-5)
         assert sol.body("ball").velocity[-1, 2] == pytest.approx(e, abs=1e-12)
         assert sol.body("block").velocity[-1, 2] == pytest.approx(0.0, abs=1e-12)
         assert sol.heat[-1] == pytest.approx(1.0 - e, abs=1e-12)
@@ -144,13 +143,13 @@ def test_a_stop_and_a_contact_are_one_island(tmp_path):
         ([0.25, 0.5], "limit_restitution = 0.5", r"joints\.slide\.limits: found a start 0\.25 beyond them"),
     ],
 )
-def test_what_is_wrong_of_hard_stops_is_named(limits, keys, fault, tmp_path):
+def test_what_is_wrong_of_hard_stops_is_named(limits, keys, fault):
     with pytest.raises(ephs.SceneError, match=fault):
-        sliding(tmp_path, f"limits = {limits}\n{keys}")
+        sliding(f"limits = {limits}\n{keys}")
 
 
 def test_a_scene_with_hard_stops_is_read_as_it_was_written(tmp_path):
-    scene = sliding(tmp_path, "limits = [-0.1, 0.1]\nlimit_restitution = 0.5", rate=1.0)
+    scene = sliding("limits = [-0.1, 0.1]\nlimit_restitution = 0.5", rate=1.0)
     sol = run(scene, 0.1)
     sol.save(tmp_path / "kept")
     again = ephs.load_solution(tmp_path / "kept").scene
@@ -164,12 +163,11 @@ def test_a_joint_in_python_takes_hard_stops():
         joint("spherical", limits=[-1.0, 1.0], stop=Impact(0.5))
 
 
-def test_joints_carry_what_hard_contacts_and_stops_press(tmp_path):
+def test_joints_carry_what_hard_contacts_and_stops_press():
     """A bar on a hinge and on the floor presses each with half of its weight; a block on its stop that with all."""
     bar = BODY.format(name="bar", position=[0.5, 0.0, 0.0])
     surface = '[surfaces.{name}]\nbody = "{body}"\nshape = {{ {shape} }}\nposition = {at}\nrestitution = 0.0\n'
     scene = scene_of(
-        tmp_path,
         bar,
         HINGE.format(name="hinge", bodies='["ground", "bar"]', at=[0.0, 0.0, 0.0], keys=""),
         surface.format(name="tip", body="bar", shape="sphere = 0.05", at=[0.5, 0.0, 0.0]),
@@ -182,7 +180,7 @@ def test_joints_carry_what_hard_contacts_and_stops_press(tmp_path):
     )  # nothing moves: no energy to compare with
     assert sol.contact("tip").force[-1] == pytest.approx([0.0, 0.0, G], abs=1e-6)
     assert np.linalg.norm(sol.joint("hinge").wrench[-1][3:]) == pytest.approx(G, abs=1e-6)
-    stopped = sliding(tmp_path, "limits = [0.0, nan]\nlimit_restitution = 0.0", gravity=G)
+    stopped = sliding("limits = [0.0, nan]\nlimit_restitution = 0.0", gravity=G)
     wrench = run(stopped, 0.1, "rk54", 2.0**-5).joint("slide").wrench[-1]
     assert wrench == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0, 2.0 * G], abs=1e-5)
 
@@ -232,13 +230,13 @@ surfaces = ["light", "heavy"]
         ("contact", "rk87", 25, 1e-3, 2000.0),
     ],
 )  # fmt: skip
-def test_a_light_body_with_much_friction_rests_on_a_heavy_one(met, method, most, mass, stiffness, tmp_path):
+def test_a_light_body_with_much_friction_rests_on_a_heavy_one(met, method, most, mass, stiffness):
     """After the blow both move as one oscillator: (m₁ + m₂) ẍ + c ẋ + k x = 0. Steps follow that, not the light body's
     own c/m₁, which is up to 10⁵ times faster."""
     friction, way, until = 20.0, 0.1, 0.15
     bodies = '["light", "heavy"]' if met == "stop" else '["ground", "heavy"]'
     text = SPRUNG.format(mass=mass, at=2.0 * way, stiffness=stiffness, friction=friction, bodies=bodies)
-    sol = run(scene_of(tmp_path, text + (STOPPED if met == "stop" else MET)), until, method, max_steps=most)
+    sol = run(scene_of(text + (STOPPED if met == "stop" else MET)), until, method, max_steps=most)
     m = 1.0 + mass
     roots = np.roots([m, friction, stiffness]).astype(complex)
     parts = np.linalg.solve(np.vander(roots, increasing=True).T, [0.0, -1.0 / m])
@@ -247,11 +245,9 @@ def test_a_light_body_with_much_friction_rests_on_a_heavy_one(met, method, most,
     assert sol.stats["steps"] + sol.stats["rejected"] <= most
 
 
-def test_a_step_that_is_rejected_ends_where_its_error_shows(tmp_path):
+def test_a_step_that_is_rejected_ends_where_its_error_shows():
     """A rebound leaves a light body in stiff flight; no part of such a step is taken after its error is known."""
-    scene = scene_of(
-        tmp_path,
-        SPRUNG.format(
+    scene = scene_of(SPRUNG.format(
             mass=1e-3, at=0.2, stiffness=2000.0, friction=20.0,
             bodies='["light", "heavy"]',
         ) + "limits = [-0.1, nan]\nlimit_restitution = 0.5\n",

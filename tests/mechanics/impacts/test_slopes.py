@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.shapes.pairs import ROUNDED
+from tests.written import scene_of_text
 
 G, MASS, RADIUS, LENGTH = 9.81, 2.0, 0.1, 0.3
 THICK = 0.2
@@ -41,7 +42,7 @@ def product(one, other):
     return [float(a * b - u @ v), *(a * v + b * u + np.cross(u, v)).tolist()]
 
 
-def sloped(tmp_path, theta, ground, shape, height, inertia, friction, turn=(1.0, 0.0, 0.0, 0.0)):
+def sloped(theta, ground, shape, height, inertia, friction, turn=(1.0, 0.0, 0.0, 0.0)):
     """A scene with a body whose centre is so high above a slope that falls along x; its directions down and up."""
     tilt = [float(np.cos(theta / 2.0)), 0.0, float(np.sin(theta / 2.0)), 0.0]
     up, down = np.array([np.sin(theta), 0.0, np.cos(theta)]), np.array([np.cos(theta), 0.0, -np.sin(theta)])
@@ -50,9 +51,7 @@ def sloped(tmp_path, theta, ground, shape, height, inertia, friction, turn=(1.0,
     text += BODY.format(
         at=(height * up).tolist(), turn=product(tilt, list(turn)), shape=shape, inertia=inertia, friction=friction
     )
-    file = tmp_path / "slope.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file), down, up
+    return scene_of_text(text), down, up
 
 
 RTOL = 1e-6
@@ -75,11 +74,11 @@ ROUND = {
 @pytest.mark.parametrize("ground", FLAT)
 @pytest.mark.parametrize("shape", ROUND)
 @pytest.mark.parametrize("steep", [0.9, 1.1])
-def test_round_bodies_roll_up_to_a_slope_and_slip_beyond(steep, shape, ground, tmp_path):
+def test_round_bodies_roll_up_to_a_slope_and_slip_beyond(steep, shape, ground):
     """They roll with g sin θ/(1 + J/mr²), cylinders with 2/3 g sin θ, up to tan θ = μ (1 + mr²/J), of cylinders 3μ."""
     (kind, ratio), mu = ROUND[shape], 0.1
     theta, inertia = float(np.arctan(steep * mu * (1.0 + 1.0 / ratio))), ratio * MASS * RADIUS**2
-    scene, down, _ = sloped(tmp_path, theta, ground, kind, RADIUS, [0.03, 0.03, inertia], mu, LYING)
+    scene, down, _ = sloped(theta, ground, kind, RADIUS, [0.03, 0.03, inertia], mu, LYING)
     sol = run(scene, 0.05)
     until, rolls, weight = sol.t[-1], steep < 1.0, MASS * G * np.cos(theta)
     pull = G * np.sin(theta) / (1.0 + ratio) if rolls else G * (np.sin(theta) - mu * np.cos(theta))
@@ -96,12 +95,12 @@ def test_round_bodies_roll_up_to_a_slope_and_slip_beyond(steep, shape, ground, t
 
 @pytest.mark.parametrize("ground", FLAT)
 @pytest.mark.parametrize("steep", [0.9, 1.1])
-def test_a_slender_box_stands_up_to_a_slope_and_tips_beyond(steep, ground, tmp_path):
+def test_a_slender_box_stands_up_to_a_slope_and_tips_beyond(steep, ground):
     """Up to tan θ = width/height, on a box without its rounded edges; beyond, φ̈ = a + b φ about the lower edge."""
     wide, high, until = 0.05 - (ROUNDED * 0.1 if ground == "box" else 0.0), 0.15, 0.0625
     theta, moment = float(np.arctan(steep * wide / high)), MASS / 3.0 * (0.05**2 + high**2)
     kind = f"box = [0.1, 0.2, {2.0 * high}]"
-    scene, down, _ = sloped(tmp_path, theta, ground, kind, high, [moment] * 3, 1.0)
+    scene, down, _ = sloped(theta, ground, kind, high, [moment] * 3, 1.0)
     sol = run(scene, until)
     motion, edge = sol.body("it"), moment + MASS * (wide**2 + high**2)
     lever = high * np.sin(theta) - wide * np.cos(theta), high * np.cos(theta) + wide * np.sin(theta)

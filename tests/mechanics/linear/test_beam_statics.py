@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 import ephs
+from tests.written import scene_of_text
 
 HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, 0.0]\n'
 ROD = """[beams.{name}]
@@ -33,10 +34,8 @@ def load(body, **given):
     return f'[loads.{body.replace(".", "_")}]\nbody = "{body}"\n' + "".join(f"{k} = {v}\n" for k, v in given.items())
 
 
-def scene_of(text, tmp_path):
-    file = tmp_path / "rods.toml"
-    file.write_text(HEAD + text, encoding="utf-8")
-    return ephs.load(file)
+def scene_of(text):
+    return scene_of_text(HEAD + text)
 
 
 def displaced(scene, body):
@@ -50,14 +49,14 @@ def along(length):
 
 @pytest.mark.parametrize("elements", [3, 4, 8])
 @pytest.mark.parametrize(("follower", "order"), [("true", 2), ("false", 2), ("true", 4)])
-def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, follower, order, tmp_path):
+def test_an_end_moment_rolls_a_rod_up_to_a_circle(elements, follower, order):
     moment = load(f"rod.{elements}", moment=[0.0, 2.0 * np.pi * 500.0, 0.0], follower=follower)
-    scene = scene_of(rod(along(1.0), elements, SOFT, order=order) + moment, tmp_path)
+    scene = scene_of(rod(along(1.0), elements, SOFT, order=order) + moment)
     assert np.abs(ephs.equilibrium(scene).model.body(f"rod.{elements}").pose[4:]).max() <= 1e-12
 
 
 @pytest.mark.parametrize("order", [2, 4])
-def test_a_bend_of_45_degrees_goes_to_its_limit_by_its_order(order, tmp_path):
+def test_a_bend_of_45_degrees_goes_to_its_limit_by_its_order(order):
     """Bathe and Bolourchi's cantilever: E = 1e7, section 1 × 1 with J = 1/6 and κ = 5/6, radius 100, 600 across."""
     young = 1e7
     section = {"EA": young, "GA": young / 2.4, "GJ": young / 12.0, "EI2": young / 12.0, "EI3": young / 12.0}
@@ -66,7 +65,7 @@ def test_a_bend_of_45_degrees_goes_to_its_limit_by_its_order(order, tmp_path):
         angles = np.linspace(0.0, np.pi / 4.0, 5)
         points = [(100.0 * np.sin(a), 100.0 * (1.0 - np.cos(a)), 0.0) for a in angles]
         text = rod(points, elements, section, order=order) + load(f"rod.{elements}", force=[0.0, 0.0, 600.0])
-        found.append(displaced(scene_of(text, tmp_path), f"rod.{elements}"))
+        found.append(displaced(scene_of(text), f"rod.{elements}"))
     one, two = found[1] - found[0], found[2] - found[1]
     assert np.linalg.norm(one) / np.linalg.norm(two) == pytest.approx(2.0**order, rel=0.05)
     assert np.abs(found[2] + two / (2.0**order - 1.0) - [-23.5607, -13.6047, 53.4755]).max() <= 5e-4
@@ -79,7 +78,7 @@ TABLE = [
 
 
 @pytest.mark.parametrize(("force", "degrees", "y", "z"), TABLE)
-def test_the_princeton_beam_goes_where_its_table_says(force, degrees, y, z, tmp_path):
+def test_the_princeton_beam_goes_where_its_table_says(force, degrees, y, z):
     length, h, w, young, nu = 0.508, 12.3777e-3, 3.2024e-3, 71.7e9, 0.31
     area, strong, weak = h * w, w * h**3 / 12.0, h * w**3 / 12.0
     shear = young / (2.0 * (1.0 + nu))
@@ -89,7 +88,7 @@ def test_the_princeton_beam_goes_where_its_table_says(force, degrees, y, z, tmp_
     }  # fmt: skip
     beta = np.radians(degrees)
     push = load("rod.12", force=[0.0, float(force * np.cos(beta)), float(force * np.sin(beta))])
-    scene = scene_of(rod(along(length), 12, section, up=(0.0, 1.0, 0.0)) + push, tmp_path)
+    scene = scene_of(rod(along(length), 12, section, up=(0.0, 1.0, 0.0)) + push)
     found = 1e3 * displaced(scene, "rod.12")[1:]
     assert np.abs(found - [y, z]).max() <= 0.01 * max(y, z)
 
@@ -111,12 +110,12 @@ def elastica(load_number):
 
 
 @pytest.mark.parametrize(("number", "order"), [(1.0, 2), (10.0, 2), (10.0, 4)])
-def test_a_thin_rod_is_the_elastica(number, order, tmp_path):
+def test_a_thin_rod_is_the_elastica(number, order):
     section = {"EA": 1e8, "GA": 1e8, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
     tips = []
     for elements in (8, 16):
         text = rod(along(1.0), elements, section, order=order) + load(f"rod.{elements}", force=[0.0, 0.0, number])
-        tips.append(ephs.equilibrium(scene_of(text, tmp_path)).model.body(f"rod.{elements}").pose[[4, 6]])
+        tips.append(ephs.equilibrium(scene_of(text)).model.body(f"rod.{elements}").pose[[4, 6]])
     limit = tips[1] + (tips[1] - tips[0]) / (2.0**order - 1.0)
     assert np.abs(limit - elastica(number)).max() <= np.abs(tips[1] - tips[0]).max() / 16.0
     assert (np.abs(tips[0] - elastica(number)).max() > 1e-4) == (order == 2)  # eight elements alone
@@ -137,32 +136,32 @@ def frame(elements, force, rigid=1.0):
 
 
 @pytest.mark.parametrize("end", [1.5, 3.0, -1.5, -2.0])
-def test_a_right_angle_frame_buckles_out_of_its_plane(end, tmp_path):
+def test_a_right_angle_frame_buckles_out_of_its_plane(end):
     """Whatever the last load: at 1.0868 N one way and 0.6802 N the other, if it is rigid in its plane."""
-    (critical,) = ephs.equilibrium(scene_of(frame(4, end, rigid=100.0), tmp_path)).critical
+    (critical,) = ephs.equilibrium(scene_of(frame(4, end, rigid=100.0))).critical
     assert end * critical == pytest.approx(1.0868 if end > 0.0 else -0.6802, abs=1e-4)
 
 
-def test_loads_of_a_frame_of_rectangular_section_converge(tmp_path):
+def test_loads_of_a_frame_of_rectangular_section_converge():
     """By order 4, to the figure of a refined run: torsion by Saint-Venant's series, soft in its plane, too."""
     section = "section = { rectangle = [30e-3, 0.6e-3], E = 7.124e10, nu = 0.31, rho = 2700.0 }"
     loads = []
     for elements in (4, 8, 16):
         text = re.sub(r"section = .*", section, frame(elements, -1.5))
-        (critical,) = ephs.equilibrium(scene_of(text, tmp_path)).critical
+        (critical,) = ephs.equilibrium(scene_of(text)).critical
         loads.append(-1.5 * critical)
     first, second = np.abs(np.diff(loads))
     assert 12.0 < first / second < 20.0
     assert loads[-1] + (loads[-1] - loads[-2]) / 15.0 == pytest.approx(-0.679, abs=5e-4)
 
 
-def test_a_path_goes_through_limit_points(tmp_path):
+def test_a_path_goes_through_limit_points():
     """A shallow arch with clamped feet snaps: the load falls, and rises again on the other side."""
     angles = np.linspace(-0.25, 0.25, 9)
     points = [(4.0 * np.sin(a), 0.0, 4.0 * np.cos(a)) for a in angles]
     section = {"EA": 1e4, "GA": 1e4, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
     text = rod(points, 8, section, up=(0.0, 1.0, 0.0), ends='"ground", "ground"')
-    found = ephs.equilibrium(scene_of(text + load("rod.4", force=[0.0, 0.0, -600.0]), tmp_path))
+    found = ephs.equilibrium(scene_of(text + load("rod.4", force=[0.0, 0.0, -600.0])))
     assert np.any(np.diff(found.shares) < 0.0) and found.shares[-1] == 1.0
     assert len(found.critical) >= 2 and found.model.body("rod.4").pose[6] < points[0][2]
 
@@ -171,12 +170,12 @@ def test_a_path_goes_through_limit_points(tmp_path):
     ("ends", "first"), [('"ground"', 1.8751040687), ("", 4.7300407449)], ids=["cantilever", "free-free"]
 )
 @pytest.mark.parametrize("order", [2, 4])
-def test_rods_swing_at_the_frequencies_of_thin_beams(order, ends, first, tmp_path):
+def test_rods_swing_at_the_frequencies_of_thin_beams(order, ends, first):
     section = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
     found = []
     for elements in (8, 16):
         text = rod(along(1.0), elements, section, ends=ends, order=order)
-        linear = ephs.linearize(scene_of(text.replace("[2e-3, 1e-3, 1e-3]", "[2e-6, 1e-6, 1e-6]"), tmp_path))
+        linear = ephs.linearize(scene_of(text.replace("[2e-3, 1e-3, 1e-3]", "[2e-6, 1e-6, 1e-6]")))
         found.append(min(mode.frequency for mode in linear.modes if mode.frequency > 1e-3))
     exact = first**2 / (2.0 * np.pi)
     off = np.abs(np.array(found) / exact - 1.0)
@@ -186,22 +185,22 @@ def test_rods_swing_at_the_frequencies_of_thin_beams(order, ends, first, tmp_pat
     assert (off[1] > 1e-3) == (order == 2)
 
 
-def test_tension_stiffens_and_modes_of_the_stressed_state_show_it(tmp_path):
+def test_tension_stiffens_and_modes_of_the_stressed_state_show_it():
     """A clamped rod under tension swings faster; under compression near Euler's load hardly at all."""
     section = {"EA": 1e6, "GA": 1e6, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0}
     euler, slow = np.pi**2 / 4.0, []
     for force in (-0.97 * euler, 0.0, euler):
         text = rod(along(1.0), 8, section) + load("rod.8", force=[float(force), 0.0, 0.0])
-        scene = scene_of(text, tmp_path)
+        scene = scene_of(text)
         rest = ephs.equilibrium(scene).model
         slow.append(min(mode.frequency for mode in ephs.linearize(rest).modes if mode.frequency > 1e-6))
     assert slow[0] < 0.3 * slow[1] < 0.3 * slow[2]
 
 
-def test_loads_count_in_the_derivatives_of_the_dynamics(tmp_path):
+def test_loads_count_in_the_derivatives_of_the_dynamics():
     loads = load("rod.2", force=[1.0, 2.0, 30.0], moment=[4.0, 50.0, 6.0])
     loads += load("rod.1", force=[1.0, 20.0, 3.0], moment=[4.0, 5.0, 6.0], follower="true")
-    model = ephs.dynamics(scene_of(rod(along(1.0), 2, SOFT) + loads, tmp_path))
+    model = ephs.dynamics(scene_of(rod(along(1.0), 2, SOFT) + loads))
     n, h = model.layout.n, 1e-5  # ∛ε: truncation and rounding of differences are equally small
     at, zero = model.moved(model.state0, 0.1 * np.random.default_rng(3).standard_normal(n)), np.zeros(n)
     by = model.derivatives(at, accelerations={})

@@ -9,6 +9,7 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
 from ephs.mechanics.methods.stages import Kept
 from tests.mechanics.ball import BALL
+from tests.written import scene_of_text
 
 SCENE = """
 format = 1
@@ -59,10 +60,8 @@ TIMES = np.linspace(0.0, 0.6, 13)
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    file = tmp_path_factory.mktemp("stick") / "stick.toml"
-    file.write_text(SCENE, encoding="utf-8")
-    return ephs.load(file)
+def scene():
+    return scene_of_text(SCENE)
 
 
 def stepwise(monkeypatch):
@@ -149,11 +148,9 @@ def test_auto_takes_the_steps_of_radau_only_while_they_pay(scene):
 
 @pytest.mark.parametrize("slip", [1e-3, 1e-4, 1e-5])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3])
-def test_radau_is_tried_where_explicit_steps_hide_their_stiffness(slip, rtol, tmp_path):
+def test_radau_is_tried_where_explicit_steps_hide_their_stiffness(slip, rtol):
     """Friction near rest makes explicit steps erratic, not equal: by their estimate alone they went on for 400 000."""
-    file = tmp_path / "ball.toml"
-    file.write_text(BALL.format(slip=slip), encoding="utf-8")
-    found = ephs.simulate(ephs.load(file), 1.0, rtol=rtol, audit="off")
+    found = ephs.simulate(scene_of_text(BALL.format(slip=slip)), 1.0, rtol=rtol, audit="off")
     bounces = 4
     assert found.stats["steps"] < 3 * bounces * auto.TRIAL
     assert np.abs(found.energy_error).max() <= 1e-12 and np.all(np.diff(found.heat) >= 0.0)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-import ephs
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.simulate import problem_of_scene
@@ -13,6 +12,7 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
+from tests.written import scene_of_text
 
 J, K, RATE = 0.5, 3.0, -1.1
 A = np.array([[0.0, 1.0], [-K / J, 0.0]])
@@ -29,10 +29,8 @@ def plain():
 
 
 @pytest.fixture(scope="module")
-def equations(tmp_path_factory):
-    file = tmp_path_factory.mktemp("torsion") / "torsion.toml"
-    file.write_text(SCENE, encoding="utf-8")
-    scene = ephs.load(file)
+def equations():
+    scene = scene_of_text(SCENE)
     return Equations(problem_of_scene(scene), 0.0)
 
 

@@ -13,6 +13,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 BY_NAME = {case.name: case for case in CASES}
@@ -111,7 +112,7 @@ def test_dense_output_has_the_order_of_the_steps():
     assert np.array_equal(every.t, times)
 
 
-def test_a_group_of_bodies_that_nothing_holds_moves_freely(tmp_path):
+def test_a_group_of_bodies_that_nothing_holds_moves_freely():
     text = """
     format = 1
     [world]
@@ -130,9 +131,7 @@ def test_a_group_of_bodies_that_nothing_holds_moves_freely(tmp_path):
     frame2 = { position = [0.0, 0.0, -0.5] }
     friction = 0.1
     """
-    file = tmp_path / "pair.toml"
-    file.write_text(text)
-    scene = ephs.load(file, adjust=True)
+    scene = scene_of_text(text, adjust=True)
     sol, _ = limit_is_met(scene, 0.3, 4e-3)
     momentum = [sum(sol.scene.body(n).mass * sol.body(n).velocity[i] for n in "ab") for i in (0, -1)]
     assert np.allclose(momentum[0], momentum[1], atol=1e-9)
@@ -167,7 +166,7 @@ def test_few_unknowns_are_left():
     assert summary["unknowns"] == {"paper": model.unknowns, "used": reduced.unknowns}
 
 
-def test_a_loop_of_prescribed_joints_is_refused_by_name(tmp_path):
+def test_a_loop_of_prescribed_joints_is_refused_by_name():
     text = """
     format = 1
     [bodies.bar]
@@ -186,10 +185,8 @@ def test_a_loop_of_prescribed_joints_is_refused_by_name(tmp_path):
     axis = [1.0, 0.0, 0.0]
     motion = { rate = 0.0 }
     """
-    file = tmp_path / "held.toml"
-    file.write_text(text)
     with pytest.raises(ephs.OptionError, match=r"that of (left|right), which closes a loop of prescribed joints"):
-        ephs.simulate(ephs.load(file), 0.1, **TIGHT)
+        ephs.simulate(scene_of_text(text), 0.1, **TIGHT)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
+from tests.written import scene_of_text
 
 SCENE = """format = 1
 name = "thrown"
@@ -35,10 +36,8 @@ at = [0.8, -0.2, 0.5]
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    file = tmp_path_factory.mktemp("thrown") / "thrown.toml"
-    file.write_text(SCENE, encoding="utf-8")
-    return ephs.load(file)
+def scene():
+    return scene_of_text(SCENE)
 
 
 @pytest.mark.parametrize("method", ["rk54", "radau", "variational"])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
+from tests.written import scene_of_text
 
 K, LENGTH, D = 50.0, 0.4, 3.0
 MASSES = {"a": 2.0, "b": 3.0}
@@ -29,22 +29,20 @@ damping = {d}
 """
 
 
-def scene_of(one, two, folder):
+def scene_of(one, two):
     at = {name: [0.0, 0.0, 0.0] if name != "ground" else PLACES[name].tolist() for name in PLACES}
     text = 'format = 1\nname = "points"\n[world]\ngravity = [0.0, 0.0, 0.0]\n'
     for name, mass in MASSES.items():
         text += BODY.format(name=name, mass=mass, place=PLACES[name].tolist(), velocity=VELOCITIES[name].tolist())
     text += SPRING.format(one=one, two=two, at1=at[one], at2=at[two], k=K, length=LENGTH, d=D)
-    file = folder / "points.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text(text)
 
 
 @pytest.mark.parametrize(
     ("one", "two"), [("a", "b"), ("b", "a"), ("ground", "a"), ("a", "ground"), ("ground", "b"), ("b", "ground")]
 )
-def test_bodies_are_pulled_together(one, two, tmp_path):
-    scene = scene_of(one, two, tmp_path)
+def test_bodies_are_pulled_together(one, two):
+    scene = scene_of(one, two)
     eq = Equations(problem_of_scene(scene), 0.0)
     state = eq.start(0.0)
     along = PLACES[two] - PLACES[one]

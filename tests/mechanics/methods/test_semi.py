@@ -19,6 +19,7 @@ from ephs.semantics.stage import Program, group, real, vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
+from tests.written import scene_of_text
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
 IMPLICIT = SCHEME[1:, 1:]
@@ -151,11 +152,9 @@ shape = { plane = {} }
 
 
 @pytest.fixture(scope="module")
-def hug(tmp_path_factory):
-    file = tmp_path_factory.mktemp("hug") / "hug.toml"
-    file.write_text(SELF, encoding="utf-8")
+def hug():
     with pytest.warns(ephs.SceneWarning):  # of overlaps
-        return ephs.load(file)
+        return scene_of_text(SELF)
 
 
 def check(stage, seed):
@@ -186,13 +185,11 @@ def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
 
 
 @pytest.fixture(scope="module", params=["four-bar", "slider-crank", "slider-crank, led", "cardan-shaft", "universal"])
-def closed(request, tmp_path_factory):
+def closed(request):
     """A mechanism with loops and friction, of which one has a crank whose motion is prescribed."""
     name, _, led = request.param.partition(", ")
     text = (SCENES / f"{name}.toml").read_text(encoding="utf-8")
-    file = tmp_path_factory.mktemp("closed") / "closed.toml"
-    file.write_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text, encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text)
 
 
 @given(seed=st.integers(0, 2**20))
@@ -211,12 +208,10 @@ def test_so_do_those_of_contacts_within_a_mechanism(hug, seed):
     assert list(stage.memory["counts"]) == [6, 3]  # three joints and three contacts
 
 
-def test_steps_converge_with_order_three(tmp_path):
+def test_steps_converge_with_order_three():
     """Where friction is smooth beside the steps, and nothing touches or parts."""
-    file = tmp_path / "hug.toml"
-    file.write_text(SELF.replace("loss =", "slip = 1.0\nloss ="), encoding="utf-8")
     with pytest.warns(ephs.SceneWarning):
-        hug = ephs.load(file)
+        hug = scene_of_text(SELF.replace("loss =", "slip = 1.0\nloss ="))
 
     def end(step):
         sol = ephs.simulate(hug, 4e-3, rtol=1e-2, atol=1e10, max_step=step, audit="off")
@@ -271,12 +266,10 @@ def test_single_steps_are_those_of_compiled_runs(name, how):
     assert max(np.abs(sol.energy_error).max() for sol in (whole, single)) <= 1e-11
 
 
-def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes(tmp_path):
+def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes():
     """Losses a thousand times as fast as steps, whose stages are one by one."""
-    file = tmp_path / "bar.toml"
     text = (SCENES / "four-bar.toml").read_text(encoding="utf-8")
-    file.write_text(re.sub(r"friction = [0-9.]+", "friction = 1e4", text), encoding="utf-8")
-    scene = ephs.load(file)
+    scene = scene_of_text(re.sub(r"friction = [0-9.]+", "friction = 1e4", text))
     inputs = {"joints.main": lambda t, state: 4.0 + t}
     found = ephs.simulate(scene, 0.5, method="semi", step=0.02, inputs=inputs, audit="off")
     assert np.abs(found.joint("main").rate).max() <= 1e-2
@@ -284,12 +277,10 @@ def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_chang
 
 
 @pytest.mark.parametrize("slip", [1e-2, 1e-4, 1e-6])
-def test_stiff_friction_does_not_shorten_steps(slip, tmp_path):
+def test_stiff_friction_does_not_shorten_steps(slip):
     """A ball that slides until it rolls: its speed 5/7, and heat 2/7 of its energy, whatever the slip."""
-    file = tmp_path / "ball.toml"
     text = BALL.format(slip=slip).replace("0.3]", "0.0999]").replace("loss = 0.2", "loss = 1.0")
-    file.write_text(text, encoding="utf-8")
-    scene = ephs.load(file)
+    scene = scene_of_text(text)
     rtol, speed = 1e-3, 5.0 / 7.0
     sol = ephs.simulate(scene, 0.5, rtol=rtol, audit="off")
     assert sol.stats["method"] == "semi" and sol.stats["steps"] < 1000
@@ -322,11 +313,9 @@ shape = { plane = {} }
 """
 
 
-def test_what_comes_to_rest_stays_where_its_energy_cannot_be_mended(tmp_path):
+def test_what_comes_to_rest_stays_where_its_energy_cannot_be_mended():
     """Near rest no small move has the energy that is missing: moves that make more of it missing are taken back."""
-    file = tmp_path / "wheel.toml"
-    file.write_text(WHEEL, encoding="utf-8")
-    sol = ephs.simulate(ephs.load(file), 1.5, rtol=0.1, atol=1e-3, audit="off")
+    sol = ephs.simulate(scene_of_text(WHEEL), 1.5, rtol=0.1, atol=1e-3, audit="off")
     assert sol.stats["method"] == "semi"
     height = sol.body("wheel").position[:, 2]
     assert height[-1] == pytest.approx(0.1 - 0.5 * 9.81 / 1e5, abs=1e-4)  # on two rims

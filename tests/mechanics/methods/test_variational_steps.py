@@ -11,6 +11,7 @@ from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve.control import Control, Tolerance
+from tests.written import scene_of_text
 
 SCENE = """format = 1
 name = "pair"
@@ -43,10 +44,8 @@ stiffness = {stiffness}
 """
 
 
-def equations(folder, gravity, stiffness):
-    file = folder / "pair.toml"
-    file.write_text(SCENE.format(gravity=gravity, stiffness=stiffness), encoding="utf-8")
-    scene = ephs.load(file)
+def equations(gravity, stiffness):
+    scene = scene_of_text(SCENE.format(gravity=gravity, stiffness=stiffness))
     return Equations(problem_of_scene(scene), 0.0)
 
 
@@ -56,8 +55,8 @@ def stepper(eq, name):
 
 
 @pytest.fixture
-def heavy(tmp_path):
-    return equations(tmp_path, [0.1, 0.2, -9.81], 2.0)
+def heavy():
+    return equations([0.1, 0.2, -9.81], 2.0)
 
 
 def momentum(eq, state):
@@ -89,8 +88,8 @@ def test_a_step_misses_by_its_third_power(heavy):
     assert missed[0] / missed[1] == pytest.approx(2.0**method.exponent, rel=0.1)
 
 
-def test_momenta_are_kept_to_rounding_where_nothing_pulls(tmp_path):
-    eq = equations(tmp_path, [0.0, 0.0, 0.0], 2.0)
+def test_momenta_are_kept_to_rounding_where_nothing_pulls():
+    eq = equations([0.0, 0.0, 0.0], 2.0)
     method, state = stepper(eq, "variational"), eq.start(0.0)
     before = momentum(eq, state)
     for _ in range(4):

@@ -355,7 +355,7 @@ def agree(scene, method, step, steps):
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
 def test_folded_steps_are_the_same_steps(file, method):
     scene = ephs.load(file)
-    agree(scene, method, 5e-4 if file.stem == "heavy-top" else 2e-3, 20)
+    agree(scene, method, 5e-4 if file.stem == "heavy-top" else 2e-3, 8)
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
@@ -386,7 +386,7 @@ def test_so_they_are_in_the_benchmarks(case):
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(scene=mechanisms(max_bodies=3))
 def test_and_in_generated_mechanisms(method, scene):
     agree(scene, method, 5e-3, 4)

@@ -21,6 +21,7 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.instant import mobility
 from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 BY_NAME = {case.name: case for case in CASES}
@@ -33,10 +34,8 @@ def reduced_of(scene):
     )
 
 
-def scene_of(tmp_path, text):
-    file = tmp_path / "scene.toml"
-    file.write_text("format = 1\nname = 'scene'\n" + text)
-    return ephs.load(file)
+def scene_of(text):
+    return scene_of_text("format = 1\nname = 'scene'\n" + text)
 
 
 def named(reduction, name):
@@ -82,8 +81,8 @@ axis = [0.0, 1.0, 0.0]
 @pytest.mark.parametrize(
     ("kind", "name"), [("prismatic", "ℝ²"), ("revolute", "SE(2)"), ("cylindrical", "SE(2)×ℝ"), ("spherical", "SE(3)")]
 )
-def test_slides_and_pins_make_the_groups_that_they_generate(tmp_path, kind, name):
-    (part,) = coordinates.mechanisms(reduced_of(scene_of(tmp_path, SLIDES.format(kind=kind))))
+def test_slides_and_pins_make_the_groups_that_they_generate(kind, name):
+    (part,) = coordinates.mechanisms(reduced_of(scene_of(SLIDES.format(kind=kind))))
     assert part.group.name == name
     assert part.bodies == ("a", "b")
 
@@ -199,9 +198,9 @@ UP, ACROSS, TILTED = "[0.0, 0.0, 1.0]", "[1.0, 0.0, 0.0]", "[0.6, 0.0, 0.8]"
         ("[0.0, 0.0, -9.81]", "revolute", UP, "friction = 2.0", 1),
     ],
 )
-def test_cyclic_coordinates_of_one_joint(tmp_path, gravity, kind, axis, more, expected):
+def test_cyclic_coordinates_of_one_joint(gravity, kind, axis, more, expected):
     joint = "" if kind is None else PIVOT.format(kind=kind, axis=axis, more=more)
-    assert count(scene_of(tmp_path, TOP.format(gravity=gravity, joint=joint))) == expected
+    assert count(scene_of(TOP.format(gravity=gravity, joint=joint))) == expected
 
 
 @pytest.mark.parametrize(
@@ -217,16 +216,16 @@ def test_cyclic_coordinates_of_one_joint(tmp_path, gravity, kind, axis, more, ex
         ("[0.0, 0.0, -9.81]", "revolute", UP, "stiffness = 2.0", [0]),
     ],
 )
-def test_jacobians_leave_out_joints_that_only_move_what_nothing_reads(tmp_path, gravity, kind, axis, more, expected):
+def test_jacobians_leave_out_joints_that_only_move_what_nothing_reads(gravity, kind, axis, more, expected):
     joint = "" if kind is None else PIVOT.format(kind=kind, axis=axis, more=more)
-    scene = scene_of(tmp_path, TOP.format(gravity=gravity, joint=joint))
+    scene = scene_of(TOP.format(gravity=gravity, joint=joint))
     assert coordinates.unread(reduced_of(scene)).tolist() == expected
 
 
-def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is(tmp_path):
+def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is():
     joint = PIVOT.format(kind="spherical", axis=UP, more="")
     spring = "[springs.s]\nbodies = ['ground', 'top']\nat1 = [1.0, 0.0, 0.0]\nat2 = [0.0, 0.2, 0.0]\nstiffness = 1.0\n"
-    assert count(scene_of(tmp_path, TOP.format(gravity="[0.0, 0.0, -9.81]", joint=joint + spring))) == 0
+    assert count(scene_of(TOP.format(gravity="[0.0, 0.0, -9.81]", joint=joint + spring))) == 0
     assert count(ephs.load(SCENES[0].parent / "four-bar.toml")) == 0
 
 
@@ -298,8 +297,8 @@ temperature = 300.0
 """
 
 
-def test_mechanisms_that_share_ground_and_heat_only_are_separate(tmp_path):
-    step = named(ephs.reduce(scene_of(tmp_path, TWO)), "separate mechanisms")
+def test_mechanisms_that_share_ground_and_heat_only_are_separate():
+    step = named(ephs.reduce(scene_of(TWO)), "separate mechanisms")
     assert step.where == ("a", "b")
     assert "2 mechanisms of 1 to 3 degrees of freedom" in step.reason
 

@@ -8,6 +8,7 @@ import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve.model import compile_model
+from tests.written import scene_of_text
 
 SCENE = """format = 1
 name = "driven"
@@ -27,10 +28,8 @@ axis = [0.0, 0.0, 1.0]
 
 
 @pytest.mark.parametrize("motion", ["", "motion = { rate = 1.0 }"])
-def test_the_first_step_begins_with_all_unknowns(motion, tmp_path):
-    file = tmp_path / "driven.toml"
-    file.write_text(SCENE.format(motion=motion), encoding="utf-8")
-    scene = ephs.load(file)
+def test_the_first_step_begins_with_all_unknowns(motion):
+    scene = scene_of_text(SCENE.format(motion=motion))
     problem = problem_of_scene(scene)
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     assert ephs.reduce(scene).before == model.unknowns

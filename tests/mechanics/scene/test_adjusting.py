@@ -14,16 +14,15 @@ from ephs.mechanics.scene.kinematics import elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.spaces.rank import ASSEMBLY
+from tests.written import scene_of_text
 
 
 def text_of(crank="", rocker="", x=0.15, adjust="true"):
     return 'format = 1\nname = "guessed"\n' + ADJUSTED.format(crank=crank, rocker=rocker, x=x, adjust=adjust)
 
 
-def load(tmp_path, **given) -> Scene:
-    file = tmp_path / "guessed.toml"
-    file.write_text(text_of(**given), encoding="utf-8")
-    return ephs.load(file)
+def load(**given) -> Scene:
+    return scene_of_text(text_of(**given))
 
 
 def closed(scene: Scene) -> bool:
@@ -38,17 +37,17 @@ def closed(scene: Scene) -> bool:
     angle=st.floats(-0.3, 0.3), rate=st.floats(-8.0, 8.0), off=st.floats(-0.05, 0.05),
     kind=st.sampled_from(["rate = {}", "motion = {{ rate = {} }}"]),
 )  # fmt: skip
-def test_given_coordinates_and_rates_come_before_given_poses(tmp_path_factory, angle, rate, off, kind):
+def test_given_coordinates_and_rates_come_before_given_poses(angle, rate, off, kind):
     crank = f"coordinate = {angle!r}\n" + kind.format(repr(rate))
-    scene = load(tmp_path_factory.mktemp("scene"), crank=crank, x=0.15 + off)
+    scene = load(crank=crank, x=0.15 + off)
     assert closed(scene)
     assert scene.joint("a").coordinate[0] == pytest.approx(angle, abs=1e-8)
     assert scene.joint("a").rate[0] == pytest.approx(rate, abs=1e-7)
     assert scene.adjusted is None or not scene.adjusted.changed
 
 
-def test_where_given_rates_contradict_each_other_it_is_said_which_gave_way(tmp_path, capsys):
-    scene = load(tmp_path, crank="rate = 6.0", rocker="rate = 6.0")
+def test_where_given_rates_contradict_each_other_it_is_said_which_gave_way(capsys):
+    scene = load(crank="rate = 6.0", rocker="rate = 6.0")
     assert closed(scene)
     changed = {(c.joint, c.what): c for c in scene.adjusted.changed}
     assert set(changed) <= {("a", "rate"), ("d", "rate")} and changed
@@ -58,7 +57,7 @@ def test_where_given_rates_contradict_each_other_it_is_said_which_gave_way(tmp_p
 
 
 def test_what_moved_is_said_by_checks_and_stands_in_the_summary(tmp_path):
-    scene = load(tmp_path, crank="rate = 6.0", x=0.17)
+    scene = load(crank="rate = 6.0", x=0.17)
     item = next(item for item in check_model(scene).items if item.name == "adjusted")
     assert "crank: moved" in item.detail
     sol = ephs.simulate(scene, 0.01, method="rk54")

@@ -3,6 +3,7 @@
 import pytest
 
 import ephs
+from tests.written import scene_of_text
 
 PAIR = """format = 1
 name = "pair"
@@ -20,16 +21,14 @@ frame2 = {{ position = [{back!r}, 0.0, 0.0] }}
 """
 
 
-def arm(length, off, tmp_path):
+def arm(length, off):
     mass = 2.0
-    file = tmp_path / "pair.toml"
     half, inertia = 0.5 * length, mass * length**2 / 12.0
-    file.write_text(PAIR.format(mass=mass, inertia=inertia, half=half, back=-half, off=off), encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text(PAIR.format(mass=mass, inertia=inertia, half=half, back=-half, off=off))
 
 
 @pytest.mark.parametrize("length", [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e5])
-def test_a_gap_is_measured_by_the_mechanism(length, tmp_path):
-    assert arm(length, 1e-9 * length, tmp_path).joint("pin").coordinate.shape == (1,)
+def test_a_gap_is_measured_by_the_mechanism(length):
+    assert arm(length, 1e-9 * length).joint("pin").coordinate.shape == (1,)
     with pytest.raises(ephs.SceneError, match="a gap of"):
-        arm(length, 1e-7 * length, tmp_path)
+        arm(length, 1e-7 * length)

@@ -7,6 +7,7 @@ from scipy.spatial import ConvexHull
 import ephs
 from ephs.mechanics.scene import polytope
 from ephs.mechanics.scene.polytope import MOST_VERTICES
+from tests.written import scene_of_text
 
 SCENE = """
 format = 1
@@ -224,10 +225,9 @@ def test_a_contact_has_one_fault(table, key, found, expected, tmp_path):
     told(tmp_path, SCENE + table, f"contacts.one{key}", found, expected)
 
 
-def test_the_scenes_that_are_spoiled_above_are_sound(tmp_path):
+def test_the_scenes_that_are_spoiled_above_are_sound():
     for text in (SCENE, HARD, SCENE + CONTACT):
-        (tmp_path / "sound.toml").write_text(text, encoding="utf-8")
-        assert ephs.load(tmp_path / "sound.toml").contacts
+        assert scene_of_text(text).contacts
 
 
 def test_a_large_mesh_is_not_read(tmp_path, monkeypatch):
@@ -237,17 +237,13 @@ def test_a_large_mesh_is_not_read(tmp_path, monkeypatch):
     assert fault.found == "large.stl, a file of more than 1 MB"
 
 
-def test_bodies_that_fixed_joints_connect_do_not_meet(tmp_path):
+def test_bodies_that_fixed_joints_connect_do_not_meet():
     """Neither is an overlap of theirs, which nothing changes, a fault."""
-    file = tmp_path / "welded.toml"
-    file.write_text(HARD.replace("0.5, 0.15]", "0.0, 0.3]") + WELDS, encoding="utf-8")
-    assert not ephs.load(file).contacts
+    assert not scene_of_text(HARD.replace("0.5, 0.15]", "0.0, 0.3]") + WELDS).contacts
 
 
-def test_an_overlap_of_elastic_surfaces_at_the_start_is_told(tmp_path):
-    file = tmp_path / "deep.toml"
-    file.write_text(SCENE.replace("0.0, 0.15]", "0.0, 0.07]"), encoding="utf-8")
+def test_an_overlap_of_elastic_surfaces_at_the_start_is_told():
     with pytest.warns(
         ephs.SceneWarning, match=r"contacts\.ball_floor: found ball and floor 0\.03 m deep in each other"
     ):
-        ephs.load(file)
+        scene_of_text(SCENE.replace("0.0, 0.15]", "0.0, 0.07]"))

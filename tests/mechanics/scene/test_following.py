@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from tests.written import scene_of_text
 
 TENDON = """<mujoco><option gravity="0 0 0"/><worldbody>
 <body name="a"><joint name="ja" axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>
@@ -103,12 +104,10 @@ RATIOS = st.sampled_from([-2.0, -0.5, 0.3, 1.0, 4.0])
 
 @settings(deadline=None, max_examples=15)
 @given(st.tuples(RATIOS, RATIOS, RATIOS), st.sets(st.sampled_from(["j0", "j1", "j2"]), min_size=1, max_size=2))
-def test_gears_keep_their_offsets_whatever_is_given(tmp_path_factory, ratios, names):
+def test_gears_keep_their_offsets_whatever_is_given(ratios, names):
     a, b, c = ratios
-    file = tmp_path_factory.mktemp("train") / "train.toml"
     text = WHEELS.format(bodies="".join(WHEEL.format(i=i) for i in range(4)), a=a, b=b, c=c)
-    file.write_text(text, encoding="utf-8")
-    scene = ephs.load(file)
+    scene = scene_of_text(text)
     there = scene.with_state(dict.fromkeys(sorted(names), 0.4))
     x = {name: float(j.coordinate[0]) for name, j in there.all_joints()}
     assert all(abs(x[name] - 0.4) <= 8 * np.finfo(float).eps for name in names)

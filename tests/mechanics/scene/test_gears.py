@@ -9,6 +9,7 @@ import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
+from tests.written import scene_of_text
 
 MASS, TURNING, RATIO, LOSS, GRAVITY = 5.0, 0.02, 10.0, 0.05, 9.81
 HOIST = f"""
@@ -43,9 +44,8 @@ temperature = 300.0
 
 
 @pytest.fixture
-def hoist(tmp_path):
-    (tmp_path / "hoist.toml").write_text(HOIST)
-    return ephs.load(tmp_path / "hoist.toml")
+def hoist():
+    return scene_of_text(HOIST)
 
 
 def falling(t):
@@ -103,7 +103,7 @@ def test_units_text_and_parameters_of_gears(hoist):
     assert np.allclose(run["joints.rail.rate"][-1, 0], near, rtol=1e-6)
 
 
-def test_a_differential_divides_its_rate(tmp_path):
+def test_a_differential_divides_its_rate():
     text = HOIST.replace(
         'joints = ["shaft", "rail"]\nratio = 10.0', 'joints = ["shaft", "rail", "other"]\nratio = [5.0, 5.0]'
     )
@@ -118,8 +118,7 @@ bodies = ["ground", "mass"]
 at = [0.2, 0.0, -1.0]
 axis = [0.0, 0.0, 1.0]
 """
-    (tmp_path / "two.toml").write_text(text)
-    sol = ephs.simulate(ephs.load(tmp_path / "two.toml"), 0.2, method="rk87")
+    sol = ephs.simulate(scene_of_text(text), 0.2, method="rk87")
     one, two, drum = (sol.joint(name).rate[:, 0] for name in ("rail", "other", "shaft"))
     assert np.allclose(drum, 5.0 * (one + two), rtol=0.0, atol=1e-12)
     assert np.allclose(one, two, rtol=1e-12, atol=1e-12)
@@ -136,8 +135,7 @@ axis = [0.0, 0.0, 1.0]
         ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*a rate of shaft of 0"),
     ],
 )
-def test_what_does_not_fit_is_told_by_its_key(tmp_path, old, new, words):
+def test_what_does_not_fit_is_told_by_its_key(old, new, words):
     assert old in HOIST
-    (tmp_path / "hoist.toml").write_text(HOIST.replace(old, new))
     with pytest.raises(ephs.SceneError, match=words):
-        ephs.load(tmp_path / "hoist.toml")
+        scene_of_text(HOIST.replace(old, new))

@@ -9,6 +9,7 @@ import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
 from tests.mechanics.tree import machines
+from tests.written import scene_of_text
 
 SCENE = machines.SCENES / "motor-four-bar.toml"
 END = ("motors.drive.coil.b", "motors.drive.rotor.p", "thermal.housing.s")
@@ -75,12 +76,11 @@ def test_a_voltage_is_an_input_and_a_scene_survives_its_text():
         ("armature = 0.002 ", "motion = { rate = 1.0 }\narmature = 0.002 ", "joints.main.armature"),
     ],
 )
-def test_what_does_not_fit_is_told_by_its_key(tmp_path, old, new, words):
+def test_what_does_not_fit_is_told_by_its_key(old, new, words):
     text = SCENE.read_text()
     assert old in text
-    (tmp_path / "scene.toml").write_text(text.replace(old, new))
     with pytest.raises(ephs.SceneError, match=words.replace('"', ".")):
-        ephs.load(tmp_path / "scene.toml")
+        scene_of_text(text.replace(old, new))
 
 
 def test_currents_are_states_of_the_linearisation():

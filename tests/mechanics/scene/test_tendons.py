@@ -12,6 +12,7 @@ from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.operad import Path
+from tests.written import scene_of_text
 
 STIFFNESS, DAMPING, LENGTH = 100.0, 2.0, 1.5
 ARM = """
@@ -63,9 +64,8 @@ SPRING = STAY.replace("tendons", "springs").replace("points = [[", "at1 = [").re
 )  # fmt: skip
 
 
-def loaded(folder, more, state=(0.2, -0.4, 0.5, -0.7), **options):
-    (folder / "reach.toml").write_text(ARM.format(*state) + more)
-    return ephs.load(folder / "reach.toml", **options)
+def loaded(more, state=(0.2, -0.4, 0.5, -0.7), **options):
+    return scene_of_text(ARM.format(*state) + more, **options)
 
 
 def length(a, b):
@@ -85,10 +85,9 @@ angle = st.floats(-1.2, 1.2)
 
 @settings(max_examples=3)
 @given(angle, angle, angle, angle, st.floats(-20.0, 20.0))
-def test_forces_are_tension_times_the_gradient_of_the_length(tmp_path_factory, a, b, rate_a, rate_b, pull):
-    folder = tmp_path_factory.mktemp("scene")
+def test_forces_are_tension_times_the_gradient_of_the_length(a, b, rate_a, rate_b, pull):
     state = (a, b, rate_a, rate_b)
-    bare, tied = ephs.dynamics(loaded(folder, "", state)), loaded(folder, CABLE, state)
+    bare, tied = ephs.dynamics(loaded("", state)), loaded(CABLE, state)
     step = 1e-20j
     gradient = np.array([length(a + step, b).imag, length(a, b + step).imag]) / 1e-20
     tension = STIFFNESS * (length(a, b) - LENGTH) + DAMPING * (gradient @ [rate_a, rate_b]) + pull
@@ -115,8 +114,8 @@ def ended(scene, method, inputs=None, **options):
         ("variational", {"step": 0.01}, 1e-2),
     ],
 )
-def test_all_methods_pull_it(tmp_path, method, options, near):
-    scene, inputs = loaded(tmp_path, CABLE), {"actuators.cable": lambda t: 5.0 * np.sin(7.0 * t)}
+def test_all_methods_pull_it(method, options, near):
+    scene, inputs = loaded(CABLE), {"actuators.cable": lambda t: 5.0 * np.sin(7.0 * t)}
     exact, sure = ended(scene, "rk87", inputs, rtol=1e-11, atol=1e-12)
     found, sol = ended(scene, method, inputs, **options)
     assert sure.energy_error.max() < 1e-12
@@ -125,10 +124,8 @@ def test_all_methods_pull_it(tmp_path, method, options, near):
         assert sol.energy_error.max() < 1e-12
 
 
-def test_between_two_points_it_is_a_spring(tmp_path):
-    (exact, spring), (found, sol) = (
-        ended(loaded(tmp_path, more), "rk87", rtol=1e-11, atol=1e-12) for more in (SPRING, STAY)
-    )
+def test_between_two_points_it_is_a_spring():
+    (exact, spring), (found, sol) = (ended(loaded(more), "rk87", rtol=1e-11, atol=1e-12) for more in (SPRING, STAY))
     assert np.allclose(found, exact, rtol=0.0, atol=1e-9)
     assert sol.heat[-1] == pytest.approx(spring.heat[-1], rel=1e-8)
 
@@ -146,34 +143,35 @@ def test_between_two_points_it_is_a_spring(tmp_path):
         (("[tendons.cable]", "[actuators.winch]\n[tendons.cable]"), "actuators.winch", "either joints or a tendon"),
     ],
 )
-def test_what_is_no_tendon_is_said(tmp_path, change, key, expected):
+def test_what_is_no_tendon_is_said(change, key, expected):
     with pytest.raises(ephs.SceneError, match=key) as caught:
-        loaded(tmp_path, CABLE.replace(*change), (0.0, 0.0, 0.0, 0.0))
+        loaded(CABLE.replace(*change), (0.0, 0.0, 0.0, 0.0))
     assert expected in str(caught.value)
 
 
 @pytest.mark.parametrize("method", ["rk87", "radau", "natural"])
-def test_antagonists_lie_beside_each_other(tmp_path, method):
+def test_antagonists_lie_beside_each_other(method):
     pair = STAY + STAY.partition("[thermal")[0].replace("stay", "other").replace("0.1, 0.4]", "-0.1, -0.4]")
     steps = {"step": 2e-3} if method == "natural" else {"rtol": 1e-8}
     pulled = {"actuators.other": 20.0}
-    still, sol = (ended(loaded(tmp_path, pair), method, given, **steps) for given in ({}, pulled))
+    still, sol = (ended(loaded(pair), method, given, **steps) for given in ({}, pulled))
     assert sol[1].energy_error.max() < 1e-11
     assert sol[0][0] > still[0][0] + 1e-3
 
 
-def test_an_actuator_pulls_at_a_tendon_by_its_ratio_within_its_limits(tmp_path):
+def test_an_actuator_pulls_at_a_tendon_by_its_ratio_within_its_limits():
     winch = '[actuators.winch]\ntendon = "cable"\nratio = -2.0\nlimits = [0.0, 3.0]\n'
-    scene = loaded(tmp_path, CABLE + winch)
+    scene = loaded(CABLE + winch)
     one, other = (ended(scene, "rk87", given)[0] for given in ({"actuators.winch": 5.0}, {"actuators.cable": 6.0}))
     assert np.allclose(one, other, rtol=0.0, atol=1e-12)
     assert not np.allclose(one, ended(scene, "rk87")[0], atol=1e-3)
 
 
 def test_documents_parts_and_units_keep_tendons(tmp_path):
-    scene = loaded(tmp_path, CABLE)
+    scene = loaded(CABLE)
     text = scene_to_text(scene)
     assert scene_to_text(scene_from_text(text)) == text
+    (tmp_path / "reach.toml").write_text(ARM.format(0.2, -0.4, 0.5, -0.7) + CABLE)
     (tmp_path / "two.toml").write_text('format = 1\n[parts.left]\nuse = "reach.toml"\nposition = [0.3, 0.2, 0.0]\n')
     part = ephs.load(tmp_path / "two.toml")
     (angles, _), sol = ended(scene, "rk87"), ephs.simulate(part, 0.3, method="rk87", audit="off")
@@ -184,8 +182,8 @@ def test_documents_parts_and_units_keep_tendons(tmp_path):
     )
 
 
-def test_a_tiny_mechanism_does_as_a_large_one(tmp_path):
-    scene = loaded(tmp_path, CABLE)
+def test_a_tiny_mechanism_does_as_a_large_one():
+    scene = loaded(CABLE)
     tiny = rescaled(scene, 1e-5, 1e-12, 1e-3)  # by whose actuators one control is as much
     one = ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
     other = ephs.simulate(tiny, 3e-4, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
@@ -195,17 +193,17 @@ def test_a_tiny_mechanism_does_as_a_large_one(tmp_path):
     assert 1e5 * other[at].ravel()[-1] == pytest.approx(one[at].ravel()[-1], rel=1e-8)
 
 
-def test_the_length_is_a_state_where_it_stores_energy(tmp_path):
-    sol = ended(loaded(tmp_path, CABLE), "rk87", rtol=1e-11, atol=1e-12)[1]
+def test_the_length_is_a_state_where_it_stores_energy():
+    sol = ended(loaded(CABLE), "rk87", rtol=1e-11, atol=1e-12)[1]
     whole = sol["tendons.cable.spring.q"].ravel() + np.sqrt(0.05)  # with what lies along the arm
     assert whole[0] == pytest.approx(length(0.2, -0.4), rel=1e-14)
     angles = (sol.joint(name).coordinate[-1, 0] for name in ("pin", "elbow"))
     assert whole[-1] == pytest.approx(length(*angles), rel=1e-10)
 
 
-def test_at_rest_tension_balances_weight(tmp_path):
+def test_at_rest_tension_balances_weight():
     """Forces are weights and k (ℓ − L) times the gradients of heights and length, by complex steps."""
-    found = ephs.equilibrium(loaded(tmp_path, CABLE))
+    found = ephs.equilibrium(loaded(CABLE))
     angles = np.array([found.model.joint(name).coordinate[0] for name in ("pin", "elbow")])
 
     def energy(a, b):
@@ -221,14 +219,14 @@ def test_at_rest_tension_balances_weight(tmp_path):
     assert np.abs(still.joint("pin").coordinate[-1] - angles[0]) < 1e-9
 
 
-def test_loads_beside_sprung_tendons_have_no_static_path(tmp_path):
+def test_loads_beside_sprung_tendons_have_no_static_path():
     with pytest.raises(ValueError, match=r"tendons\.cable and loads"):
-        ephs.equilibrium(loaded(tmp_path, CABLE + '[loads.push]\nbody = "hand"\nforce = [0.0, 0.0, 1.0]\n'))
+        ephs.equilibrium(loaded(CABLE + '[loads.push]\nbody = "hand"\nforce = [0.0, 0.0, 1.0]\n'))
 
 
 @pytest.mark.parametrize(("key", "value"), [("stiffness", STIFFNESS), ("damping", DAMPING), ("length", LENGTH)])
-def test_sensitivities_to_its_numbers_are_exact(tmp_path, key, value):
-    scene, path = loaded(tmp_path, CABLE), f"tendons.cable.{key}"
+def test_sensitivities_to_its_numbers_are_exact(key, value):
+    scene, path = loaded(CABLE), f"tendons.cable.{key}"
     found = ephs.sensitivity(scene, [path], 0.3, method="rk87", rtol=1e-11, atol=1e-12, save_at=[0.0, 0.3])
     slope = found.of(lambda sol: sol.joint("pin").coordinate[:, 0])[-1, 0]
     step = 1e-3 * value

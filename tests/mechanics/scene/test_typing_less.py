@@ -8,12 +8,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
-import ephs
 from ephs.mechanics.scene import SceneError
 from ephs.mechanics.scene.entries import validate
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.rotations import RotationEntry
 from ephs.mechanics.scene.schema import BodyEntry
+from tests.written import scene_of_text
 
 ANGLES = st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3)
 LENGTH = st.floats(0.01, 2.0)
@@ -97,14 +97,12 @@ def test_inertia_of_shapes_is_the_integral_over_them(shape, angles, place, densi
 GIVEN = "mass = 1.0\ninertia = [1, 1, 1]\n"
 
 
-def scene(tmp_path, body):
-    file = tmp_path / "a.toml"
-    file.write_text(f"format = 1\n[bodies.a]\n{body}\n")
-    return ephs.load(file)
+def scene(body):
+    return scene_of_text(f"format = 1\n[bodies.a]\n{body}\n")
 
 
-def test_a_scene_takes_both(tmp_path):
-    found = scene(tmp_path, "density = 2.0\nshape = { box = [1, 1, 1] }\nrotation = { rpy_deg = [0, 0, 90] }").body("a")
+def test_a_scene_takes_both():
+    found = scene("density = 2.0\nshape = { box = [1, 1, 1] }\nrotation = { rpy_deg = [0, 0, 90] }").body("a")
     assert found.mass == 2.0
     np.testing.assert_allclose(found.inertia, np.eye(3) / 3, rtol=1e-15)
     np.testing.assert_allclose(found.pose[:4], [0.5**0.5, 0, 0, 0.5**0.5], atol=1e-16)
@@ -125,9 +123,9 @@ def test_a_scene_takes_both(tmp_path):
         ("GIVENrotation = 3", "bodies.a.rotation", "quaternion"),
     ],
 )  # fmt: skip
-def test_faults_name_the_key(tmp_path, body, key, words):
+def test_faults_name_the_key(body, key, words):
     with pytest.raises(SceneError) as caught:
-        scene(tmp_path, body.replace("GIVEN", GIVEN))
+        scene(body.replace("GIVEN", GIVEN))
     (fault,) = caught.value.faults
     assert fault.key == key
     assert words in str(fault)

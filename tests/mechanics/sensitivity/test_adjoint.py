@@ -12,6 +12,7 @@ from ephs.solve.errors import OptionError
 from tests.mechanics.sensitivity.test_exact import PENDULUM, pendulum
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
 from tests.solve.test_own_methods import Kutta
+from tests.written import scene_of_text
 
 NEAR = 1e-12
 """Part of the largest derivative: both ways round the same derivatives of some thousand operations a step."""
@@ -113,12 +114,10 @@ def test_systems_with_what_is_attached_as_tangents_say(machine, paths, joint):
     assert np.abs(mine - expected).max() <= READ * np.abs(expected).max()
 
 
-def test_a_pendulum_as_a_complex_step_says(tmp_path, monkeypatch):
+def test_a_pendulum_as_a_complex_step_says(monkeypatch):
     """Of the method's plain steps: f(x + i ε)/ε has no difference in which digits cancel."""
     monkeypatch.setattr(explicit, "StepTangent", lambda *given, corrected: StepTangent(*given, corrected=False))
-    file = tmp_path / "pendulum.toml"
-    file.write_text(PENDULUM)
-    scene = ephs.load(file).with_state({"pin": 0.6}, {"pin": 1.1})
+    scene = scene_of_text(PENDULUM).with_state({"pin": 0.6}, {"pin": 1.1})
     values = np.array([2.0, 0.3, 0.7, 0.2, 1.5, 9.81, 0.6, 1.1])
     paths = ["bodies.rod.mass", "bodies.rod.inertia[2]", "joints.pin.frame2.position[1]", "joints.pin.friction",
              "joints.pin.stiffness", "world.gravity[1]", "joints.pin.coordinate", "joints.pin.rate"]  # fmt: skip
@@ -133,11 +132,9 @@ def test_a_pendulum_as_a_complex_step_says(tmp_path, monkeypatch):
     assert np.abs(mine - slopes).max() <= 1e-12 * np.abs(slopes).max()
 
 
-def test_through_a_contact_that_slips_as_tangents_say(tmp_path):
+def test_through_a_contact_that_slips_as_tangents_say():
     """A ball on a slide strikes a floor that moves past it: the force is a power of a depth that was none."""
-    file = tmp_path / "striking.toml"
-    file.write_text(STRIKING)
-    scene = ephs.load(file)
+    scene = scene_of_text(STRIKING)
     paths = ["bodies.ball.mass", "bodies.carriage.mass", "world.gravity[2]", "joints.fall.coordinate",
              "joints.slide.rate"]  # fmt: skip
     weights = {"joints.fall.rate": [0.4, 1.0], "joints.slide.rate": [0.0, -2.0]}

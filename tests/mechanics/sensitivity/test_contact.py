@@ -6,6 +6,7 @@ import pytest
 import ephs
 from ephs.mechanics.scene.parameters import varied
 from ephs.solve.errors import OptionError
+from tests.written import scene_of_text
 
 SCENE = """
 format = 1
@@ -30,10 +31,8 @@ VALUES = [1e4, 0.2, 0.3, 1.0]
 STEP, UNTIL = 2e-4, 0.12
 
 
-def scene_of(folder, law=SOFT):
-    file = folder / "thrown.toml"
-    file.write_text(SCENE.replace("{law}", law), encoding="utf-8")
-    return ephs.load(file)
+def scene_of(law=SOFT):
+    return scene_of_text(SCENE.replace("{law}", law))
 
 
 def end(sol):
@@ -46,8 +45,8 @@ def run(scene, path=None, value=None):
     return end(ephs.simulate(model, UNTIL, method="rk54", step=STEP, audit="off"))
 
 
-def test_sensitivities_through_contact_are_those_of_differences(tmp_path):
-    scene = scene_of(tmp_path)
+def test_sensitivities_through_contact_are_those_of_differences():
+    scene = scene_of()
     found = ephs.sensitivity(scene, PATHS, UNTIL, method="rk54", step=STEP)
     slopes = found.of(end)
     touched = ephs.simulate(scene, UNTIL, method="rk54", step=STEP, audit="off").contact("ball_floor")
@@ -59,8 +58,8 @@ def test_sensitivities_through_contact_are_those_of_differences(tmp_path):
         assert slope == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
 
 
-def test_a_sweep_through_contact_is_its_runs(tmp_path):
-    scene, values, path = scene_of(tmp_path), [0.1, 0.3, 0.6], "contacts.ball_floor.friction"
+def test_a_sweep_through_contact_is_its_runs():
+    scene, values, path = scene_of(), [0.1, 0.3, 0.6], "contacts.ball_floor.friction"
     found = ephs.sweep(
         scene, {path: values}, UNTIL, outputs=["joints.ball.rate"], save_at=[0.0, UNTIL], method="rk54", step=STEP
     )
@@ -72,7 +71,7 @@ def test_a_sweep_through_contact_is_its_runs(tmp_path):
     assert np.ptp(rates[:, 3]) > 1e-2, "it slips"
 
 
-def test_hard_contact_says_that_it_has_no_derivative(tmp_path):
-    scene = scene_of(tmp_path, "restitution = 0.5")
+def test_hard_contact_says_that_it_has_no_derivative():
+    scene = scene_of("restitution = 0.5")
     with pytest.raises(OptionError, match="impulses"):
         ephs.sensitivity(scene, ["bodies.ball.mass"], UNTIL, method="rk54", step=STEP)

@@ -16,6 +16,7 @@ from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from tests.mechanics.tree.engine.test_engine import moved
+from tests.written import scene_of_text
 
 EXACT = 1e-12
 """Part of the largest derivative: 10 κ ε of some hundred operations."""
@@ -60,15 +61,13 @@ def pendulum(numbers, method, h, steps):
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87"])
-def test_a_pendulum_as_a_complex_step_says(tmp_path, method, monkeypatch):
+def test_a_pendulum_as_a_complex_step_says(method, monkeypatch):
     """f(x + i ε)/ε has no difference in which digits cancel: derivatives by eight numbers, to rounding.
 
     Of the method's plain steps, without the correction that keeps the balance.
     """
     monkeypatch.setattr(explicit, "StepTangent", lambda *given, corrected: StepTangent(*given, corrected=False))
-    file = tmp_path / "pendulum.toml"
-    file.write_text(PENDULUM)
-    scene = ephs.load(file).with_state({"pin": 0.6}, {"pin": 1.1})
+    scene = scene_of_text(PENDULUM).with_state({"pin": 0.6}, {"pin": 1.1})
     values = [2.0, 0.3, 0.7, 0.2, 1.5, 9.81, 0.6, 1.1]
     paths = ["bodies.rod.mass", "bodies.rod.inertia[2]", "joints.pin.frame2.position[1]", "joints.pin.friction",
              "joints.pin.stiffness", "world.gravity[1]", "joints.pin.coordinate", "joints.pin.rate"]  # fmt: skip

@@ -76,7 +76,7 @@ def test_a_noisy_motion_gives_them_within_three_deviations(case):
 
 
 def test_a_system_is_fitted_with_its_initial_value():
-    truth = ephs.simulate(oscillator(), 2.0, step=0.05, initial={"osc.pe.q": 1.0})
+    truth = ephs.simulate(oscillator(), 1.0, step=0.05, initial={"osc.pe.q": 1.0})
     start = {"osc.pe.k": 1.0, "mf.d": 0.3, "osc.pe.q": 0.7}
     data = {"t": truth.t, "osc.pe.q": np.where(np.arange(truth.t.size) % 3, truth["osc.pe.q"], np.nan)}
     found = ephs.fit(oscillator(), data, list(start), start=start, step=0.05)

@@ -10,6 +10,7 @@ import ephs
 from ephs.mechanics.shapes.pairs import ROUNDED, touches
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.written import scene_of_text
 
 UNIT = np.array([1.0, 0.0, 0.0, 0.0])
 LENGTH = st.floats(0.1, 1.0)
@@ -105,16 +106,14 @@ def test_normals_are_slopes_of_gaps(seed):
         assert rate == pytest.approx((ends[0] - ends[1]) / (2.0 * step), abs=1e-7)
 
 
-def scene_of(tmp_path, law, *boxes, pairs=()):
+def scene_of(law, *boxes, pairs=()):
     parts = [HEAD, "shape = { plane = {} }\n", law]
     for name, at, sizes in boxes:
         x, y, z = (size**2 for size in sizes)
         inertia = [(y + z) / 12.0, (x + z) / 12.0, (x + y) / 12.0]
         parts.append(BOX.format(name=name, at=list(at), sizes=list(sizes), inertia=inertia, law=law))
     parts += [f'[contacts.{one}_{other}]\nsurfaces = ["{one}", "{other}"]\n' for one, other in pairs]
-    file = tmp_path / "boxes.toml"
-    file.write_text("".join(parts), encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text("".join(parts))
 
 
 @pytest.mark.parametrize(
@@ -126,28 +125,28 @@ def scene_of(tmp_path, law, *boxes, pairs=()):
     ],
     ids=["equal", "aside", "across"],
 )
-def test_a_hard_box_rests_on_a_box(lower, upper, at, tmp_path):
+def test_a_hard_box_rests_on_a_box(lower, upper, at):
     """By corners, or across by edges alone: it does not move at all, and presses with its weight."""
-    scene = scene_of(tmp_path, HARD, ("a", [0.0, 0.0, 0.1], lower), ("b", at, upper))
+    scene = scene_of(HARD, ("a", [0.0, 0.0, 0.1], lower), ("b", at, upper))
     sol = ephs.simulate(scene, 2.0**-5, method="rk54", step=2.0**-5, save_at=[2.0**-5], audit="off")
     assert sol.body("b").position[-1] == pytest.approx(at, abs=1e-12)
     assert sol.contact("a_b").force[-1] == pytest.approx([0.0, 0.0, G], abs=1e-6)
     assert np.abs(sol.contact("floor_a").force[-1]) == pytest.approx([0.0, 0.0, 2.0 * G], abs=1e-6)
 
 
-def test_a_box_beyond_the_edge_tips_over(tmp_path):
-    scene = scene_of(tmp_path, HARD, ("a", [0.0, 0.0, 0.1], [0.2] * 3), ("b", [0.11, 0.0, 0.3], [0.2] * 3))
+def test_a_box_beyond_the_edge_tips_over():
+    scene = scene_of(HARD, ("a", [0.0, 0.0, 0.1], [0.2] * 3), ("b", [0.11, 0.0, 0.3], [0.2] * 3))
     sol = ephs.simulate(scene, 0.1, method="rk54", step=2.0**-7, audit="off")
     assert sol.body("b").angular_velocity[-1, 1] > 0.1
     assert np.abs(sol.energy_error).max() <= 1e-11
 
 
-def test_a_stack_of_ten_elastic_boxes_stands(tmp_path):
+def test_a_stack_of_ten_elastic_boxes_stands():
     """It sinks by less than four times what four points would give way, and does not turn or move aside."""
     names = [f"b{i}" for i in range(10)]
     boxes = [(name, [0.0, 0.0, 0.1 + 0.2 * i], [0.2] * 3) for i, name in enumerate(names)]
     pairs = list(zip(["floor", *names], names, strict=False))
-    scene = scene_of(tmp_path, SOFT, *boxes, pairs=pairs)
+    scene = scene_of(SOFT, *boxes, pairs=pairs)
     sol = ephs.simulate(scene, 0.1, method="radau", rtol=1e-3, atol=1e-6, save_at=np.linspace(0.0, 0.1, 11))
     assert np.abs(sol.energy_error).max() <= 1e-11
     assert sol.stats["least_production"] >= 0.0

@@ -11,6 +11,7 @@ from ephs.mechanics.shapes.gap import PENETRATED, UPRIGHT
 from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.semantics.spaces import SE3
 from tests.mechanics.elements.test_surface_pairs import DRAWN
+from tests.written import scene_of_text
 
 STEP, SMALL, FAR = 1e-3, 1e-7, 0.8
 SPAN = 0.2
@@ -40,16 +41,14 @@ stiffness = {stiffness}
 """
 
 
-def dropped(tmp_path, shape, z, stiffness):
+def dropped(shape, z, stiffness):
     """A ball above a shape; two surfaces in series have half the stiffness."""
-    file = tmp_path / "ball.toml"
-    file.write_text(SCENE.format(g=G, mass=MASS, radius=RADIUS, z=z, shape=shape, stiffness=2.0 * stiffness))
-    return ephs.load(file)
+    return scene_of_text(SCENE.format(g=G, mass=MASS, radius=RADIUS, z=z, shape=shape, stiffness=2.0 * stiffness))
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 @given(seed=st.integers(0, 2**20))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 def test_normals_are_slopes_of_gaps_until_the_centre_is_near(pair, seed):
     """Of one shape that moves to the centre of the other: gaps change by no more than it moves, and by the normal.
 
@@ -93,20 +92,21 @@ def test_normals_are_slopes_of_gaps_until_the_centre_is_near(pair, seed):
 
 
 @pytest.mark.parametrize("shape", THICK)
-def test_a_ball_swings_on_a_face_that_its_centre_enters(shape, tmp_path):
+def test_a_ball_swings_on_a_face_that_its_centre_enters(shape):
     """It begins at the touch, so that its centre is at the surface's height less r cos ω t; z − r (1 − cos ω t)."""
     stiffness, until = MASS * G / (0.9 * RADIUS), 0.6
-    run = ephs.simulate(dropped(tmp_path, THICK[shape], 0.2 + RADIUS, stiffness), until, method="rk87", rtol=1e-10)
+    run = ephs.simulate(dropped(THICK[shape], 0.2 + RADIUS, stiffness), until, method="rk87", rtol=1e-10)
     swing = 0.9 * RADIUS * (1.0 - np.cos(np.sqrt(stiffness / MASS) * run.t))
     assert swing.max() > 1.5 * RADIUS
     assert np.abs(run.body("ball").position[:, 2] - (0.2 + RADIUS - swing)).max() <= 1e-8
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("shape", THIN)
-def test_a_run_ends_where_a_ball_passes_the_middle(shape, method, tmp_path):
+@pytest.mark.parametrize(
+    ("shape", "method"), [*(("box", name) for name in METHODS), *((shape, "rk54") for shape in THIN if shape != "box")]
+)
+def test_a_run_ends_where_a_ball_passes_the_middle(shape, method):
     kind = METHODS[method]
-    scene = dropped(tmp_path, THIN[shape], 0.3, 100.0)
+    scene = dropped(THIN[shape], 0.3, 100.0)
     options = {} if method in ("rk54", "rk87", "radau") else {"step": 2e-3}
     with pytest.raises(ephs.SimulationError) as failure:
         ephs.simulate(scene, 0.5, method=kind.name, **options)

@@ -21,6 +21,7 @@ from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 ROOT = Path(__file__).parents[3]
 SCENES = ROOT / "scenes"
@@ -117,14 +118,12 @@ def test_members_of_any_mechanism_by_any_number(scene, data):
             agree(scene, table, [{"member": k}], 1e-9, rtol=1e-7, atol=1e-7)
 
 
-def test_what_two_paths_change_together_is_built_in_full(tmp_path):
+def test_what_two_paths_change_together_is_built_in_full():
     scene = ephs.load(CHAIN)
     apart = Axes.of({"bodies.rod1.mass": [1.0, 2.0], "bodies.rod2.mass": [1.0, 2.0]}, paired=False)
-    file = tmp_path / "welded.toml"
-    file.write_text(WELDED)
     # the moment of a mass that begins with the arm 0 is changed by neither alone
     product = Axes.of({"joints.weld.frame1.position[0]": [0.0, 0.2], "bodies.two.mass": [1.0, 2.0]}, paired=False)
-    for model, axes in ((scene, apart), (ephs.load(file), product)):
+    for model, axes in ((scene, apart), (scene_of_text(WELDED), product)):
         ensemble = Ensemble(model, axes, 0.0, 0.1, TIMES, {}, outputs_of(model, None))
         assert_built(ensemble.images, axes.members)
 
@@ -152,10 +151,9 @@ def test_a_member_unlike_the_others_is_run_on_its_own():
         agree(scene, table, [{"joints.j0.friction": k}], 1e-9, rtol=1e-7, atol=1e-7)
 
 
-def test_members_of_what_is_prescribed_keep_its_longest_step(tmp_path):
+def test_members_of_what_is_prescribed_keep_its_longest_step():
     text = (SCENES / "slider-crank.toml").read_text().replace("drive = 0.06", "motion = { rate = 10.0 }")
-    (tmp_path / "turned.toml").write_text(text)
-    scene = ephs.load(tmp_path / "turned.toml")
+    scene = scene_of_text(text)
     for options in ({}, {"method": "rk54", "step": 0.002}):
         vary = {"joints.bearing.friction": [0.001, 0.004], "bodies.rod.mass": [0.15, 0.3]}
         table = ephs.sweep(scene, vary, 0.05, save_at=TIMES, outputs=["work", "heat"], **options)
