@@ -40,7 +40,7 @@ def page(tmp_path_factory):
     before, out = dict(REGISTERED), {}
     folder = tmp_path_factory.mktemp("page")
     for cell in CELLS:
-        classes = re.search(r"^@register_element\n(?:.*\n)*?(?=\n\nPath)", cell, re.MULTILINE)
+        classes = re.search(r"^@register_element\n(?:.*\n)*?(?=\n\n\(folder)", cell, re.MULTILINE)
         imports = cell.partition("\n\n\n@register_element")[0] if "import" in cell else ""
         if classes:
             exec(imports.replace('sys.path.insert(0, "..")', "") + "\n" + classes[0], out)
@@ -471,6 +471,16 @@ def test_a_run_goes_on_from_the_end_of_another_or_is_refused(tmp_path):
     with pytest.raises(ephs.SceneError, match=r"pushes\.s: found the state spring\.q .* let continued"):
         odd = pushed(tmp_path, turns=2)
         odd.at(ephs.simulate(odd, 0.5, step=0.01), 0.5)
+
+
+def test_the_page_runs(capsys):
+    REGISTERED.clear()
+    out = {}
+    for cell in CELLS:
+        exec(cell, out)
+    said = capsys.readouterr().out
+    assert "broken.toml: 3 faults" in said and "-6.2642 m/s after 5 s; in the end -6.2642 m/s" in said
+    assert float(said.partition("length kept to ")[2].split()[0]) < 1e-13
 
 
 def test_its_lines_are_drawn_in_parts_too(tmp_path):
