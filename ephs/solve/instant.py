@@ -67,6 +67,35 @@ def is_velocity(quantity: Quantity) -> bool:
     return quantity.parity < 0 and quantity.kind != "flux_linkage"
 
 
+def rate_balances(d: Descriptor, x: Array) -> list[dict[int, float]]:
+    """Flow balances of junctions that store nothing, as conditions on velocities: effort -> coefficient.
+
+    Such a junction is that of a tendon's tension, where the rates of its segments and of its whole length add up to 0.
+    Balances with other terms than velocities are left out.
+    """
+    velocities = {i for slot in d.junctions if is_velocity(slot.quantity) for i in range(d.effort_size)[slot.efforts]}
+    inner = (slot for slot in d.junctions if not (slot.exposed or is_velocity(slot.quantity)))
+    rows: dict[int, dict[int, float]] = {i: {} for slot in inner for i in range(d.effort_size)[slot.efforts]}
+    for slot in d.components:
+        if not isinstance(slot.primitive, Reversible):
+            for effort in slot.efforts:
+                rows.pop(effort, None)
+    for slot in d.components:
+        if not isinstance(slot.primitive, Reversible) or rows.keys().isdisjoint(slot.efforts):
+            continue
+        left, constraint = slot.primitive.structure(d.point(slot, x))
+        for i, effort in enumerate(slot.efforts):
+            if effort not in rows:
+                continue
+            if np.any(constraint[:, i]):
+                del rows[effort]
+                continue
+            for other, by in zip(slot.efforts, left[i].tolist(), strict=True):
+                rows[effort][other] = rows[effort].get(other, 0.0) + by
+    found = ({other: by for other, by in row.items() if by} for row in rows.values())
+    return [row for row in found if row and row.keys() <= velocities]
+
+
 def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
     """Count motions and redundant constraints at a state.
 
@@ -76,6 +105,10 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
     for slot in descriptor.outer:
         if slot.path in prescribed:
             rows.append(np.eye(descriptor.effort_size)[slot.efforts])
+    for balance in rate_balances(descriptor, x):
+        row = np.zeros((1, descriptor.effort_size))
+        row[0, list(balance)] = list(balance.values())
+        rows.append(row)
     velocities = np.zeros(descriptor.effort_size, dtype=bool)
     for slot in descriptor.junctions:
         velocities[slot.efforts] = is_velocity(slot.quantity)

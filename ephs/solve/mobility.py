@@ -20,7 +20,7 @@ from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives import Reversible
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.instant import Mobility, is_velocity
+from ephs.solve.instant import Mobility, is_velocity, rate_balances
 from ephs.solve.sparse import Index
 
 SOUND = 1e-3
@@ -94,11 +94,17 @@ def _conditions(
         if slot.path in prescribed and slot.at in number:
             dim = int(dims[number[slot.at]])
             out.append(_Condition({number[slot.at]: np.eye(dim)}, np.ones(dim)))
+    for balance in rate_balances(d, x):
+        blocks: dict[int, Array] = {}
+        for effort, by in balance.items():
+            junction, i = junction_of[effort]
+            blocks.setdefault(junction, np.zeros((1, int(dims[junction]))))[0, i] = by
+        out.append(_Condition(blocks, np.linalg.norm(np.hstack(list(blocks.values())), axis=1)))
     for slot in d.components:
         if not (slot.multipliers and isinstance(slot.primitive, Reversible)):
             continue
         constraint = uncancelled(slot.primitive.structure(d.point(slot, x))[1], slot.efforts)
-        blocks: dict[int, Array] = {}
+        blocks = {}
         for column, effort in enumerate(slot.efforts):
             if effort in junction_of:
                 junction, i = junction_of[effort]

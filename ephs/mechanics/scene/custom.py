@@ -189,6 +189,10 @@ class Element(Entry):
         """What it is in pictures: from a point of a body to one of another, (3,) each in the body's frame."""
         return iter(())
 
+    def continued(self, states: Mapping[str, Array]) -> Self:
+        """The element that starts in states of its boxes, by their paths below ``SECTION.NAME``: see `Scene.at`."""
+        return self
+
     @classmethod
     def of_table(cls, name: str, table: Mapping[str, Any]) -> Self:
         """The element of a sound table.

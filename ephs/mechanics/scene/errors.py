@@ -186,6 +186,10 @@ TEXTS: dict[str, tuple[str, str]] = {
         "the stops' energy is part of the initial energy; set the joint's coordinate between them",
     ),
     "no scale": ("a stiffness, since the scene gives no time scale for a default", "add this key"),
+    "not continued": (
+        "a start that follows from poses and rates, or from its table",
+        "let continued(self, states) return an element that starts there",
+    ),
     "not built": ("an element that can be built", "correct its values"),
     "unknown surface": ("a surface", "{hint}"),
     "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),

@@ -12,6 +12,7 @@ from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.assembly import gyration, measure
 from ephs.mechanics.scene.attached import ATTACHED, Attachment, Gear
 from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.continuing import inner_states, lost_states
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.following import attachment_at, stretched, tied
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
@@ -249,11 +250,19 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     def attached(section: str) -> Callable[[str, Attachment], Attachment]:
         return lambda path, of: attachment_at(of, component_path(section, path + of.name), states)
 
-    return mapped(
+    def continued(section: str) -> Callable[[str, Any], Any]:
+        return lambda path, of: of.continued(inner_states(section, path + of.name, states))
+
+    own = {section for section, _, _ in scene.all_elements()}
+    found = mapped(
         there,
         {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])}
-        | {section: attached(section) for section in ATTACHED},
+        | {section: attached(section) for section in ATTACHED}
+        | {section: continued(section) for section in own},
     )
+    if faults := list(lost_states(found, states)):
+        raise SceneError(scene.name, faults)
+    return found
 
 
 def _given(now: Snapshot, values: Mapping[str, ArrayLike], what: str, where: str) -> dict[str, Array]:

@@ -17,7 +17,7 @@ from ephs.mechanics import Element, key, register_element, rule
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.custom import ElementError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.own_units import Units
+from ephs.mechanics.scene.own_units import Units, mobility_of
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.scene.reference import scene_tables
 from ephs.mechanics.scene.registry import REGISTERED
@@ -25,6 +25,8 @@ from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import json_schema
 from ephs.mechanics.scene.soundness import check_scene
 from ephs.show.lines import lines_of
+from ephs.solve import instant
+from ephs.solve.instant import Mobility
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "elements.md"
 CELLS = re.findall(r"```\{code-cell\} ipython3\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
@@ -38,7 +40,7 @@ def page(tmp_path_factory):
     before, out = dict(REGISTERED), {}
     folder = tmp_path_factory.mktemp("page")
     for cell in CELLS:
-        classes = re.search(r"^@register_element\n(?:.*\n)*?(?=\n\nPath)", cell, re.MULTILINE)
+        classes = re.search(r"^@register_element\n(?:.*\n)*?(?=\n\n\(folder)", cell, re.MULTILINE)
         imports = cell.partition("\n\n\n@register_element")[0] if "import" in cell else ""
         if classes:
             exec(imports.replace('sys.path.insert(0, "..")', "") + "\n" + classes[0], out)
@@ -84,6 +86,9 @@ class Push(Element, section="pushes", said="springs on joints"):
     ratio: float | None = key("a ratio", None, unit="1", gt=0.0)
     turns: int = key("a count", 1, ge=1)
     open: bool = key("a flag", False)
+
+    def continued(self, states):
+        return self.changed(stretch=float(states["spring.q"][0])) if self.turns == 1 else self
 
     @rule("stretch", expected="below 10", found="the stretch {stretch:g}")
     def small(self) -> bool:
@@ -251,6 +256,15 @@ def test_a_rod_keeps_its_length_and_swings_as_a_pendulum(tmp_path):
     assert ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 0.1).audit.passed
     with pytest.raises(ephs.OptionError, match=r"rods\.r\.line\.segment1\.st holds a rate"):
         ephs.simulate(loaded(tmp_path, text + table("rods", "r", rod)), 0.1, method="rk54")
+
+
+def test_a_rod_takes_one_freedom_and_a_tendon_none(tmp_path):
+    rod = {"bodies": ["ground", "ball"], "at1": [0.0, 0.0, 1.0], "at2": [0.0, 0.1, 0.0]}
+    cord = {"bodies": ["ground", "ball"], "points": [[0.0, 0.0, 1.0], [0.0, 0.1, 0.0]]}
+    for section, keys, count in (("rods", rod, 5), ("tendons", cord, 6)):
+        problem = problem_of_scene(loaded(tmp_path, FALL + table(section, "r", keys)))
+        x = problem.descriptor.pack(problem.initial)
+        assert mobility_of(problem) == instant.mobility(problem.descriptor, x) == Mobility(count, 0)
 
 
 def test_runs_in_other_units_agree(tmp_path):
@@ -444,6 +458,29 @@ def test_only_what_keys_name_is_connected(tmp_path):
     register_element(Sneaky)
     found = faults(tmp_path, FALL + "[sneaky.x]\n")["sneaky.x"]
     assert "the body ball" in found.found and found.expected == "an element that can be built"
+
+
+def test_a_run_goes_on_from_the_end_of_another_or_is_refused(tmp_path):
+    register_element(Push)
+    scene = pushed(tmp_path)
+    whole = ephs.simulate(scene, 1.0, step=0.01)
+    half = scene.at(whole, 0.5)
+    assert half.elements["pushes"]["s"].stretch == whole["pushes.s.spring.q"][50]
+    rest = ephs.simulate(half, 0.5, step=0.01)
+    assert rest.joint("rail").coordinate[-1] == pytest.approx(whole.joint("rail").coordinate[-1], abs=1e-12)
+    with pytest.raises(ephs.SceneError, match=r"pushes\.s: found the state spring\.q .* let continued"):
+        odd = pushed(tmp_path, turns=2)
+        odd.at(ephs.simulate(odd, 0.5, step=0.01), 0.5)
+
+
+def test_the_page_runs(capsys):
+    REGISTERED.clear()
+    out = {}
+    for cell in CELLS:
+        exec(cell, out)
+    said = capsys.readouterr().out
+    assert "broken.toml: 3 faults" in said and "-6.2642 m/s after 5 s; in the end -6.2642 m/s" in said
+    assert float(said.partition("length kept to ")[2].split()[0]) < 1e-13
 
 
 def test_its_lines_are_drawn_in_parts_too(tmp_path):
