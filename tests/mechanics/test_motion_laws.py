@@ -135,12 +135,7 @@ def cart(law, end):
 
 @pytest.mark.parametrize(
     ("method", "form"),
-    [
-        (name, form)
-        for name in METHODS
-        for form in FORMS
-        if name in ("rk87", "natural") or "times" in form
-    ],
+    [(name, form) for name in METHODS for form in FORMS if name in ("rk87", "natural") or "times" in form],
 )
 def test_pendulum_on_a_led_cart_by_every_method(method, form):
     scene, law, end = loaded(CART.replace("{motion}", form)), FORMS[form], 1.2
