@@ -54,7 +54,7 @@ class Steps:
         h = number_of("h", h)
         if not (np.isfinite(h) and h != 0.0):
             raise OptionError("h", h, "a number of seconds other than 0")
-        if method in EXPLICIT or isinstance(method, Method):
+        if isinstance(method, Method) or (isinstance(method, str) and method in EXPLICIT):
             return self._explicit(state, h, tableau(method, chosen=False))
         of, _ = chosen(method, self._problem, step=abs(h))
         tolerance = Tolerance.of("rtol", RTOL, RTOL), Tolerance.of("atol", ATOL, ATOL)

@@ -27,7 +27,7 @@ def reading_program() -> Program:
 
 @cache
 def _taped(entry: Entry) -> Program:
-    return Program("taped", level=0, run=entry.taped())
+    return Program("taped", 0, run=entry.taped())
 
 
 @final

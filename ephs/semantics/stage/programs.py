@@ -41,7 +41,7 @@ class Program:
         The entry functions, each under its name.
     """
 
-    def __init__(self, name: str, *, level: int = LEVEL, **entries: Entry) -> None:
+    def __init__(self, name: str, level: int = LEVEL, /, **entries: Entry) -> None:
         if not entries or not name.isidentifier():
             raise StageError("entries", where=name, found=", ".join(entries) or "none")
         self.name, self.level, self.entries = name, level, MappingProxyType(entries)
@@ -184,7 +184,7 @@ def _tangent(program: Program, directions: int) -> Program:
 @cache
 def _taped(program: Program) -> Program:
     taped = {name: entry.taped() for name, entry in program.entries.items()}
-    return Program(f"{program.name}_taped", level=0, **taped)
+    return Program(f"{program.name}_taped", 0, **taped)
 
 
 @cache

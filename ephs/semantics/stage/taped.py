@@ -247,10 +247,10 @@ class Taped(Evaluator):
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         if on is not self:
             return function(on, *arguments)
-        passed = self.base.call(_writing(function), self.tape, _swapped(arguments, self._passed))
-        return _swapped(passed, self._taken)
+        passed = self.base.call(_writing(function), self.tape, _swapped(arguments, self.passed))
+        return _swapped(passed, self.taken)
 
-    def _passed(self, number: Any) -> Any:
+    def passed(self, number: Any) -> Any:
         """Return what stands for a number or for memory beside a tape that is handed over: its row is written."""
         match number:
             case Traced():
@@ -260,8 +260,8 @@ class Taped(Evaluator):
             case _:
                 return None
 
-    def _taken(self, passed: Any) -> Any:
-        """Return the number or the memory that something stands for: `_passed` undone."""
+    def taken(self, passed: Any) -> Any:
+        """Return the number or the memory that something stands for: `passed` undone."""
         match passed:
             case _PassedNumber():
                 return Traced(self, passed.value, ((passed.place, 1.0),))
@@ -296,7 +296,7 @@ def _writing(function: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(function)
     def run(base: Evaluator, tape: Tape, arguments: tuple[Any, ...]) -> Any:
         on = Taped(base, tape)
-        return _swapped(function(on, *_swapped(arguments, on._taken)), on._passed)
+        return _swapped(function(on, *_swapped(arguments, on.taken)), on.passed)
 
     return run
 
@@ -318,7 +318,7 @@ def _swapped(value: Any, swap: Callable[[Any], Any]) -> Any:
             parts = (value.integers, value.integer_start, value.reals, value.real_start)
             return type(value)(*(_swapped(part, swap) for part in parts))
         case Number() | Cells():
-            return value
+            return cast("Any", value)
         case _ if is_dataclass(value) and not isinstance(value, type):
             made = cast("Callable[..., Any]", type(value))
             return made(*(_swapped(getattr(value, field.name), swap) for field in fields(value)))

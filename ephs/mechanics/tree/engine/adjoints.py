@@ -27,7 +27,7 @@ class StepAdjoint:
         entries = step_program(looped=engine.looped).entries
         given = {name: _values(tangent.given[name]) for name in entries["step"].kinds}
         self._arrays = {name: given[name] for name in ("base", "start", "q", "y")}
-        self._forward = Program("forward", level=0, step=entries["step"]).compiled()["step"].bind(*given.values())
+        self._forward = Program("forward", 0, step=entries["step"]).compiled()["step"].bind(*given.values())
         taped = {**given, "tables": {**given["tables"], **reaching(engine, relation, Program.taped)}}
         self._back = Gradients(entries["step"], **taped)
         self._sum: Shares | None = None
