@@ -28,5 +28,5 @@ def test_it_comes_to_the_same_motion_and_keeps_the_balance(name):
 
 def test_it_is_no_method_of_the_package():
     assert IDA.name not in METHODS
-    with pytest.raises(ephs.OptionError, match="radau, which took its place"):
+    with pytest.warns(FutureWarning, match="'radau' is taken in its place"):
         ephs.simulate(ephs.load(SCENES / "heavy-top.toml"), 0.1, method="ida")

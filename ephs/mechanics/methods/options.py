@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from typing import Any
+from warnings import warn
 
-from ephs.mechanics.methods.registry import MethodEntry
+from ephs.mechanics.methods.registry import REPLACED, MethodEntry
 from ephs.mechanics.tree.equations.accounts import KEEP
 from ephs.mechanics.tree.finding.roles import strikes
 from ephs.solve.errors import OptionError, nearest_of
@@ -22,6 +23,9 @@ def options_of(method: MethodEntry, problem: Problem, given: Mapping[str, Any] |
         return {}
     if not isinstance(given, Mapping):
         raise OptionError("options", given, "a mapping from names to values")
+    if "rho" in given and method.name == REPLACED["alpha"]:
+        warn("option 'rho' was one of alpha; radau damps all that its steps do not resolve", FutureWarning, 4)
+        given = {key: value for key, value in given.items() if key != "rho"}
     if unknown := [key for key in given if key not in method.options]:
         known = ", ".join(method.options) or "none"
         raise OptionError(

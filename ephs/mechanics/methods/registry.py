@@ -217,16 +217,9 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
 METHODS: dict[str, MethodEntry] = {}
 """The registered methods."""
 REPLACED: Mapping[str, str] = MappingProxyType(
-    {
-        "alpha": "radau, which took its place: it damps what a step does not resolve, and keeps the balance of energy",
-        "ida": "radau, which took its place",
-        **dict.fromkeys(
-            ("gauss4", "gauss6", "gauss8"),
-            "rk87, which took its place, or natural4, which is symmetric in time and damps nothing, too",
-        ),
-    }
+    {"alpha": "radau", "ida": "radau", "gauss4": "rk87", "gauss6": "rk87", "gauss8": "rk87"}
 )
-"""Names of former methods, and what to take instead."""
+"""Names of former methods -> what is taken in their place."""
 
 
 def register_method(method: own.Method | MethodEntry) -> None:
@@ -346,9 +339,10 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
         return _for_all(problem, step)
     if isinstance(name, own.Method):
         name = entry_of(name)
+    if isinstance(name, str) and name in REPLACED and name not in METHODS:
+        warn(f"method {name!r} is gone; {REPLACED[name]!r} is taken in its place", FutureWarning, 4)
+        name = REPLACED[name]
     if not isinstance(name, MethodEntry) and name not in METHODS:
-        if name in REPLACED:
-            raise OptionError("method", name, REPLACED[name])
         known = ("auto", *METHODS)
         raise OptionError("method", name, f"one of {', '.join(known)}, or an ephs.Method" + nearest_of(name, known))
     method = name if isinstance(name, MethodEntry) else METHODS[name]
