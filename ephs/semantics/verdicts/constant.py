@@ -119,7 +119,7 @@ def _searched(reversible: "Reversible", statement: str, kind: str, defect: Array
     """
     off = np.abs(defect) / np.maximum(allowed, TINY)
     if off.max(initial=0.0) <= 1.0:
-        return _off(statement, float(np.abs(defect).max()))
+        return _off(statement, float(np.abs(defect).max(initial=0.0)))
     entry = tuple(int(i) for i in np.unravel_index(int(np.argmax(off)), off.shape))
     raise _refuted(reversible, kind, float(defect[entry]), entry)
 

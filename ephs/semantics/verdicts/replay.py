@@ -50,7 +50,7 @@ class Replay:
 
     def __init__(self, claim: Claim, read: Callable[[float], Fraction] = Fraction) -> None:
         self.claim, self._read, self._on = claim, read, Expansion()
-        self._n = len(claim.parity)
+        self._n = len(claim.parity) or 1  # there are no rows where there are no ports
         self._given = {symbol: self._symbol(symbol, *ends) for symbol, ends in claim.bounds.items()}
         self.rows = self._formulas({})
 
@@ -101,6 +101,8 @@ class Replay:
         if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
             return given[term]
         if not isinstance(term, tuple):
+            if not isinstance(term, float | Fraction):  # the function of a root
+                raise Unexpandable
             return number_of(self._read(term))
         if id(term) not in known:  # terms share what was computed once
             known[id(term)] = self._on.function(term[0], *(self._value(each, given, known) for each in term[1:]))

@@ -44,6 +44,15 @@ def test_the_proof_of_each_library_primitive_is_replayed(name):
     assert set(proof) == set(STATEMENTS[primitive.kind]) == replay(primitive, proof)
 
 
+def test_a_structure_without_ports_is_proved():
+    """A rigid joint has the kinematics of no freedoms: every identity of no entries holds."""
+    joint = ephs.mechanics.joint("fixed")
+    parts = [slot.primitive for slot in joint.flatten().descriptor().components]
+    without = [part for part in parts if part.kind == "reversible" and not part.bundle.size]
+    assert without
+    assert all(part.verdict == "proved" for part in without)
+
+
 def leaves(data, at=()):
     """Places of numbers, texts and lists inside data."""
     yield at
