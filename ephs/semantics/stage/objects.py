@@ -14,6 +14,7 @@ from ephs.semantics.stage.store import STORE
 
 LEVELS: Final = ("0", "1", "2", "3")
 """Values of the environment variable ``EPHS_LLVM_LEVEL``."""
+HIGHEST: Final = int(LEVELS[-1])
 TARGETS: Final = {
     "linux-x86-64-v2": Target("x86_64-unknown-linux-gnu", "x86-64-v2", ""),
     "linux-x86-64-v3": Target("x86_64-unknown-linux-gnu", "x86-64-v3", ""),
@@ -68,7 +69,7 @@ def telling(say: Callable[[str], None]) -> Generator[None]:
         _TOLD.reset(before)
 
 
-def compiled(text: str, name: str = "program", most: int = LEVEL) -> Library:
+def compiled(text: str, name: str = "program", most: int = HIGHEST) -> Library:
     """Return a module in machine code for this process, compiled if neither package nor store has it.
 
     Parameters
