@@ -14,10 +14,9 @@ from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, T
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.known import known
-from ephs.semantics.stage.llvm import LEVEL
 from ephs.semantics.stage.machine import Machine
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
-from ephs.semantics.stage.objects import compiled
+from ephs.semantics.stage.objects import HIGHEST, compiled
 from ephs.semantics.stage.plain import PLAIN
 from ephs.semantics.stage.reaching import Atom
 
@@ -41,7 +40,7 @@ class Program:
         The entry functions, each under its name.
     """
 
-    def __init__(self, name: str, level: int = LEVEL, /, **entries: Entry) -> None:
+    def __init__(self, name: str, level: int = HIGHEST, /, **entries: Entry) -> None:
         if not entries or not name.isidentifier():
             raise StageError("entries", where=name, found=", ".join(entries) or "none")
         self.name, self.level, self.entries = name, level, MappingProxyType(entries)
