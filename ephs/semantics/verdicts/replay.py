@@ -101,7 +101,7 @@ class Replay:
         if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
             return given[term]
         if not isinstance(term, tuple):
-            if not isinstance(term, float | Fraction):  # the function of a root
+            if not isinstance(term, int | float | Fraction):  # the function of a root
                 raise Unexpandable
             return number_of(self._read(term))
         if id(term) not in known:  # terms share what was computed once
