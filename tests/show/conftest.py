@@ -43,7 +43,7 @@ class FakeScene:
         return [("housing", None)]
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("all_"):
+        if name.startswith("all_") or name == "levels":
             return list  # there is nothing of that kind
         raise AttributeError(name)
 
