@@ -3,7 +3,7 @@
 Steps of a mechanism on which nothing but given constants acts are taken many in one compiled call.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, final
@@ -60,21 +60,21 @@ def tableau(method: str | Method, *, chosen: bool = True) -> Tableau:
         return _named(method)
     of = coefficients_of(method, chosen=chosen)
     arrays = {"a": np.ascontiguousarray(of.extended[:, :-1]), "error": of.error, "coarse": np.zeros(of.error.size)}
-    return Tableau(method.name, of.order, arrays | _explicit(of.b, two=False), of.a.sum(axis=1), float(of.power))
+    return Tableau(method.name, of.order, arrays | _combined(False), of.a.sum(axis=1), float(of.power))
 
 
 @cache
 def _named(name: str) -> Tableau:
     if name == "rk87":
         arrays = {"a": _steps(t.A8, t.B8), "error": np.array(t.E8_5), "coarse": np.array(t.E8_3)}
-        return Tableau(name, 8, arrays | _explicit(t.B8, two=True), np.array(t.C8), 8.0)
+        return Tableau(name, 8, arrays | _combined(True), np.array(t.C8), 8.0)
     arrays = {"a": _steps(t.A5, t.B5), "error": np.array(t.E5), "coarse": np.zeros(len(t.B5) + 1)}
-    return Tableau(name, 5, arrays | _explicit(t.B5, two=False), np.array(t.C5), 5.0)
+    return Tableau(name, 5, arrays | _combined(False), np.array(t.C5), 5.0)
 
 
-def _explicit(b: Sequence[float] | Array, *, two: bool) -> dict[str, Any]:
-    """Scheme of stages without iteration, with one estimate or two that are combined."""
-    return {"guess": np.zeros((0, len(b))), "eighth": np.array([int(two)], dtype=np.int64)}
+def _combined(two: bool) -> dict[str, Any]:
+    """Whether a scheme has two estimates that are combined."""
+    return {"eighth": np.array([int(two)], dtype=np.int64)}
 
 
 def _steps(rows: tuple[tuple[float, ...], ...], last: tuple[float, ...]) -> Array:
@@ -138,8 +138,7 @@ class Explicit(ReducedMethod):
             if self._known is None or self._known[0] is not state.q:
                 self._known = state.q, eq.rates(state.t, state.q, y0)
             k[0] = self._known[1]
-        tolerances, chosen = (self.atol, self.rtol), self.control.step is None
-        before = self.solve(state, scheme, self.method.c, h, y0, k, y1, tolerances, chosen=chosen)
+        before = self.solve(state, scheme, self.method.c, h, y0, k, y1)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
         y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=self.lagged is not None)
         sums = np.array(eq.engine.totals["low" if part else "whole"])

@@ -25,7 +25,6 @@ SCHEME: Final = radau(3)
 _EMBEDDED = SCHEME.defect @ np.linalg.inv(SCHEME.coefficients) / SCHEME.gamma
 ARRAYS: Final[Mapping[str, Any]] = {
     "a": np.pad(np.vstack([np.zeros(3), SCHEME.coefficients, SCHEME.coefficients[-1]]), ((0, 0), (1, 0))),
-    "guess": np.zeros((4, 4)),
     "error": np.array([1.0, *(SCHEME.defect / SCHEME.gamma), 0.0]),
     "coarse": np.zeros(5),
     "eighth": np.zeros(1, dtype=np.int64),

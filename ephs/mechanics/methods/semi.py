@@ -43,7 +43,6 @@ ARRAYS: Final[Mapping[str, Any]] = {
         [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0],
         [0.0, 0.0, 0.25, 0.25, 0.0], [0.0, 0.0, *_LAST],
     ]),
-    "guess": np.zeros((0, 5)),
     "error": np.array([0.0, 0.0, _LAST[0] - 0.5, _LAST[1] - 0.5, _LAST[2], 0.0]),
     "coarse": np.zeros(6),
     "eighth": np.zeros(1, dtype=np.int64),
@@ -98,9 +97,8 @@ class Semi:
         return self._made
 
     def stages(
-        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,
-        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
-    ) -> Array:  # fmt: skip
+        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
+    ) -> Array:
         """The rates k at the stages of a step, each under the inputs at its node, and y at its end into y1.
 
         Returns y at the last stage. Stages are explicit where constraints nearly repeat each other. See
@@ -121,7 +119,7 @@ class Semi:
             eq.evaluations += anew
             status = int(stage(i, h))
             if status == Status.DEPENDENT:
-                before, y1[:] = evaluated(at, scheme, c, h, y0, k, None, chosen=chosen)
+                before, y1[:] = evaluated(at, scheme["a"], c, h, y0, k)
                 return before
             eq.refuse(status, engine.failed)
         k[:], y1[:] = self._k, self._y

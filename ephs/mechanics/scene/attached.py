@@ -5,11 +5,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, final
 
-from ephs.mechanics.scene.element import ABOVE_ONE, ENVIRONMENT, NON_NEGATIVE, POSITIVE, Element, Named, Number, frozen
+from ephs.mechanics.scene.element import (
+    ABOVE_ONE,
+    ENVIRONMENT,
+    NON_NEGATIVE,
+    POSITIVE,
+    Named,
+    Number,
+    SceneElement,
+    frozen,
+)
 from ephs.semantics.bundle import Array
 
 
-class Attachment(Element):
+class Attachment(SceneElement):
     """Attachments to joints with one degree of freedom each."""
 
     __slots__ = ()

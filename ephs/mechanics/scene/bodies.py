@@ -13,10 +13,10 @@ from ephs.mechanics.scene.element import (
     POSE,
     POSITIVE,
     TWIST,
-    Element,
     Measured,
     Named,
     Number,
+    SceneElement,
     frozen,
 )
 from ephs.mechanics.scene.flexible import Strain
@@ -45,7 +45,7 @@ class World(Measured):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Body(Element):
+class Body(SceneElement):
     """A rigid body.
 
     Attributes
@@ -69,7 +69,7 @@ class Body(Element):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint(Element):
+class Joint(SceneElement):
     """A joint of body 2 on body 1, through a lower pair or a universal joint.
 
     Attributes
@@ -123,7 +123,7 @@ class Joint(Element):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Spring(Element):
+class Spring(SceneElement):
     """A massless spring-damper between two points, ``½ k (distance − length)²``."""
 
     name: str
@@ -139,7 +139,7 @@ class Spring(Element):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Marker(Element):
+class Marker(SceneElement):
     """A point of interest."""
 
     name: str

@@ -91,7 +91,7 @@ def _hidden(extra: Mapping[str, str]) -> Any:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Rule:
+class KeyRule:
     """A condition on keys of a table, with its texts."""
 
     keys: tuple[str, ...]
@@ -103,18 +103,18 @@ class Rule:
     placed: bool
 
     def texts(self, element: "Element") -> tuple[str, str]:
-        """What was expected, and the advice, with values of keys."""
+        """Texts of the expected value and of the advice, with the values of keys filled in."""
         values = _values(element)
         return self.expected.format_map(values), self.advice.format_map(values)
 
     def found_in(self, element: "Element") -> str:
-        """What was found, with values of keys."""
+        """Text of the found value, with the values of keys filled in."""
         return self.found.format_map(_values(element))
 
 
 def rule(
     *keys: str, expected: str, advice: str = "correct the value", found: str = "", at: str = "", placed: bool = False
-) -> Callable[[Callable[..., bool]], Rule]:
+) -> Callable[[Callable[..., bool]], KeyRule]:
     """Mark a method as a condition on keys of the table: where it is false there is a fault.
 
     It is asked where none of these keys has a fault of its own.
@@ -126,15 +126,15 @@ def rule(
     expected, advice
         Texts of the message; values of keys may stand in braces.
     found
-        What there is instead, likewise; default: the value at the key.
+        Text of the found value, with values of keys in braces; default: the value at the key.
     at
         The key that the message names; default: the first one.
     placed
         Whether it is asked once all bodies are where they are at the start: then the method takes a `Site`, too.
     """
 
-    def marked(holds: Callable[..., bool]) -> Rule:
-        return Rule(keys, holds, expected, advice, found, at or keys[0], placed)
+    def marked(holds: Callable[..., bool]) -> KeyRule:
+        return KeyRule(keys, holds, expected, advice, found, at or keys[0], placed)
 
     return marked
 
@@ -153,14 +153,14 @@ class Element(Entry):
         The element's name, as seen from its scene.
     """
 
-    model_config = ConfigDict(strict=True, allow_inf_nan=False, ignored_types=(Rule,))
+    model_config = ConfigDict(strict=True, allow_inf_nan=False, ignored_types=(KeyRule,))
     section: ClassVar[str] = ""
     said: ClassVar[str] = ""
     names: ClassVar[Mapping[str, str]] = {}
     """Keys that name elements, and of which kind."""
     numbers: ClassVar[Mapping[str, Number]] = {}
     """Keys that are numbers, and their dimensions."""
-    rules: ClassVar[tuple[Rule, ...]] = ()
+    rules: ClassVar[tuple[KeyRule, ...]] = ()
     _name: str = PrivateAttr("")
 
     def __init_subclass__(cls, **_: str) -> None:
@@ -169,7 +169,7 @@ class Element(Entry):
     @classmethod
     def __pydantic_init_subclass__(cls, *, section: str = "", said: str = "", **_: Any) -> None:
         cls.section, cls.said = section or cls.section, said or cls.said
-        own = tuple(each for each in vars(cls).values() if isinstance(each, Rule))
+        own = tuple(each for each in vars(cls).values() if isinstance(each, KeyRule))
         cls.rules = (*cls.rules, *own)
         extras = {name: _extra(field.json_schema_extra) for name, field in cls.model_fields.items()}
         cls.names = {name: of.names for name, of in extras.items() if of.names}
@@ -186,7 +186,7 @@ class Element(Entry):
         """Add its boxes to the system of its scene."""
 
     def lines(self, site: "Site") -> Iterator[tuple[str, Any, str, Any]]:
-        """What it is in pictures: from a point of a body to one of another, (3,) each in the body's frame."""
+        """Lines of its picture: body, point (3,), body, point (3,), each point in the frame of its body."""
         return iter(())
 
     def continued(self, states: Mapping[str, Array]) -> Self:

@@ -1,4 +1,4 @@
-"""What a level of a scene connects to in its parts: bodies, thermal nodes, and joints that are driven there."""
+"""Ports that a level of a scene needs from its parts: of bodies, thermal nodes and driven joints."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

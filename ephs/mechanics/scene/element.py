@@ -145,7 +145,7 @@ class Measured(ABC):  # noqa: B024 - what differs are values
         return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all are dataclasses
 
 
-class Element(Measured):
+class SceneElement(Measured):
     """Something in a scene that has a name."""
 
     __slots__ = ()

@@ -6,7 +6,7 @@ from typing import Annotated, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Element, Measured, Named, Number, frozen
+from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Measured, Named, Number, SceneElement, frozen
 from ephs.semantics.bundle import Array
 
 
@@ -35,7 +35,7 @@ class Strain(Measured):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Beam(Element):
+class Beam(SceneElement):
     """A rod: its nodes are the bodies ``NAME.0`` … ``NAME.n``, its elements the joints ``NAME-1`` … ``NAME-n``.
 
     Attributes
@@ -64,7 +64,7 @@ class Beam(Element):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Tendon(Element):
+class Tendon(SceneElement):
     """A tendon without mass, straight from point to point of bodies, through which it slides.
 
     ``points`` (n, 3) in m are one in each body, in its centre-of-mass frame (ground: world).
@@ -100,7 +100,7 @@ class Tendon(Element):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Load(Element):
+class Load(SceneElement):
     """A force and a moment on a body's centre of mass."""
 
     name: str

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.scene import attached
 from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, Marker, Spring, World, free_joint
-from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, Element, frozen
+from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, SceneElement, frozen
 from ephs.mechanics.scene.flexible import Beam, Load, Tendon
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.scene.thermal import Conduction, ThermalNode
@@ -21,7 +21,7 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept
 
 if TYPE_CHECKING:
-    from ephs.mechanics.scene.custom import Element as OwnElement
+    from ephs.mechanics.scene.custom import Element
     from ephs.semantics import System
 
 __all__ = [
@@ -81,7 +81,7 @@ class Scene:
     cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
     gas_springs: Mapping[str, attached.GasSpring] = field(default_factory=dict)
     actuators: Mapping[str, attached.Actuator] = field(default_factory=dict)
-    elements: Mapping[str, Mapping[str, "OwnElement"]] = field(default_factory=dict)
+    elements: Mapping[str, Mapping[str, "Element"]] = field(default_factory=dict)
     origin: Array = field(default_factory=lambda: IDENTITY_POSE)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
@@ -145,7 +145,7 @@ class Scene:
         """The elements of a section of this level, registered ones included."""
         return getattr(self, name) if name in ELEMENTS else self.elements.get(name, {})
 
-    def all_elements(self) -> "Iterator[tuple[str, str, OwnElement]]":
+    def all_elements(self) -> "Iterator[tuple[str, str, Element]]":
         """Section, dotted name and value of every element of registered sections; what it names is dotted, too."""
         for path, scene in self.levels():
             for section, own in scene.elements.items():
@@ -248,7 +248,7 @@ class Scene:
             yield from part.levels(f"{path}{name}.")
 
 
-ELEMENTS: Mapping[str, type[Element]] = {
+ELEMENTS: Mapping[str, type[SceneElement]] = {
     "bodies": Body,
     "joints": Joint,
     "springs": Spring,

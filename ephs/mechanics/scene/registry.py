@@ -1,4 +1,4 @@
-"""Sections of scene files that users registered, and what stands in them. Light: whoever registers has the rest."""
+"""Sections of scene files that users registered, with their element classes. Imports nothing heavy."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ REGISTERED: "dict[str, type[Element]]" = {}
 
 
 def registered(section: str) -> "type[Element]":
-    """What stands in a section.
+    """Element class of a registered section.
 
     Raises
     ------

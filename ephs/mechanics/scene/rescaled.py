@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.mechanics.scene.attached import Attachment
-from ephs.mechanics.scene.element import Element
+from ephs.mechanics.scene.element import SceneElement
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
@@ -15,7 +15,7 @@ from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.semantics.bundle import Array
 
 if TYPE_CHECKING:
-    from ephs.mechanics.scene.custom import Element as OwnElement
+    from ephs.mechanics.scene.custom import Element
 
 
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:
@@ -25,7 +25,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
     """
     units = length, mass, time
 
-    def other(path: str, x: Element) -> Element:
+    def other(path: str, x: SceneElement) -> SceneElement:
         match x:
             case Joint():
                 return _joint(x, *units)
@@ -41,7 +41,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case _:
                 return x.rescaled(*units)
 
-    def own(path: str, x: "OwnElement") -> "OwnElement":
+    def own(path: str, x: "Element") -> "Element":
         tied = [scene.joint(path + name) for kind in ("axis", "joint") for name in x.named(kind)]
         return x.rescaled(*units, _firsts(tied, length))
 

@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.element import Element, Measured
+from ephs.mechanics.scene.element import Measured, SceneElement
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Strain
@@ -85,7 +85,7 @@ class Names:
     thermal: Set[str]
     unknown_parts: Set[str]
 
-    def check_all(self, kind: type[Element], table: Checked[Any], key: str, faults: list[Fault]) -> None:
+    def check_all(self, kind: type[SceneElement], table: Checked[Any], key: str, faults: list[Fault]) -> None:
         """Append a fault for each unknown reference among the keys of an element's table."""
         for part, of in kind.names.items():
             if of in ("body", "node") and part in type(table.entry).model_fields and table.sound(part):

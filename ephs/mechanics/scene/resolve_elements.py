@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import AXIS, Element, Rule, number_of
+from ephs.mechanics.scene.custom import AXIS, Element, KeyRule, number_of
 from ephs.mechanics.scene.entries import Checked, Document, shown, validate
 from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
 from ephs.mechanics.scene.model import Scene
@@ -71,7 +71,7 @@ def _sound_references(table: Checked[Element]) -> Iterable[tuple[str, str, str]]
     return (each for each in table.entry.references() if table.sound(each[0].partition("[")[0]))
 
 
-def broken(of: Rule, element: Element, key: str) -> Fault:
+def broken(of: KeyRule, element: Element, key: str) -> Fault:
     """The fault of a rule that does not hold."""
     expected, advice = of.texts(element)
     there = of.found_in(element) if of.found else shown(getattr(element, of.at))

@@ -1,4 +1,4 @@
-"""Where an element of one's own stands in a scene: what it may read there, and what it adds to the scene's system."""
+"""Site of an element of one's own in a scene: values that it reads there, and boxes that it adds to the system."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -42,7 +42,7 @@ class Level:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Site:
-    """Where an element stands.
+    """Place of an element in a scene, with access to poses, junctions and boxes.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ephs.mechanics.scene.attached import Attachment
-from ephs.mechanics.scene.element import OUTSIDE, Element
+from ephs.mechanics.scene.element import OUTSIDE, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
@@ -81,7 +81,7 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
     return found if lost else scene
 
 
-def _all(scene: Scene) -> Iterator[tuple[str, Element]]:
+def _all(scene: Scene) -> Iterator[tuple[str, SceneElement]]:
     """Every element of a scene with its dotted name."""
     for section in ELEMENTS:
         yield from scene.every(section)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, final
 
-from ephs.mechanics.scene.element import POSE, Element, Named
+from ephs.mechanics.scene.element import POSE, Named, SceneElement
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.semantics.bundle import Array
@@ -12,7 +12,7 @@ from ephs.semantics.bundle import Array
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Surface(Element):
+class Surface(SceneElement):
     """A surface on a body, or on the ground.
 
     Attributes
@@ -30,7 +30,7 @@ class Surface(Element):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Contact(Element):
+class Contact(SceneElement):
     """A contact between two surfaces.
 
     Attributes

@@ -6,12 +6,12 @@ from typing import Annotated, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Element, Named, Number
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Named, Number, SceneElement
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class ThermalNode(Element):
+class ThermalNode(SceneElement):
     """A body of uniform temperature.
 
     One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the
@@ -32,7 +32,7 @@ class ThermalNode(Element):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Conduction(Element):
+class Conduction(SceneElement):
     """Heat conduction between two thermal nodes, or one and the environment."""
 
     name: str

@@ -29,7 +29,7 @@ MOST = 20_000
 
 
 @final
-class Expansion:
+class Expander:
     """Atoms that formulas have in common, and the rules of their arithmetic."""
 
     def __init__(self) -> None:
@@ -295,56 +295,56 @@ _RULED = ("number", "absolute", "sin")
 _PARITY: Mapping[str, int] = {"cos": 1, "sinhc": 1} | dict.fromkeys(("sin", "atan", "asinh", "asin", "atanh"), -1)
 """Functions that are even, with f(0) = 1, or odd."""
 _ARGUMENTS: Mapping[str, tuple[int, int]] = {"choose": (3, 3), "squared turn": (4, 4)}
-One: TypeAlias = Callable[[Expansion, Expanded], Expanded]
-Two: TypeAlias = Callable[[Expansion, Expanded, Expanded], Expanded]
+One: TypeAlias = Callable[[Expander, Expanded], Expanded]
+Two: TypeAlias = Callable[[Expander, Expanded, Expanded], Expanded]
 Many: TypeAlias = Callable[..., Expanded]
 
 
-def _exponentials(on: Expansion, x: Expanded, sign: int) -> Expanded:
+def _exponentials(on: Expander, x: Expanded, sign: int) -> Expanded:
     """e^x ± e^(−x)."""
     return on.add(on.exponential(x), scaled(on.exponential(scaled(x, -1)), sign))
 
 
-def _half_turn(on: Expansion, square: Expanded) -> Expanded:
+def _half_turn(on: Expander, square: Expanded) -> Expanded:
     return scaled(on.power(square, HALF), HALF)
 
 
-def _turn_ratio(on: Expansion, square: Expanded) -> Expanded:
+def _turn_ratio(on: Expander, square: Expanded) -> Expanded:
     half = _half_turn(on, square)
     return on.quotient(half, on.function("sin", half))
 
 
-def _turn_curve(on: Expansion, square: Expanded) -> Expanded:
+def _turn_curve(on: Expander, square: Expanded) -> Expanded:
     half = _half_turn(on, square)
     cotangent = on.quotient(on.function("cos", half), on.function("sin", half))
     return on.quotient(on.add(number_of(1), scaled(on.times(half, cotangent), -1)), square)
 
 
-def _squared_turn(on: Expansion, w: Expanded, *vector: Expanded) -> Expanded:
+def _squared_turn(on: Expander, w: Expanded, *vector: Expanded) -> Expanded:
     length = on.power(on.add(*(on.times(x, x) for x in vector)), HALF)
     angle = on.function("atan2", length, on.absolute(w))
     return scaled(on.times(angle, angle), 4)
 
 
-def _power(on: Expansion, a: Expanded, b: Expanded) -> Expanded:
+def _power(on: Expander, a: Expanded, b: Expanded) -> Expanded:
     exponent = b.get((), Fraction(0)) if not b.keys() - {()} else None
     if exponent is not None and (4 * exponent).denominator == 1:
         return on.power(a, exponent)
     return on.exponential(on.times(b, on.logarithm(a)))
 
 
-def _minus(on: Expansion, a: Expanded, *b: Expanded) -> Expanded:
+def _minus(on: Expander, a: Expanded, *b: Expanded) -> Expanded:
     return on.add(a, *(scaled(each, -1) for each in b)) if b else scaled(a, -1)
 
 
-def _product(on: Expansion, *factors: Expanded) -> Expanded:
+def _product(on: Expander, *factors: Expanded) -> Expanded:
     return reduce(on.times, factors)
 
 
 _ONE: Mapping[str, One] = {
-    "abs": Expansion.absolute,
-    "exp": Expansion.exponential,
-    "log": Expansion.logarithm,
+    "abs": Expander.absolute,
+    "exp": Expander.exponential,
+    "log": Expander.logarithm,
     "sqrt": lambda on, x: on.power(x, HALF),
     "sign": lambda on, x: on.quotient(on.absolute(x), x),
     "sinh": lambda on, x: scaled(_exponentials(on, x, -1), HALF),
@@ -356,10 +356,10 @@ _ONE: Mapping[str, One] = {
     "shown": lambda _, x: x,
 }
 _MANY: Mapping[str, Many] = {
-    "+": Expansion.add,
+    "+": Expander.add,
     "*": _product,
     "-": _minus,
-    "/": Expansion.quotient,
+    "/": Expander.quotient,
     "^": _power,
     "squared turn": _squared_turn,
 }
@@ -372,7 +372,7 @@ def _circle(sign: int, at: int, exponent: Fraction) -> One:
     return lambda on, x: on.power(on.add(number_of(at), scaled(on.times(x, x), sign)), exponent)
 
 
-def _of_sinhc(on: Expansion, x: Expanded) -> Expanded:
+def _of_sinhc(on: Expander, x: Expanded) -> Expanded:
     return on.quotient(on.add(on.function("cosh", x), scaled(on.function("sinhc", x), -1)), x)
 
 

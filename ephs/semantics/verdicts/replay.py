@@ -16,7 +16,7 @@ from ephs.semantics.symbols.bounds import signs
 from ephs.semantics.symbols.terms import Term
 from ephs.semantics.verdicts.checks import ROTATING, STATEMENTS
 from ephs.semantics.verdicts.claims import Claim, frame_of
-from ephs.semantics.verdicts.expansion import Expansion
+from ephs.semantics.verdicts.expansion import Expander
 from ephs.semantics.verdicts.sums import Expanded, Unexpandable, number_of, scaled
 from ephs.semantics.verdicts.verdict import Evidence
 
@@ -49,7 +49,7 @@ class Replay:
     """A claim, expanded."""
 
     def __init__(self, claim: Claim, read: Callable[[float], Fraction] = Fraction) -> None:
-        self.claim, self._read, self._on = claim, read, Expansion()
+        self.claim, self._read, self._on = claim, read, Expander()
         self._n = len(claim.parity) or 1  # there are no rows where there are no ports
         self._given = {symbol: self._symbol(symbol, *ends) for symbol, ends in claim.bounds.items()}
         self.rows = self._formulas({})
@@ -101,7 +101,7 @@ class Replay:
         if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
             return given[term]
         if not isinstance(term, tuple):
-            if not isinstance(term, int | float | Fraction):  # the function of a root
+            if not isinstance(term, int | float | Fraction):  # pyright: ignore[reportUnnecessaryIsInstance] - a root's tape
                 raise Unexpandable
             return number_of(self._read(term))
         if id(term) not in known:  # terms share what was computed once

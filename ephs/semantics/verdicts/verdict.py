@@ -5,8 +5,7 @@ A structure with a counterexample is refused: `StructureError`, with the smalles
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias, cast, final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, cast, final
 
 if TYPE_CHECKING:
     from ephs.semantics.primitives import Primitive
@@ -129,6 +128,10 @@ def examine(primitive: "Primitive") -> StructureVerdict:
     )
 
 
+_OF_LIBRARY: Final[dict[object, "tuple[Condition, ...]"]] = {}
+"""Conditions on trusted primitives, by ports, formula and signs of parameters: those of all numbers of these signs."""
+
+
 def _asked(primitive: "Primitive", conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
     """The conditions without that on parity where the primitive is one-sided, or in a reversed field."""
     from ephs.semantics.verdicts.checks import MIRRORED
@@ -150,31 +153,12 @@ def _proofs(primitive: "Primitive") -> tuple[Condition, ...]:
         from ephs.semantics.verdicts.proving import signs_of
 
         signs = tuple(signs_of(primitive).items())
-        key = (primitive.kind, tuple(primitive.interface.items()), primitive.reads, primitive.domain)
-        return _of_library((key, formula.function, formula.gradient, signs), _Alike(primitive))
+        ports = (primitive.kind, tuple(primitive.interface.items()), primitive.reads, primitive.domain)
+        key = (ports, formula.function, formula.gradient, signs)
+        if key not in _OF_LIBRARY:
+            _OF_LIBRARY[key] = _shown(primitive)
+        return _OF_LIBRARY[key]
     return _shown(primitive)
-
-
-class _Alike:
-    """A primitive that compares equal to all others, to keep it out of cache keys."""
-
-    __slots__ = ("primitive",)
-
-    def __init__(self, primitive: "Primitive") -> None:
-        self.primitive = primitive
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Alike)
-
-    def __hash__(self) -> int:
-        return 0
-
-
-@lru_cache(maxsize=256)
-def _of_library(key: object, like: _Alike) -> tuple[Condition, ...]:
-    """Conditions on all trusted primitives with this formula whose parameters have the same signs."""
-    del key
-    return _shown(like.primitive)
 
 
 def _shown(primitive: "Primitive") -> tuple[Condition, ...]:

@@ -2,10 +2,8 @@
 
 from ephs.solve.march.account import Account as Account
 from ephs.solve.march.march import march as march
-from ephs.solve.march.memory import ERRORS as ERRORS
 from ephs.solve.march.memory import MEMORY as MEMORY
 from ephs.solve.march.memory import TOTALS as TOTALS
-from ephs.solve.march.memory import Errors as Errors
 from ephs.solve.march.memory import Memory as Memory
 from ephs.solve.march.memory import Totals as Totals
 from ephs.solve.march.records import TABLEAU as TABLEAU

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
-from ephs.solve.march.collocation import combine
+from ephs.solve.march.evaluating import combine
 from ephs.solve.march.records import Control, Motion, Tableau
 
 

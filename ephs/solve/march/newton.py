@@ -8,7 +8,7 @@ from typing import final
 
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
-from ephs.solve.march.collocation import evaluate, place
+from ephs.solve.march.evaluating import evaluate, place
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 from ephs.solve.march.stiff import Solver, Stiff, whole

@@ -245,17 +245,13 @@ class Tableau:
     ----------
     a
         (stages + 1, stages): its last row leads to the step's end.
-    guess
-        (stages, stages), strictly lower: first stages of a method whose stages depend on each other; no rows of an
-        explicit one.
     error, coarse
         (stages + 1,): weights of the estimates; `coarse` is taken where eighth[0] is not 0.
     eighth
-        (1,): 1 for estimates of orders 5 and 3 that are combined; 2 for one times the square of its ratio to the other.
+        (1,): 1 for estimates of orders 5 and 3 that are combined, else 0.
     """
 
     a: Matrix
-    guess: Matrix
     error: Vector
     coarse: Vector
     eighth: Integers
@@ -263,7 +259,6 @@ class Tableau:
 
 TABLEAU: Final[dict[str, Any]] = {
     "a": matrix(),
-    "guess": matrix(),
     "error": vector(),
     "coarse": vector(),
     "eighth": indices(1),

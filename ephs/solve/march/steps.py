@@ -4,7 +4,6 @@ from typing import Final
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.linear.sums import grown
-from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -22,8 +21,8 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
-from ephs.solve.march.collocation import combine, evaluate, iterate, place
 from ephs.solve.march.control import judge
+from ephs.solve.march.evaluating import combine, evaluate, place
 from ephs.solve.march.lagged import Lagged, lag
 from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
@@ -62,10 +61,10 @@ def attempt(
     stiff: Stiff | None = None,
     lagged: Lagged | None = None,
 ) -> Integer:
-    """Evaluate the stages of a step of length h from (base, start), k[0] known; by iteration where they need it.
+    """Evaluate the stages of a step of length h from (base, start), k[0] known.
 
-    Without errors for iterations to end at, the method is an explicit one; with memory for that, it is Newton's, or
-    semi-implicit, whose stages need no k[0].
+    Stages are explicit; with memory for that they are found by Newton's method, to errors that are allowed, or
+    semi-implicit ones, which need no k[0].
     The step's end goes to y and q, the rates there to the last row of k, y at the last stage to ``last``.
 
     Returns
@@ -86,18 +85,13 @@ def attempt(
         stage.value = i + 1
         return on.either(on.negate(on.same(status.value, Status.SOUND)), stage.value > count)
 
-    def collocated(errors: Errors) -> None:
+    if stiff is None:
+        on.when(on.same(count, 1), lambda: copy(on, start, last))
+    elif errors is not None:
         allow(on, motion, errors, start, start)
-        if stiff is None:
-            status.value = iterate(on, motion, tableau, control, base, start, h, k, errors.allowed, y, q)
-        else:
-            status.value = newton(on, motion, tableau, control, base, start, h, k, errors, stiff, y, q)
+        status.value = newton(on, motion, tableau, control, base, start, h, k, errors, stiff, y, q)
         copy(on, y, last)
         stage.value = count
-
-    if errors is not None:
-        on.when(tableau.guess.rows > 0, lambda: collocated(errors))
-    on.when(on.same(count, 1), lambda: copy(on, start, last))
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(one))
     return status.value
 
@@ -218,12 +212,8 @@ def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth
 
     on.loop(size, one)
     count = on.real(on.select(size > 1, size, 1))
-    plain = on.sqrt(first.value / count)
     both = first.value / on.sqrt((first.value + 0.01 * second.value) * count)
-    # Differences of rates in a step fall by a ratio: two orders more of it, where it is less than one.
-    falling = plain * on.minimum(first.value / on.maximum(second.value, TINY), 1.0)
-    blended = on.select(on.same(eighth[0], 2), falling, both)
-    return on.select(on.both(two, on.negate(first.value <= 0.0)), blended, plain)
+    return on.select(on.both(two, on.negate(first.value <= 0.0)), both, on.sqrt(first.value / count))
 
 
 def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real:

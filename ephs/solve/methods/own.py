@@ -20,7 +20,7 @@ from ephs.solve.methods.orders import order_of, power_of
 MOST_STAGES = 64
 
 
-class _Linear:
+class _Recorded:
     """What only adds up and is multiplied by numbers."""
 
     __slots__ = ()
@@ -55,7 +55,7 @@ def _number(value: object) -> float | None:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Combination(_Linear):
+class Combination(_Recorded):
     """A sum of a step's rates times numbers, and times the step's length where it is a change.
 
     Attributes
@@ -82,7 +82,7 @@ class Combination(_Linear):
     __radd__ = __add__
 
     def __mul__(self, other: object) -> "Combination":
-        if isinstance(other, Length):
+        if isinstance(other, StepLength):
             if self.change:
                 raise _refused("the square of step.h")
             return Combination({k: other.factor * w for k, w in self.weights.items()}, True)
@@ -118,7 +118,7 @@ class Combination(_Linear):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Length(_Linear):
+class StepLength(_Recorded):
     """The length of a step, in s, times a number."""
 
     factor: float = 1.0
@@ -128,23 +128,23 @@ class Length(_Linear):
             return other * self
         factor = _number(other)
         if factor is None:
-            raise _refused(f"the product of step.h and {'itself' if isinstance(other, Length) else repr(other)}")
-        return Length(factor * self.factor)
+            raise _refused(f"the product of step.h and {'itself' if isinstance(other, StepLength) else repr(other)}")
+        return StepLength(factor * self.factor)
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: object) -> "Length":
+    def __truediv__(self, other: object) -> "StepLength":
         divisor = _number(other)
         if not divisor:
             raise _refused(f"a division of step.h by {other!r}")
-        return Length(self.factor / divisor)
+        return StepLength(self.factor / divisor)
 
-    def __neg__(self) -> "Length":
-        return Length(-self.factor)
+    def __neg__(self) -> "StepLength":
+        return StepLength(-self.factor)
 
 
 @final
-class Step:
+class RecordedStep:
     """A step that is recorded.
 
     Attributes
@@ -156,7 +156,7 @@ class Step:
     """
 
     def __init__(self) -> None:
-        self.h = Length()
+        self.h = StepLength()
         self.taken = [Combination({0: 1.0})]
         self.rows: list[Combination] = [Combination({}, True)]
 
@@ -195,13 +195,13 @@ class Method(ABC):
         return type(self).__name__ + parameters.removesuffix("()")
 
     @abstractmethod
-    def stages(self, step: Step) -> Combination:
+    def stages(self, step: RecordedStep) -> Combination:
         """The change of the state in a step: sums of ``step.rates(change)`` times numbers and ``step.h``.
 
         ``step.rates()`` are the rates at the start, ``step.rates(change)`` those where ``change`` leads to.
         """
 
-    def estimate(self, step: Step, rates: tuple[Combination, ...], end: Combination) -> Combination | None:
+    def estimate(self, step: RecordedStep, rates: tuple[Combination, ...], end: Combination) -> Combination | None:
         """The error of the step, as a change; None: the difference of two half steps and a whole one.
 
         Parameters
@@ -261,7 +261,7 @@ def coefficients_of(method: Method, *, chosen: bool = True) -> Coefficients:
     OptionError
         It is not linear in its rates, of order 0, or its estimate is none.
     """
-    step = Step()
+    step = RecordedStep()
     change = _change(method.stages(step), "stages")
     count = len(step.rows)
     a, b = np.array([row.row(count) for row in step.rows]), change.row(count)

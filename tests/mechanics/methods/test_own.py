@@ -132,6 +132,31 @@ def test_derivatives_are_those_of_its_steps():
     assert own != pytest.approx(slope("rk54"), rel=1e-5), "a control: another method has another derivative"
 
 
+class Heun(ephs.Method):
+    """Heun's method, with as many stages as the midpoint rule."""
+
+    def stages(self, step):
+        k1 = step.rates()
+        return step.h * (k1 + step.rates(step.h * k1)) / 2
+
+
+class Midpoint(ephs.Method):
+    """The explicit midpoint rule."""
+
+    def stages(self, step):
+        return step.h * step.rates(step.h * step.rates() / 2)
+
+
+def test_methods_with_as_many_stages_share_a_model_but_no_coefficients():
+    scene = BY_NAME["revolute-chain-4"].scene()
+    shared = ephs.dynamics(scene)
+    for method in (Heun(), Midpoint(), Heun()):
+        alone = ephs.dynamics(scene)
+        found, expected = (m.step(m.state0, 0.05, method).array for m in (shared, alone))
+        assert np.array_equal(found, expected)
+    assert not np.array_equal(*(shared.step(shared.state0, 0.05, method).array for method in (Heun(), Midpoint())))
+
+
 def test_it_is_registered_under_its_name(monkeypatch):
     monkeypatch.setattr(registry, "METHODS", dict(METHODS))
     register_method(Kutta())

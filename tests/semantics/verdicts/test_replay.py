@@ -20,7 +20,7 @@ from ephs.semantics.symbols.bounds import signs
 from ephs.semantics.symbols.terms import OPERATIONS
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.claims import Seen, frame_of
-from ephs.semantics.verdicts.expansion import Expansion
+from ephs.semantics.verdicts.expansion import Expander
 from ephs.semantics.verdicts.proving import proof_of, replay
 from ephs.semantics.verdicts.sums import Unexpandable, number_of, scaled
 from ephs.semantics.verdicts.verdict import as_evidence
@@ -205,7 +205,7 @@ WRONG = [
 
 
 def difference(one, other):
-    on = Expansion()
+    on = Expander()
     known = {"x": on.atom("symbol", "x", False), "y": on.atom("symbol", "y", False), "p": on.atom("symbol", "p", True)}
 
     def value(term):

@@ -11,7 +11,7 @@ from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, 
 from ephs.semantics.bundle import Array
 from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import ERRORS, TOTALS, Account, Control
+from ephs.solve.march import TOTALS, Account, Control
 from ephs.solve.march.account import WORTH
 
 
@@ -53,7 +53,7 @@ class Engine:
         self.totals = {name: np.zeros(summed) for name in TOTALS} | {"start": self._start, "end": self._y}
         self._counted = 2 * self._r.size + work["entropy"].size
         self._account, self._allowed = Account.table(1), np.zeros(self._counted)
-        self._stages: dict[int, tuple[Table[Control], Array, dict[str, Array], Array, Bound]] = {}
+        self._stages: dict[int, tuple[dict[str, Array], Table[Control], Array, Array, Bound]] = {}
         self._sums: dict[int, tuple[Mapping[str, Any], Array, Bound]] = {}
         self._arguments: dict[str, tuple[Any, ...]] = {
             "rates": (self._base, self._y, self._q, self._out),
@@ -120,17 +120,9 @@ class Engine:
         return status, self._q.copy(), self._out.copy()
 
     def stages(
-        self, tableau: Mapping[str, Any], base: Array, start: Array, h: float, k: Array, y: Array,
-        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
-    ) -> tuple[int, int, Array]:  # fmt: skip
+        self, tableau: Mapping[str, Any], base: Array, start: Array, h: float, k: Array, y: Array
+    ) -> tuple[int, int, Array]:
         """Evaluate the stages of a step of length h from (base, start) into k, whose first row is known, and y.
-
-        Parameters
-        ----------
-        tolerances
-            atol and rtol of what an error counts, for stages that are iterated.
-        chosen
-            Whether steps are chosen by them.
 
         Returns
         -------
@@ -138,18 +130,16 @@ class Engine:
             A status, how many evaluations there were, and y at the last stage.
         """
         if len(k) not in self._stages:
+            own = {name: np.array(value) for name, value in tableau.items()}
             control, rows, last = Control.table(1), np.zeros(k.shape), np.zeros(y.size)
-            errors = {name: np.zeros(self._counted) for name in ERRORS}
-            bound = self.bind(
-                "stages", tableau, control, self._base, self._start, rows, errors, last, self._y, self._q, 0.0
-            )  # fmt: skip
-            self._stages[len(k)] = control, rows, errors, last, bound
-        control, rows, errors, last, bound = self._stages[len(k)]
+            bound = self.bind("stages", own, control, self._base, self._start, rows, last, self._y, self._q, 0.0)
+            self._stages[len(k)] = own, control, rows, last, bound
+        own, control, rows, last, bound = self._stages[len(k)]
+        for name, value in own.items():  # methods may have as many stages as each other
+            value[...] = tableau[name]
         self._base[:], self._start[:], rows[0] = base, start, k[0]
-        if tolerances is not None:
-            errors["atol"][:], errors["rtol"][:] = tolerances
         counts: Any = control[0]
-        before, counts.grid = cast("int", counts.evaluations), float(not chosen)
+        before = cast("int", counts.evaluations)
         status = int(bound(h))
         k[:], y[:] = rows, self._y
         return status, cast("int", counts.evaluations) - before, last.copy()

@@ -26,14 +26,12 @@ from ephs.semantics.stage import (
     vector,
 )
 from ephs.solve.march import (
-    ERRORS,
     MEMORY,
     STIFF,
     TABLEAU,
     TOTALS,
     Account,
     Control,
-    Errors,
     Memory,
     Stiff,
     Tableau,
@@ -69,9 +67,9 @@ def motion_program(*, looped: bool) -> Program:
 
     def stages(
         on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
-        k: Matrix, errors: Errors, last: Vector, y: Vector, q: Vector, h: Real,
+        k: Matrix, last: Vector, y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
-        return attempt(on, motion, tableau, control[0], base, start, h, k, errors, last, y, q)
+        return attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
 
     def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
         return motion.rates(on, base, y, q, out)[0]
@@ -133,7 +131,7 @@ def motion_program(*, looped: bool) -> Program:
         ),
         "stages": entry(
             stages, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(),
-            errors=group(Errors, **ERRORS), last=vector(),
+            last=vector(),
             y=vector(), q=vector(), h=real(),
         ),
         "rates": entry(rates, base=vector(), y=vector(), q=vector(), out=vector()),

@@ -59,7 +59,7 @@ class RateSlopes:
         self._size = size
         self._calls = calls
         still, moved = np.zeros((coordinates, DIRECTIONS)), np.zeros((coordinates, DIRECTIONS))
-        tables, work, _ = paired_tables(engine, relation)
+        tables, work = paired_tables(engine, relation)
         self._run = rate_slopes().compiled()["rates"].bind(
             tables, work, (self._q, still), (self._y, self._seed), (np.zeros(coordinates), moved),
             (self._out, self._slope),

@@ -163,10 +163,11 @@ class StepTangent:
         self.slopes: dict[str, Array] = {}
         self._tangents = partial(reaching, engine, relation, lambda program: program.tangent(DIRECTIONS))
         self._looped = engine.looped
-        tables = {name: _paired(value, self.slopes, name) for name, value in engine.tables.items()}
-        work = {name: _paired(value, {}, name) for name, value in engine.work.items()}
-        coefficients = {name: _paired(value, {}, name) for name, value in tableau.items()}
-        self.given: dict[str, Any] = {"tables": tables, "work": work, "tableau": coefficients}
+        self.given: dict[str, Any] = {
+            "tables": _all_paired(engine.tables, self.slopes),
+            "work": _all_paired(engine.work, {}),
+            "tableau": _all_paired(tableau, {}),
+        }
         arguments = self.given
         shapes: dict[str, tuple[int, ...]] = {
             "base": (coordinates,), "start": (size,), "k": (stages, size), "last": (size,), "y": (size,),
@@ -227,12 +228,15 @@ def step_tangents(looped: bool) -> Program:
 
 def paired_tables(
     engine: Engine, relation: Callable[[int], tuple[Program, str]]
-) -> tuple[dict[str, Any], dict[str, Any], dict[str, Array]]:
-    """Return an engine's tables and memory with slopes, which call tangents, and the slopes of the tables by name."""
-    slopes: dict[str, Array] = {}
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return an engine's tables and memory with slopes, which call tangents."""
     tables = {**engine.tables, **reaching(engine, relation, lambda program: program.tangent(DIRECTIONS))}
-    paired = {name: _paired(value, slopes, name) for name, value in tables.items()}
-    return paired, {name: _paired(value, {}, name) for name, value in engine.work.items()}, slopes
+    return _all_paired(tables, {}), _all_paired(engine.work, {})
+
+
+def _all_paired(values: Mapping[str, Any], kept: dict[str, Array]) -> dict[str, Any]:
+    """Return arguments with memory for their slopes."""
+    return {name: _paired(value, kept, name) for name, value in values.items()}
 
 
 def _pair(array: Array) -> tuple[Array, Array]:

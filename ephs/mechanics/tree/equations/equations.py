@@ -142,9 +142,8 @@ class Equations:
         return out
 
     def stages(
-        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array,
-        tolerances: tuple[Array, Array] | None = None, *, chosen: bool = True,
-    ) -> Array:  # fmt: skip
+        self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
+    ) -> Array:
         """The rates k (stages + 1, size) at the stages and the end of a step, k[0] known; y at the end into y1.
 
         Returns y at the last stage. See `Engine.stages`.
@@ -152,7 +151,7 @@ class Equations:
         if self.held:
             self.given.place(state.t, NO_STATE)
         if self.steady:
-            status, evaluations, before = self.engine.stages(scheme, state.q, y0, h, k, y1, tolerances, chosen=chosen)
+            status, evaluations, before = self.engine.stages(scheme, state.q, y0, h, k, y1)
             self.evaluations += evaluations
             if status != Status.DEPENDENT:
                 self.refuse(status, self.engine.failed)
@@ -161,13 +160,7 @@ class Equations:
         def at(part: float, y: Array) -> Array:
             return self.rates(state.t + part * h, state.q, y)
 
-        def relative(change: Array) -> Array:
-            assert tolerances is not None
-            atol, rtol = tolerances
-            return h * change[self.counted] / (atol + rtol * self.sizes(y0, y0))
-
-        measured = None if tolerances is None else relative
-        before, y1[:] = evaluated(at, scheme, c, h, y0, k, measured, chosen=chosen)
+        before, y1[:] = evaluated(at, scheme["a"], c, h, y0, k)
         return before
 
     def prepare(self, state: ReducedState) -> None:

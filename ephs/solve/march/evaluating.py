@@ -1,0 +1,36 @@
+"""Rates at the stages of a step, and the states at which they are evaluated."""
+
+from ephs.semantics.linear.dense import copy
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
+from ephs.solve.march.records import Control, Motion
+
+
+def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
+    """Return the index in y of the j-th counted number."""
+    return on.select(j < motion.freedoms, j, j + (motion.increments - motion.freedoms))
+
+
+@staged
+def evaluate(
+    on: Evaluator, motion: Motion, control: Control, base: Vector, y: Vector, q: Vector, out: Vector
+) -> Integer:
+    """Evaluate the rates at base·exp(v) and count it; return a status."""
+    control.evaluations = control.evaluations + 1
+    status, component = motion.rates(on, base, y, q, out)
+    control.component = component
+    return status
+
+
+def combine(on: Evaluator, weights: Vector, count: Integer, h: Real, k: Matrix, start: Vector, y: Vector) -> None:
+    """Write start + h Σ weights·k of the first ``count`` rates to y."""
+    copy(on, start, y)
+
+    def add(s: Integer) -> None:
+        weight = h * weights[s]
+
+        def entry(j: Integer) -> None:
+            y[j] = y[j] + weight * k[s, j]
+
+        on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(y.size, entry))
+
+    on.loop(count, add)
