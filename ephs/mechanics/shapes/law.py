@@ -58,8 +58,9 @@ class Law:
 
     def normal(self, overlap: Any, opening: Any) -> tuple[Any, Any]:
         """Normal force N = φ′ − d ġ ≥ 0 at an overlap in m and a rate ġ of the gap in m/s, and d in N s/m."""
-        elastic, rate = self.force(overlap), 1.5 * self.loss * opening
-        return elastic * ramp(1.0 - rate), 1.5 * self.loss * elastic / (1.0 + ramp(rate - 1.0))
+        elastic, loss = self.force(overlap), 1.5 * self.loss
+        rate = loss * opening
+        return elastic * ramp(1.0 - rate), loss * elastic / (1.0 + ramp(rate - 1.0))
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:
