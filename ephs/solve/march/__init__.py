@@ -1,4 +1,4 @@
-"""Runge-Kutta steps, explicit or iterated, as staged functions, many in one call."""
+"""Runge-Kutta steps, explicit, implicit or semi-implicit, as staged functions, many in one call."""
 
 from ephs.solve.march.account import Account as Account
 from ephs.solve.march.march import march as march

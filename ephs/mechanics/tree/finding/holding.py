@@ -35,7 +35,7 @@ def check_determined(network: Network, components: Sequence[ComponentSlot]) -> N
 
 
 def _pattern(slot: ComponentSlot, size: int) -> Array:
-    """(size, size) 1 where a flow may depend on an effort or a multiplier."""
+    """(size, size) 1 where a flow depends on an effort or a multiplier; of a relation, at one state that is drawn."""
     if not isinstance(slot.primitive, Reversible):
         return np.ones((size, size))
     of = slot.primitive
