@@ -30,7 +30,7 @@ def digests(threads: str, seed: str) -> subprocess.Popen:
 def test_threads_and_hash_seeds_change_nothing():
     """One scene with heat, one with a loop, and a system with a function of one's own, by every method."""
     first, second = (json.loads(run.communicate()[0]) for run in (digests("1", "0"), digests("4", "4242")))
-    assert {name.partition("-")[0] for name in first} == set(METHODS), "every method has runs"
+    assert {name.partition("-")[0] for name in first} - {"sweep"} == set(METHODS), "every method has runs"
     assert {name for name in first if first[name] != second[name]} == set()
 
 
