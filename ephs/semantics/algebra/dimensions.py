@@ -6,13 +6,16 @@ A port's state has a unit X; then its flow has X/s, and its effort J/X. So one u
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, TypeAlias, final
+from typing import TypeAlias, final
 
-from ephs.operad import Algebra, Interface, Path, Pattern, Quantity
+from ephs.operad import ROOT, Algebra, Interface, Path, Pattern, Quantity
 from ephs.operad.names import PathLike
 from ephs.operad.units import dimension
-from ephs.semantics.algebra.elimination import Row, eliminated, reduced
 from ephs.semantics.errors import SemanticsError
+from ephs.semantics.meaning import LinearRelation, glued
+from ephs.semantics.meaning.fields import Rational
+from ephs.semantics.meaning.functor import Theory
+from ephs.semantics.meaning.variables import ONE, Variable
 
 Unit: TypeAlias = Mapping[str, int | Fraction]
 """Exponents of base units, such as ``{"kg": 1, "m": 1, "s": -1}``."""
@@ -20,6 +23,9 @@ Powers: TypeAlias = Mapping[Path, int] | Mapping[str, int]
 """Port -> power of the unit of its state."""
 BASE = ("kg", "m", "s", "A", "K", "mol")
 """Their order in texts; words of one's own come after them."""
+RATIONAL = Rational()
+SAME = Theory((), ("unit",), states=True)
+"""Ports that show one state have one unit."""
 
 
 @final
@@ -32,12 +38,12 @@ class Units:
     interface
         The ports.
     equations
-        In reduced form: ports, whose exponents are unknown vectors, and base units, whose coefficients are constants;
-        the one equation 1 = 0 where they contradict each other.
+        In reduced form: outer variables are the exponents at ports, unknown vectors; those with a name for good are
+        base units, whose coefficients are constants. The one equation 1 = 0 where they contradict each other.
     """
 
     interface: Interface
-    equations: tuple[Row[tuple[int, Path | str]], ...]
+    equations: tuple[tuple[tuple[Variable, Fraction], ...], ...]
 
     @staticmethod
     def of(
@@ -56,19 +62,19 @@ class Units:
         >>> Units.of(tank, [({"l": 1, "v": -1}, {"m": -2})]).unit("l")
         'm'
         """
-        rows: list[dict[tuple[int, Path | str], Any]] = []
+        rows: list[dict[Variable, int | Fraction]] = []
         for port, of in interface.items():
             unit = _unit(of.quantity)
             if unit is not None:
-                rows.append({(0, port): 1} | _constants(unit))
-        own = {str(name) for row in rows for rank, name in row if rank}
+                rows.append({_at(port): 1} | _constants(unit))
+        own = {str(v.port) for row in rows for v in row if v.role == "own"}
         words = (*BASE, *sorted(own.difference(BASE)))
         for powers, unit in equations:
             unknown = sorted(unit.keys() - set(words))
             if unknown:
                 raise SemanticsError("units", unknown[0], found=unknown[0], expected=", ".join(words))
-            rows.append({(0, Path.of(port)): power for port, power in powers.items()} | _constants(unit))
-        return _made(interface, reduced(rows, _order))
+            rows.append({_at(Path.of(port)): power for port, power in powers.items()} | _constants(unit))
+        return _made(interface, LinearRelation.among(RATIONAL, map(RATIONAL.exact, rows)))
 
     @property
     def consistent(self) -> bool:
@@ -87,12 +93,12 @@ class Units:
             raise SemanticsError("units", port, found="equations that contradict each other", expected="units")
         for row in self.equations:
             (first, _), *rest = row
-            if first == (0, Path.of(port)) and all(rank for (rank, _), _ in rest):
-                return _text({str(name): -value for (_, name), value in rest})
+            if first == _at(Path.of(port)) and all(v.role == "own" for v, _ in rest):
+                return _text({str(v.port): -value for v, value in rest})
         return None
 
 
-_CONTRADICTION: tuple[Row[tuple[int, Path | str]], ...] = ((((1, "1"), Fraction(1)),),)
+_CONTRADICTION = (((ONE, Fraction(1)),),)
 
 
 def _unit(quantity: Quantity) -> Unit | None:
@@ -100,18 +106,19 @@ def _unit(quantity: Quantity) -> Unit | None:
     return dict(dimension(quantity.unit)) if quantity.unit else None
 
 
-def _constants(unit: Unit) -> dict[tuple[int, Path | str], Any]:
-    return {(1, name): -power for name, power in unit.items()}
+def _at(port: Path) -> Variable:
+    return Variable("outer", "unit", ROOT, port, 0)
 
 
-def _order(key: tuple[int, Path | str]) -> tuple[int, Any]:
-    return key
+def _constants(unit: Unit) -> dict[Variable, int | Fraction]:
+    return {Variable("own", "unit", ROOT, Path((name,)), 0): -power for name, power in unit.items()}
 
 
-def _made(interface: Interface, rows: list[dict[tuple[int, Path | str], Fraction]]) -> Units:
-    if any(all(rank for rank, _ in row) for row in rows):
+def _made(interface: Interface, relation: LinearRelation) -> Units:
+    rows = relation.canonical
+    if any(all(v.role == "own" for v in row) for row in rows):
         return Units(interface, _CONTRADICTION)
-    return Units(interface, tuple(tuple(sorted(row.items())) for row in rows))
+    return Units(interface, tuple(tuple(row.items()) for row in rows))
 
 
 def _text(unit: Mapping[str, Fraction]) -> str:
@@ -125,22 +132,8 @@ def _interface(element: object) -> Interface | None:
 
 
 def _compose(pattern: Pattern, parts: Mapping[Path, Units]) -> Units:
-    """Ports on a junction, and junctions that share a state, have one unit."""
-    rows: list[dict[tuple[int, Any], Any]] = []
-    for group in pattern.links:
-        first, *others = sorted(group)
-        rows += [{(0, ("", first)): 1, (0, ("", other)): -1} for other in others]
-    rows += [{(0, path): 1, (0, ("", path)): -1} for path in pattern.interface]
-    for box, part in parts.items():
-        ports = pattern.boxes[box].ports
-        for equation in part.equations:
-            row: dict[tuple[int, Any], Fraction] = {}
-            for (rank, name), value in equation:
-                key = (rank, name) if rank else (0, ("", ports[name].junction))
-                row[key] = row.get(key, Fraction(0)) + value
-            rows.append(row)
-    kept = {key for row in rows for key in row if key[0] or isinstance(key[1], Path)}
-    return _made(pattern.interface, eliminated(rows, kept, _order))
+    relations = {box: LinearRelation.among(RATIONAL, map(dict, part.equations)) for box, part in parts.items()}
+    return _made(pattern.interface, glued(RATIONAL, pattern, relations, SAME))
 
 
 units: Algebra[Units] = Algebra("units", _interface, _compose)

@@ -9,6 +9,7 @@ from ephs.operad.links import closure
 from ephs.operad.names import PathLike
 from ephs.semantics.algebra.fibres import Meaning, relation_for, relations
 from ephs.semantics.errors import SemanticsError
+from ephs.semantics.meaning.partition import pushout
 
 
 @final
@@ -55,15 +56,10 @@ def _interface(element: object) -> Interface | None:
 
 
 def _compose(pattern: Pattern, parts: Mapping[Path, Corelation]) -> Corelation:
-    """The pushout: a part that joins two of its ports joins the junctions that they are on."""
-    groups = list(pattern.links)
-    for box, part in parts.items():
-        ports = pattern.boxes[box].ports
-        groups += [frozenset(ports[port].junction for port in group) for group in part.classes]
-    joined = closure(groups)
-    outer = pattern.interface
-    shown = frozenset(outer)
-    return Corelation(outer, frozenset(joined.get(path, frozenset((path,))) & shown for path in outer))
+    """A part that joins two of its ports joins the junctions that they are on."""
+    shown = {box: [(group, None) for group in part.classes] for box, part in parts.items()}
+    classes = (frozenset(ports) for ports, _ in pushout(pattern, shown) if ports)
+    return Corelation(pattern.interface, frozenset(classes))
 
 
 corelations: Algebra[Corelation] = Algebra("corelations", _interface, _compose)

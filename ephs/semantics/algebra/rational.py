@@ -1,20 +1,21 @@
 """Linear relations over ℚ, exactly: flows and efforts of linear systems, with their states beside them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal, TypeAlias, final
+from typing import Literal, TypeAlias, final
 
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Path, Pattern
-from ephs.semantics.algebra.elimination import RATIONAL, Row, eliminated, reduced
 from ephs.semantics.meaning import LinearRelation, glued, variables
-from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.meaning.fields import Rational
+from ephs.semantics.meaning.variables import Variable, own
 
 Number: TypeAlias = int | Fraction
 Kind: TypeAlias = Literal["effort", "flow", "one", "rate", "state", "before", "after"]
 Coordinate: TypeAlias = tuple[Kind, Path, int]
 """Key of an unknown: its kind, port or state, and its place in a vector; ``("one", ROOT, 0)`` is constantly one."""
 ONE: Coordinate = ("one", ROOT, 0)
+RATIONAL = Rational()
 
 
 @final
@@ -34,7 +35,7 @@ class ExactRelation:
 
     interface: Interface
     inner: tuple[tuple[Path, int], ...]
-    equations: tuple[Row[Coordinate], ...]
+    equations: tuple[tuple[tuple[Coordinate, Fraction], ...], ...]
 
     @staticmethod
     def of(
@@ -56,7 +57,14 @@ class ExactRelation:
         effort q - 3 state q = 0
         flow q - rate q = 0
         """
-        return _made(interface, dict(inner or {}), reduced(equations, _order))
+        rows = [RATIONAL.exact({_variable(key): value for key, value in row.items()}) for row in equations]
+        return _made(interface, inner or {}, LinearRelation.among(RATIONAL, rows))
+
+    @property
+    def relation(self) -> LinearRelation:
+        """The equations as a relation between variables; those of states inside have the states' names."""
+        rows = [{_variable(key): value for key, value in row} for row in self.equations]
+        return LinearRelation.among(RATIONAL, rows)
 
     @property
     def empty(self) -> bool:
@@ -67,18 +75,19 @@ class ExactRelation:
         return "\n".join(map(_text, self.equations)) or "(no equation)"
 
 
-def _order(key: Coordinate) -> tuple[bool, str, Path, int]:
-    return (key == ONE, *key)
+def _variable(key: Coordinate) -> Variable:
+    kind, path, i = key
+    if key == ONE:
+        return variables.ONE
+    return Variable("outer" if kind in ("flow", "effort") else "own", kind, ROOT, path, i)
 
 
-def _made(interface: Interface, inner: Mapping[Path, int], rows: list[dict[Coordinate, Fraction]]) -> ExactRelation:
-    if any(row.keys() == {ONE} for row in rows):
-        rows = [{ONE: Fraction(1)}]
-    equations = tuple(tuple(sorted(row.items(), key=lambda item: _order(item[0]))) for row in rows)
+def _made(interface: Interface, inner: Mapping[Path, int], relation: LinearRelation) -> ExactRelation:
+    equations = tuple(tuple(((v.kind, v.port, v.place), n) for v, n in row.items()) for row in relation.canonical)
     return ExactRelation(interface, tuple(sorted(inner.items())), equations)
 
 
-def _text(row: Row[Coordinate]) -> str:
+def _text(row: tuple[tuple[Coordinate, Fraction], ...]) -> str:
     words: list[str] = []
     for (kind, path, i), value in row:
         name = "" if kind == "one" else f"{kind} {path}" + (f"[{i}]" if i else "")
@@ -91,37 +100,23 @@ def _interface(element: object) -> Interface | None:
     return element.interface if isinstance(element, ExactRelation) else None
 
 
-def _linear(element: ExactRelation, box: Path) -> LinearRelation:
-    """The relation of what fills a box; states inside have their names in the whole."""
-
-    def variable(key: Coordinate) -> Variable:
-        kind, path, i = key
-        if key == ONE:
-            return variables.ONE
-        outer = kind in ("flow", "effort")
-        return Variable("outer" if outer else "own", kind, ROOT, path if outer else box / path, i)
-
-    rows = [{variable(key): value for key, value in row} for row in element.equations]
-    return LinearRelation.of(RATIONAL, {name for row in rows for name in row}, rows)
+def _named(element: ExactRelation, name: Callable[[Path], Path]) -> tuple[dict[Path, int], LinearRelation]:
+    """The states inside under other names, and the relation with them."""
+    relation = element.relation.renamed(lambda v: v._replace(port=name(v.port)) if v.role == "own" else v)
+    return {name(path): dim for path, dim in element.inner}, relation
 
 
 def _compose(pattern: Pattern, parts: Mapping[Path, ExactRelation]) -> ExactRelation:
-    found = glued(RATIONAL, pattern, {box: _linear(part, box) for box, part in parts.items()})
-    rows: list[dict[Any, Fraction]] = [
-        {(v.kind, v.port, v.place): n for v, n in row.items()} for row in found.equations
-    ]
-    return ExactRelation.of(pattern.interface, rows, {box / n: d for box, part in parts.items() for n, d in part.inner})
+    inner: dict[Path, int] = {}
+    relations: dict[Path, LinearRelation] = {}
+    for box, part in parts.items():
+        states, relations[box] = _named(part, box.__truediv__)
+        inner |= states
+    return _made(pattern.interface, inner, glued(RATIONAL, pattern, relations))
 
 
 def _rename(element: ExactRelation, names: Mapping[Path, Path]) -> ExactRelation:
-    inner = {path.moved(names): dim for path, dim in element.inner}
-    rows: list[dict[Coordinate, Fraction]] = []
-    for equation in element.equations:
-        row: dict[Coordinate, Fraction] = {}
-        for (kind, path, i), value in equation:
-            row[kind, path if kind in ("effort", "flow", "one") else path.moved(names), i] = value
-        rows.append(row)
-    return ExactRelation.of(element.interface, rows, inner)
+    return _made(element.interface, *_named(element, lambda path: path.moved(names)))
 
 
 exact_relations: Algebra[ExactRelation] = Algebra("exact relations", _interface, _compose, rename=_rename)
@@ -129,8 +124,8 @@ exact_relations: Algebra[ExactRelation] = Algebra("exact relations", _interface,
 
 
 def _behaviour(element: ExactRelation) -> ExactRelation:
-    stay = {key for row in element.equations for key, _ in row if key[0] in ("effort", "flow", "one")}
-    return _made(element.interface, {}, eliminated(map(dict, element.equations), stay, _order))
+    relation = element.relation
+    return _made(element.interface, {}, relation.without(v for v in relation.variables if v.role == "own"))
 
 
 behaviour: AlgebraMap[ExactRelation, ExactRelation] = AlgebraMap(
@@ -144,19 +139,15 @@ def midpoint(h: Number) -> AlgebraMap[ExactRelation, ExactRelation]:
     step = Fraction(h)
 
     def discretised(element: ExactRelation) -> ExactRelation:
-        rows: list[dict[Coordinate, Fraction]] = []
-        for equation in element.equations:
-            row: dict[Coordinate, Fraction] = {}
-            for key, value in equation:
-                kind, path, i = key
-                terms: dict[Coordinate, Fraction] = {key: value}
-                if kind == "state":
-                    terms = {("before", path, i): value / 2, ("after", path, i): value / 2}
-                elif kind == "rate":
-                    terms = {("before", path, i): -value / step, ("after", path, i): value / step}
-                for new, term in terms.items():
-                    row[new] = row.get(new, Fraction(0)) + term
-            rows.append(row)
-        return ExactRelation.of(element.interface, rows, dict(element.inner))
+        rows: list[dict[Variable, Fraction]] = []
+        instant: list[Variable] = []
+        for path, dim in element.inner:
+            kinds = [own(kind, path, dim) for kind in ("state", "rate", "before", "after")]
+            for state, rate, before, after in zip(*kinds, strict=True):
+                rows.append(RATIONAL.exact({state: 2, before: -1, after: -1}))
+                rows.append(RATIONAL.exact({rate: step, before: 1, after: -1}))
+                instant += [state, rate]
+        of_step = LinearRelation.among(RATIONAL, rows)
+        return _made(element.interface, dict(element.inner), element.relation.join(of_step).without(instant))
 
     return AlgebraMap(exact_relations, exact_relations, discretised, f"midpoint rule, h = {step}")

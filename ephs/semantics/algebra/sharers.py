@@ -11,9 +11,9 @@ from fractions import Fraction
 from typing import Any, TypeAlias, final
 
 from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
-from ephs.operad.links import closure
 from ephs.semantics.algebra.duals import Dual
 from ephs.semantics.errors import SemanticsError
+from ephs.semantics.meaning.partition import pushout
 
 State: TypeAlias = frozenset[Path]
 """A shared state, by the paths of its members."""
@@ -95,47 +95,29 @@ def _interface(element: object) -> Interface | None:
 
 def _compose(pattern: Pattern, parts: Mapping[Path, Sharer]) -> Sharer:
     """The pushforward of states: those on one junction, or on linked ones, become one, and rates add."""
-    groups = [frozenset(map(_junction, group)) for group in pattern.links]
-    for box, part in parts.items():
-        for port, state in part.shows.items():
-            groups.append(frozenset((_inner(box, state), _junction(pattern.boxes[box].ports[port].junction))))
-    joined = closure(groups)
-    members: dict[frozenset[Path], set[Path]] = {}
-    dims: dict[frozenset[Path], int] = {}
-    for box, part in parts.items():
-        for state, dim in part.states.items():
-            group = _group(joined, _inner(box, state))
-            members.setdefault(group, set()).update(box / path for path in state)
-            dims[group] = dim
-    whole = {group: frozenset(paths) for group, paths in members.items()}
-    places = [
-        (part, {state: whole[_group(joined, _inner(box, state))] for state in part.states})
+    shown = {
+        box: [([port for port, found in part.shows.items() if found == state], state) for state in part.states]
         for box, part in parts.items()
-    ]
+    }
+    states: dict[State, int] = {}
+    shows: dict[Path, State] = {}
+    places: dict[Path, dict[State, State]] = {box: {} for box in parts}
+    for ports, members in pushout(pattern, shown):
+        whole = frozenset(box / path for box, state in members for path in state)
+        shows |= dict.fromkeys(ports, whole)
+        for box, state in members:
+            places[box][state] = whole
+            states[whole] = parts[box].states[state]
 
     def rates(values: Values) -> Values:
         total: dict[State, tuple[Any, ...]] = {}
-        for part, place in places:
-            for state, rate in part.rates({state: values[at] for state, at in place.items()}).items():
+        for box, place in places.items():
+            for state, rate in parts[box].rates({state: values[at] for state, at in place.items()}).items():
                 old = total.get(place[state])
                 total[place[state]] = rate if old is None else tuple(a + b for a, b in zip(old, rate, strict=True))
         return total
 
-    shows = {port: whole[_group(joined, _junction(port))] for port in pattern.interface}
-    states = {whole[group]: dim for group, dim in dims.items()}
     return Sharer(pattern.interface, states, Directory.trusted(shows), rates)
-
-
-def _junction(path: Path) -> Path:
-    return Path(("junction", *path))
-
-
-def _inner(box: Path, state: State) -> Path:
-    return Path(("box", *(box / min(state))))
-
-
-def _group(joined: Mapping[Path, frozenset[Path]], path: Path) -> frozenset[Path]:
-    return joined.get(path) or frozenset((path,))
 
 
 def _equal(left: Sharer, right: Sharer) -> bool:

@@ -12,11 +12,11 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Path, Pattern, Quantity
-from ephs.operad.links import closure
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import AssemblyError
 from ephs.semantics.initial import read_state
 from ephs.semantics.meaning.fields import ROUNDED, Field, Rounded
+from ephs.semantics.meaning.partition import pushout
 from ephs.semantics.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import manifold
 
@@ -116,32 +116,13 @@ def glued_classes(pattern: Pattern, parts: Mapping[Path, Sequence[StateClass]]) 
     A state that nobody stores or reads is left out where no outer port shows it: the relation does not depend on it.
     """
     found: list[StateClass] = []
-    joined: list[tuple[list[Path], StateClass]] = []  # junctions that a part's class is on
-    for box, classes in parts.items():
-        ports = pattern.boxes[box].ports
-        for each in classes:
-            stores, readers = (tuple(box / path for path in paths) for paths in (each.stores, each.readers))
-            named = StateClass(each.quantity, (), stores, readers)
-            if each.ports:
-                joined.append(([ports[port].junction for port in each.ports], named))
-            else:
-                found.append(named)
-    one = closure([*pattern.links, *(junctions for junctions, _ in joined)])
-    members: dict[frozenset[Path], list[StateClass]] = {}
-    for junctions, each in joined:
-        members.setdefault(one.get(junctions[0]) or frozenset(junctions[:1]), []).append(each)
-    for junctions, parts_of in members.items():
-        ports = tuple(sorted(path for path in junctions if pattern.junctions[path].exposed))
-        stores = tuple(sorted(path for each in parts_of for path in each.stores))
-        readers = tuple(sorted(path for each in parts_of for path in each.readers))
-        if ports or stores or readers:
-            found.append(StateClass(parts_of[0].quantity, ports, stores, readers))
-    return sorted_classes(found)
-
-
-def sorted_classes(classes: Sequence[StateClass]) -> tuple[StateClass, ...]:
-    """The classes in the order of their names."""
-    return tuple(sorted(classes, key=lambda each: each.name))
+    shown = {box: [(each.ports, each) for each in classes] for box, classes in parts.items()}
+    for ports, members in pushout(pattern, shown):
+        stores = tuple(sorted(box / path for box, each in members for path in each.stores))
+        readers = tuple(sorted(box / path for box, each in members for path in each.readers))
+        if members and (ports or stores or readers):
+            found.append(StateClass(members[0][1].quantity, ports, stores, readers))
+    return tuple(sorted(found, key=lambda each: each.name))
 
 
 def place(classes: Sequence[StateClass], state: Values, ports: Values) -> tuple[dict[Path, Array], str]:

@@ -29,7 +29,7 @@ class Field(ABC, Generic[N]):
     """Whether zero is decided, of the numbers as they are read."""
 
     @abstractmethod
-    def number(self, value: float, error: float = 0.0) -> N:
+    def number(self, value: float | Fraction, error: float = 0.0) -> N:
         """A number that is known to an error; without one it is meant exactly."""
 
     @abstractmethod
@@ -56,7 +56,7 @@ class Field(ABC, Generic[N]):
     def pivot(self, rows: Sequence[Row[N]], variable: Any) -> int:
         """Index of the pivot row for the elimination of a variable, which is certainly there in all rows."""
 
-    def exact(self, terms: Mapping[Any, float]) -> Row[N]:
+    def exact(self, terms: Mapping[Any, float | Fraction]) -> Row[N]:
         """A linear form whose coefficients are meant exactly."""
         return {key: self.number(value) for key, value in terms.items() if value}
 
@@ -96,7 +96,7 @@ class Rational(Field[Fraction]):
     def __init__(self, read: Callable[[float], Fraction] = Fraction) -> None:
         self._read = read
 
-    def number(self, value: float, error: float = 0.0) -> Fraction:
+    def number(self, value: float | Fraction, error: float = 0.0) -> Fraction:
         """The rational number of a float; ℚ knows no error."""
         return value if isinstance(value, Fraction) else self._read(value)
 
@@ -141,9 +141,9 @@ class Rounded(Field[Bounded]):
     __slots__ = ()
     one = (1.0, 0.0)
 
-    def number(self, value: float, error: float = 0.0) -> Bounded:
+    def number(self, value: float | Fraction, error: float = 0.0) -> Bounded:
         """A float and the bound of its error."""
-        size = abs(value)
+        size = abs(float(value))
         return (float(value), error) if size > error else (0.0, error + size)
 
     def value(self, number: Bounded) -> float:

@@ -5,11 +5,13 @@ F(f) is a relation between variables at the ports of the boxes and at the outer 
     (F(f) ∩ ⊕ parts) projected to what is not inside,
 
 whether the parts are relations of components, of systems or of patterns. Hence one formula composes systems,
-substitutes patterns, F(f ∘ g) = F(f) ∘ F(g), and takes a step of time.
+substitutes patterns, F(f ∘ g) = F(f) ∘ F(g), and takes a step of time. A table says what a pattern says of each kind of
+variable, so that the formula serves other numbers at ports, too.
 """
 
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any, TypeAlias, final
 
 from ephs.operad import Path, Pattern, PortType
 from ephs.semantics.meaning.fields import Field, Row
@@ -20,32 +22,62 @@ _Port: TypeAlias = tuple[float, Path | None, Path, PortType]
 """Sign of its flow in the balance, box or None at the interface, port and what it is."""
 
 
-def relation_of_pattern(field: Field[Any], pattern: Pattern, inside: Role = "inner") -> LinearRelation:
-    """F(f): at each junction flows balance, the outer one counting negative, and efforts are shared.
+@final
+@dataclass(frozen=True, slots=True)
+class Theory:
+    """What a pattern says of the variables at ports, by their kind.
+
+    Parameters
+    ----------
+    balanced
+        Kinds whose variables add up to zero, the outer one counting negative.
+    shared
+        Kinds of which there is one variable.
+    states
+        Whether all ports that show one state are together; else the power ports on one junction.
+    """
+
+    balanced: tuple[str, ...]
+    shared: tuple[str, ...]
+    states: bool = False
+
+
+POWER = Theory(("flow",), ("effort",))
+
+
+def relation_of_pattern(
+    field: Field[Any], pattern: Pattern, inside: Role = "inner", theory: Theory = POWER
+) -> LinearRelation:
+    """F(f): at each junction flows balance and efforts are shared, or what another theory says.
 
     Parameters
     ----------
     inside
         The role of variables at boxes: ``"met"`` of boxes that are being filled.
     """
-    at: dict[Path, list[_Port]] = {}
-    for box, content in pattern.boxes.items():
-        for port, wire in content.ports.items():
-            if wire.power:
-                at.setdefault(wire.junction, []).append((1.0, box, port, content.interface[port]))
-    for port, described in pattern.interface.items():
-        if described.power:
-            at.setdefault(port, []).append((-1.0, None, port, described))
+    ports: list[tuple[Path, bool, _Port]] = [
+        (wire.junction, wire.power, (1.0, box, port, content.interface[port]))
+        for box, content in pattern.boxes.items()
+        for port, wire in content.ports.items()
+    ]
+    ports += [(port, described.power, (-1.0, None, port, described)) for port, described in pattern.interface.items()]
+    together: dict[Path, list[_Port]] = {}
+    for junction, power, port in ports:
+        if theory.states or power:
+            place = min(pattern.state_class(junction)) if theory.states else junction
+            together.setdefault(place, []).append(port)
     variables: list[Variable] = []
     rows: list[Row[Any]] = []
-    for ports in at.values():
-        flows, efforts = ([_at(inside, kind, where) for where in ports] for kind in ("flow", "effort"))
-        signs = [sign for sign, *_ in ports]
-        for i in range(len(flows[0])):
-            rows.append(field.exact({each[i]: sign for sign, each in zip(signs, flows, strict=True)}))
-            rows += [field.exact({efforts[0][i]: 1.0, other[i]: -1.0}) for other in efforts[1:]]
-        for each in (*flows, *efforts):
-            variables += each
+    for group in together.values():
+        signs = [sign for sign, *_ in group]
+        for kind in (*theory.balanced, *theory.shared):
+            # by places of the vector
+            for each in zip(*(_at(inside, kind, where) for where in group), strict=True):
+                variables += each
+                if kind in theory.balanced:
+                    rows.append(field.exact(dict(zip(each, signs, strict=True))))
+                else:
+                    rows += [field.exact({each[0]: 1.0, other: -1.0}) for other in each[1:]]
     return LinearRelation.of(field, variables, rows)
 
 
@@ -70,9 +102,11 @@ def _composed(whole: LinearRelation, parts: Mapping[Path, LinearRelation]) -> Li
     return joined.without(v for v in joined.variables if v.role == "met")
 
 
-def glued(field: Field[Any], pattern: Pattern, parts: Mapping[Path, LinearRelation]) -> LinearRelation:
+def glued(
+    field: Field[Any], pattern: Pattern, parts: Mapping[Path, LinearRelation], theory: Theory = POWER
+) -> LinearRelation:
     """(F(f) ∩ ⊕ parts) projected to the outer ports."""
-    return _composed(relation_of_pattern(field, pattern, "met"), parts)
+    return _composed(relation_of_pattern(field, pattern, "met", theory), parts)
 
 
 def power(relation: LinearRelation) -> dict[Variable, tuple[Variable, int]]:

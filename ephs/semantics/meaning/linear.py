@@ -37,6 +37,12 @@ class LinearRelation:
         """The relation of some equations; without any it is everything."""
         return LinearRelation(field, frozenset(variables), tuple(row for row in equations if field.support(row)))
 
+    @staticmethod
+    def among(field: Field[Any], equations: Iterable[Row[Any]]) -> "LinearRelation":
+        """The relation of some equations between the variables that are in them."""
+        rows = list(equations)
+        return LinearRelation.of(field, {variable for row in rows for variable in row}, rows)
+
     def join(self, *others: "LinearRelation") -> "LinearRelation":
         """All at once; variables of one name are one."""
         variables = self.variables.union(*(each.variables for each in others))
@@ -60,8 +66,9 @@ class LinearRelation:
 
     @property
     def canonical(self) -> tuple[Row[Any], ...]:
-        """The equations in reduced form: over ℚ equal relations have equal ones."""
-        return tuple(reduced(self.field, self.equations, _one_last))
+        """The equations in reduced form, 1 = 0 alone if it is empty: over ℚ equal relations have equal ones."""
+        rows = tuple(reduced(self.field, self.equations, _one_last))
+        return rows[-1:] if rows and rows[-1].keys() == {ONE} else rows
 
     @property
     def dimension(self) -> int:

@@ -131,7 +131,7 @@ def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
         for effort, number in equation.items():
             point.field.subtract(row, number, slopes[effort])
         rows.append(row)
-    return LinearRelation.of(point.field, {v for row in rows for v in row}, rows)
+    return LinearRelation.among(point.field, rows)
 
 
 def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Row[Any]]:
