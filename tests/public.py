@@ -45,7 +45,6 @@ CLASSES = (
     "ephs.semantics.meaning.StateClass",
     "ephs.semantics.spaces.Pair",
     "ephs.semantics.spaces.PairEntry",
-    "ephs.semantics.subspace.Subspace",
 )
 """What public functions return or take, and where it is."""
 FILE = Path(__file__).with_name("public.txt")

@@ -116,7 +116,6 @@ ATTRIBUTES = {
     "ephs.Solution": "t energy exergy entropy stats __getitem__",
     "ephs.SimulationError": "partial",
     "ephs.semantics.meaning.Instant": "projector empty determined",
-    "ephs.semantics.subspace.Subspace": "projector",
     "ephs.mechanics.dynamics.Dynamics": "state0",
     "ephs.mechanics.dynamics.State": "array",
     "ephs.mechanics.motion.motion.BodyMotion": "position quaternion rotation velocity angular_velocity",

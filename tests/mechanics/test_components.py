@@ -19,9 +19,10 @@ from ephs.semantics import Reference, Storage, StructureError, library
 from ephs.semantics.behaviour import Natural
 from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
 from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
-from ephs.semantics.verdicts.checks import dirac, random_efforts, random_point
+from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import check_primitive, mechanisms
+from tests.semantics.subspace import dirac
 
 REFERENCE = Reference()
 EPS = float(np.finfo(float).eps)

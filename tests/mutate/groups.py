@@ -102,12 +102,11 @@ GROUPS = {
         (
             "ephs/semantics/meaning/*.py",
             "ephs/semantics/laws.py",
-            "ephs/semantics/subspace.py",
         ),
         (
             *tuple(
                 f"tests/semantics/test_{name}.py"
-                for name in ("base", "controls", "edge_cases", "laws", "naturality", "relations", "stacked", "subspace")
+                for name in ("base", "controls", "edge_cases", "laws", "naturality", "relations", "stacked")
             ),
             "tests/semantics/meaning",
         ),

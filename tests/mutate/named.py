@@ -87,19 +87,15 @@ BREAKS = {
     ),
     "import, welds": Break("ephs/mechanics/imports/mjcf_links.py", "pose(data[3:6], data[6:10])", "pose(data[3:6])"),
     "base, what a part identifies": Break(
-        "ephs/semantics/meaning/base.py",
-        "one = closure([*pattern.links, *(junctions for junctions, _ in joined)])",
-        "one = closure(pattern.links)",
+        "ephs/semantics/meaning/partition.py", "joined = closure(groups)", "joined = closure(pattern.links)"
     ),
     "base, links of a level": Break(
-        "ephs/semantics/meaning/base.py",
-        "one = closure([*pattern.links, *(junctions for junctions, _ in joined)])",
-        "one = closure(junctions for junctions, _ in joined)",
+        "ephs/semantics/meaning/partition.py",
+        "groups: list[Iterable[Path]] = list(pattern.links)",
+        "groups: list[Iterable[Path]] = []",
     ),
     "base, shown at every outer port of its class": Break(
-        "ephs/semantics/meaning/base.py",
-        "for path in junctions if pattern.junctions[path].exposed))",
-        "for path in junctions if path == min(junctions) and pattern.junctions[path].exposed))",
+        "ephs/semantics/meaning/partition.py", "sorted(outer & members)", "sorted(outer & {min(members)})"
     ),
     "base, diagonal": Break("ephs/semantics/meaning/base.py", "if not all(_equal(", "if not any(_equal("),
     "base, states that nobody stores": Break(
@@ -119,16 +115,16 @@ BREAKS = {
     ),
     "gluing": Break(
         "ephs/semantics/meaning/functor.py",
-        "append((-1.0, None, port, described))",
-        "append((1.0, None, port, described))",
+        "(-1.0, None, port, described)",
+        "(1.0, None, port, described)",
     ),
     "gluing, third port": Break(
-        "ephs/semantics/meaning/functor.py", "for other in efforts[1:]]", "for other in efforts[1:2]]"
+        "ephs/semantics/meaning/functor.py", "for other in each[1:]]", "for other in each[1:2]]"
     ),
     "gluing, open ports": Break(
         "ephs/semantics/meaning/functor.py",
-        "            rows.append(field.exact({each[i]: sign for sign, each in zip(signs, flows, strict=True)}))",
-        "            rows += [field.exact({f[i]: s for s, f in zip(signs, flows, strict=True)})] * (len(signs) > 1)",
+        "rows.append(field.exact(dict(zip(each, signs, strict=True))))",
+        "rows += [field.exact(dict(zip(each, signs, strict=True)))] * (len(signs) > 1)",
     ),
     "emptiness never": Break(
         "ephs/semantics/meaning/posed.py",

@@ -10,8 +10,9 @@ from ephs.operad import Path
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.bundle import Bundle
-from ephs.semantics.verdicts.checks import dirac, random_efforts, random_point
+from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
+from tests.semantics.subspace import dirac
 
 GASES = (
     library.chemistry.Species("A", {"X": 1}, energy=1e3, entropy=10.0, capacity=20.0),

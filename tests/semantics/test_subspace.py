@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ephs.semantics.subspace import Subspace
+from tests.semantics.subspace import Subspace
 
 DIAGONAL = np.array([[1.0], [1.0]]) / np.sqrt(2.0)
 

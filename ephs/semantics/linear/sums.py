@@ -38,9 +38,3 @@ def uncancelled(matrix: NDArray[Any], columns: Sequence[int]) -> NDArray[Any]:
         return matrix
     same = np.equal.outer(columns, columns).astype(float)
     return np.where(np.abs(matrix @ same) > ROUNDED * (np.abs(matrix) @ same), matrix, 0.0)
-
-
-def unit_rows(constraint: NDArray[Any]) -> NDArray[Any]:
-    """Matrix (k, n) with rows of length one, or zero: a constraint 0 = C e does not depend on the size of a row."""
-    sizes = np.linalg.norm(constraint, axis=1, keepdims=True)
-    return constraint / np.where(sizes > 0.0, sizes, 1.0)

@@ -96,6 +96,12 @@ def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array
     return LinearRelation.of(field, [*flows, *efforts, *multipliers], rows)
 
 
+def constant_relation(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> LinearRelation:
+    """The relation of f = A e + Cᵀ λ, 0 = C e in f and e alone."""
+    found = process(field, bundle, dynamic, constraint)
+    return found.onto(variable for variable in found.variables if variable.role == "outer")
+
+
 def _rounded(field: Field[Any], names: list[Variable], entries: list[float], sizes: list[float]) -> Row[Any]:
     return field.rounded(dict(zip(names, entries, strict=True)), dict(zip(names, sizes, strict=True)))
 

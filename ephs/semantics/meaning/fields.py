@@ -27,6 +27,8 @@ class Field(ABC, Generic[N]):
     one: N
     decides: ClassVar[bool] = False
     """Whether zero is decided, of the numbers as they are read."""
+    rounding: float = ROUNDED
+    """Relative error of coefficients that were computed."""
 
     @abstractmethod
     def number(self, value: float | Fraction, error: float = 0.0) -> N:
@@ -64,7 +66,7 @@ class Field(ABC, Generic[N]):
         """A linear form whose coefficients were computed, with rounding beside themselves or beside larger sizes."""
         beside = sizes or {}
         return {
-            key: self.number(value, ROUNDED * max(abs(value), beside.get(key, 0.0)))
+            key: self.number(value, self.rounding * max(abs(value), beside.get(key, 0.0)))
             for key, value in terms.items()
             if value
         }
@@ -136,10 +138,19 @@ Bounded: TypeAlias = tuple[float, float]
 
 @final
 class Rounded(Field[Bounded]):
-    """Floats with bounds of their errors (running error analysis)."""
+    """Floats with bounds of their errors (running error analysis).
 
-    __slots__ = ()
+    Parameters
+    ----------
+    rounding
+        Relative error of coefficients that were computed.
+    """
+
+    __slots__ = ("rounding",)
     one = (1.0, 0.0)
+
+    def __init__(self, rounding: float = ROUNDED) -> None:
+        self.rounding = rounding
 
     def number(self, value: float | Fraction, error: float = 0.0) -> Bounded:
         """A float and the bound of its error."""

@@ -14,7 +14,6 @@ from ephs.semantics.bundle import Array
 from ephs.semantics.meaning.elimination import echelon, eliminated, reduced
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.variables import ONE, Variable
-from ephs.semantics.subspace import Subspace
 
 
 @final
@@ -162,9 +161,15 @@ class LinearRelation:
                 row[place[variable]] = self.field.value(number)
         return out / np.linalg.norm(out, axis=1, keepdims=True) if unit else out
 
-    def subspace(self, order: Sequence[Variable]) -> Subspace:
-        """The relation as a subspace of ℝⁿ, in an order of the n variables."""
-        return Subspace.from_kernel(self.matrix(order))
+    def projector(self, order: Sequence[Variable]) -> Array:
+        """The orthogonal projector (n, n) on it, in an order of the n variables."""
+        place = {variable: i for i, variable in enumerate(order)}
+        span = np.zeros((len(place), self.dimension))
+        for column, vector in zip(span.T, self.basis(), strict=True):
+            for variable, number in vector.items():
+                column[place[variable]] = self.field.value(number)
+        orthonormal = np.linalg.qr(span / np.linalg.norm(span, axis=0))[0]
+        return orthonormal @ orthonormal.T
 
 
 def _one_last(variable: Variable) -> tuple[bool, Variable]:

@@ -26,7 +26,6 @@ from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
 from ephs.semantics.meaning.variables import ONE, Variable, into, own
 from ephs.semantics.primitives import Primitive, Storage
-from ephs.semantics.subspace import Subspace
 from ephs.semantics.system import Filling, as_system, fold, require_fillings
 
 Route: TypeAlias = Literal["flat", "nested"]
@@ -253,14 +252,9 @@ class Instant:
         return out
 
     @property
-    def subspace(self) -> Subspace:
-        """The relation as a subspace of the vectors in the `order` of variables."""
-        return self.linear.subspace(self.order)
-
-    @property
     def projector(self) -> Array:
-        """The orthogonal projector on the `subspace`."""
-        return self.subspace.projector
+        """The orthogonal projector on the relation, as a subspace of the vectors in the `order` of variables."""
+        return self.linear.projector(self.order)
 
     @property
     def dimension(self) -> int:
@@ -277,7 +271,7 @@ class Instant:
             raise ValueError("relations between variables of other names cannot be compared")
         if self.linear.empty or other.linear.empty:
             return float(self.linear.empty != other.linear.empty)
-        return self.subspace.distance(other.subspace)
+        return float(np.abs(self.projector - other.projector).max(initial=0.0))
 
 
 def _glued(pattern: Pattern, parts: Mapping[Path, Relation], reference: Reference) -> Relation:

@@ -13,11 +13,9 @@ from ephs.operad import Path
 from ephs.semantics.bundle import Array, Bundle
 from ephs.semantics.errors import StructureError
 from ephs.semantics.extents import into
-from ephs.semantics.linear.sums import unit_rows
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
-from ephs.semantics.subspace import Subspace
 from ephs.semantics.verdicts.trials import ROTATING, Trial
 
 if TYPE_CHECKING:
@@ -166,21 +164,19 @@ def _check_gradient(storage: "Storage", trial: Trial, gradient: Array) -> None:
         raise _fail("gradient", storage, trial, found, entry=(entry,), expected=expected)
 
 
-def dirac(skew: Array, constraint: Array) -> Subspace:
-    """The subspace {(f, e): f = L e + Cᵀ λ, 0 = C e} of ℝ²ⁿ."""
-    n, k, rows = skew.shape[0], constraint.shape[0], unit_rows(constraint)
-    kernel = np.block([[-np.eye(n), skew, rows.T], [np.zeros((k, n)), rows, np.zeros((k, k))]])
-    return Subspace.from_kernel(kernel).project(range(2 * n))
-
-
-def _apart(one: tuple[Array, Array], two: tuple[Array, Array]) -> float:
-    """Distance of two Dirac structures (L, C), relative to their entries: 0 where the matrices are equal."""
+def _apart(bundle: Bundle, one: tuple[Array, Array], two: tuple[Array, Array]) -> float:
+    """Largest difference of the matrices of two structures (L, C), relative to these; 0 if they are one relation."""
     scales = [max(float(np.abs(a).max(initial=0.0)), TINY) for a in (one[0], one[1])]
     same = [float(np.abs(a - b).max(initial=0.0)) / s for a, b, s in zip(one, two, scales, strict=True)]
     same[1] = min(same[1], float(np.abs(one[1] + two[1]).max(initial=0.0)) / scales[1])
     if max(same) <= SAME or not one[1].size:
         return max(same)
-    return dirac(*one).distance(dirac(*two))
+    from ephs.semantics.meaning.components import constant_relation
+    from ephs.semantics.meaning.fields import Rounded
+
+    known = Rounded(SAME)
+    relation, other = (constant_relation(known, bundle, *each) for each in (one, two))
+    return 0.0 if relation.same(other) else max(same)
 
 
 def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
@@ -209,11 +205,11 @@ def _check_reversible(reversible: "Reversible", trial: Trial) -> None:
             raise _fail("conservation", reversible, trial, float(defect[entry]), quantity=kind, entry=entry)
     # (f, e) ∈ D(x) ⇔ (−ϵf, ϵe) ∈ D(ϵx)
     there = reversible.structure(_reversed(bundle, x))
-    found = _apart((-parity[:, None] * skew * parity, constraint * parity), there) if _finite(*there) else 0.0
+    found = _apart(bundle, (-parity[:, None] * skew * parity, constraint * parity), there) if _finite(*there) else 0.0
     if not reversible.external_field and not found <= SAME:
         raise _fail("parity", reversible, trial, found, flag=FLAGS["reversible"])
     for port, opposite in _opposite(bundle, x):
-        found = _apart((skew, constraint), reversible.structure({**x, port: opposite}))
+        found = _apart(bundle, (skew, constraint), reversible.structure({**x, port: opposite}))
         if not found <= SAME:
             raise _fail("rotation-sign", reversible, trial, found, what="the structure tells", port=port)
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from ephs.semantics.bundle import Array, Reference
 from ephs.semantics.errors import StructureError
-from ephs.semantics.meaning.components import process
+from ephs.semantics.meaning.components import constant_relation
 from ephs.semantics.meaning.fields import ROUNDED, Rational
-from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.verdicts.checks import FLAGS, STATEMENTS
 from ephs.semantics.verdicts.claims import Claim, of_formulas
@@ -87,17 +86,11 @@ def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: A
     mirrored = -parity[:, None] * skew * parity, constraint * parity
     for words, read in READINGS.items():
         one, other = (
-            _without_multipliers(process(Rational(read), reversible.bundle, *each))
-            for each in ((skew, constraint), mirrored)
+            constant_relation(Rational(read), reversible.bundle, *each) for each in ((skew, constraint), mirrored)
         )
         if one.same(other):
             return Condition(statement, True, ("relations", words))
     return Condition(statement, False, ("off", "both sides are equal up to the rounding of the whole structure"))
-
-
-def _without_multipliers(relation: LinearRelation) -> LinearRelation:
-    """Equations in f and e alone."""
-    return relation.onto(variable for variable in relation.variables if variable.role == "outer")
 
 
 def _beside(reversible: "Reversible", matrix: Array) -> Array:

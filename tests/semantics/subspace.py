@@ -1,7 +1,7 @@
 """Linear subspaces of ℝⁿ by orthonormal bases: projectors of relations and their distances.
 
-Rank is decided relative to the largest singular value, after each row of a kernel was brought to unit length:
-this suits an oracle that compares relations, not an integrator.
+Rank is decided relative to the largest singular value, after each row of a kernel was brought to unit length. Nothing
+of it is in the package: relations are held against it.
 """
 
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundle import Array
-from ephs.semantics.spaces.decompositions import svd
+from ephs.semantics.meaning import Instant
 from ephs.semantics.spaces.rank import ELIMINATION, TINY, rank_of
 
 
@@ -36,7 +36,7 @@ class Subspace:
         rows = matrix[norms > 0.0] / norms[norms > 0.0, None] if matrix.size else matrix[:0]
         if not rows.size:
             return Subspace(np.eye(n))
-        _, sigma, vt = svd(rows)
+        _, sigma, vt = np.linalg.svd(rows)
         rank = rank_of(sigma, ELIMINATION)
         return Subspace(np.ascontiguousarray(vt[rank:].T))
 
@@ -45,7 +45,7 @@ class Subspace:
         """Span of the columns of vectors (n, r); columns small relative to the usual size count as rounding."""
         if not vectors.size:
             return Subspace(np.zeros((vectors.shape[0], 0)))
-        u, sigma, _ = svd(vectors, full_matrices=False)
+        u, sigma, _ = np.linalg.svd(vectors, full_matrices=False)
         rank = rank_of(sigma, ELIMINATION, usual)
         return Subspace(np.ascontiguousarray(u[:, :rank]))
 
@@ -78,3 +78,16 @@ class Subspace:
         """Distance of a vector from the subspace, relative to its length."""
         off = vector - self.basis @ (self.basis.T @ vector)
         return float(np.linalg.norm(off) / max(np.linalg.norm(vector), TINY))
+
+
+def subspace_of(instant: Instant) -> Subspace:
+    """The relation at an instant, of vectors in its order of variables."""
+    return Subspace.from_kernel(instant.linear.matrix(instant.order))
+
+
+def dirac(skew: Array, constraint: Array) -> Subspace:
+    """{(f, e): f = L e + Cᵀ λ, 0 = C e}."""
+    n, k = skew.shape[0], constraint.shape[0]
+    rows = constraint / np.linalg.norm(constraint, axis=1, keepdims=True)
+    kernel = np.block([[-np.eye(n), skew, rows.T], [np.zeros((k, n)), rows, np.zeros((k, k))]])
+    return Subspace.from_kernel(kernel).project(range(2 * n))
