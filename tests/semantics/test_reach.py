@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, Phase, find, given, settings
 from ephs.semantics import AssemblyError, Reversible, Storage, System
 from ephs.testing import fillings, nestings, systems
 from ephs.testing.systems import PULL, STRETCH
+from tests.semantics.scales import scaled, sizes
 from tests.semantics.stacked import levels_of
 
 DRAWN = 120
@@ -76,6 +77,12 @@ def open_ports(level):
     return {port for port, of in level.interface.items() if of.power} - {p.junction for p in ports if p.power}
 
 
+def wide(system, ratio):
+    """Whether the equations at the identity have coefficients so far apart."""
+    found = sizes(system.relation().at())
+    return max(found, default=1.0) >= ratio * min(found, default=1.0)
+
+
 FACTS = {
     "links of three": lambda s: any(len(group) > 2 for _, each in levels_of(s) for group in each.pattern.links),
     "identities in identities": lambda s: chain(s) > 1,
@@ -100,6 +107,8 @@ FACTS = {
     "a quantity of one's own": lambda s: any(each in (STRETCH, PULL) for each in states(s)),
     "a relative pose": lambda s: any(each.kind == "relative_pose" for each in states(s)),
     "equations": assembles,
+    "numbers of 1e9 and 1e-9": lambda s: wide(s, 1e16),
+    "numbers a million apart": lambda s: wide(s, 1e6),
 }
 REACH = {
     "systems": {
@@ -114,6 +123,7 @@ REACH = {
         "links of the flat pattern": 15, "read below its storage": 10, "read above its storage": 5, "equations": DRAWN,
     },
     "systems that are not posed": {"stored twice": 25, "stored by nobody": 15},
+    "rescaled systems": {"numbers of 1e9 and 1e-9": 20, "numbers a million apart": 60},
     "fillings": {
         "links of the flat pattern": 20, "a component reads": 20, "stored by nobody": 12,
         "stored outside": 12,
@@ -125,6 +135,7 @@ STRATEGIES = {
     "systems": systems(),
     "systems in two levels": systems(max_depth=2, max_junctions=2),
     "systems that are not posed": systems(posed=False),
+    "rescaled systems": scaled(systems()),
     "fillings": nestings().flatmap(fillings),
 }
 

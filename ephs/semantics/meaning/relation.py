@@ -20,7 +20,7 @@ from ephs.semantics.bundle import Array, Bundle, Reference
 from ephs.semantics.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.meaning.base import BasePoint, StateClass, Values, component_classes, glued_classes, names_of, place
 from ephs.semantics.meaning.components import at_instant, at_ports, efforts_of
-from ephs.semantics.meaning.fields import Field, Rational, Rounded
+from ephs.semantics.meaning.fields import ROUNDED, Field, Rational, Rounded
 from ephs.semantics.meaning.functor import glued, relation_of_pattern
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
@@ -260,6 +260,22 @@ class Instant:
     def dimension(self) -> int:
         """Dimension of the subspace, the constant coordinate included."""
         return self.linear.dimension
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """Dimensions of the subspace and of its projection on efforts."""
+        return self.dimension, self.linear.onto(v for v in self.order if v.kind in ("effort", "one")).dimension
+
+    @property
+    def clear(self) -> bool:
+        """Whether no coefficient is near its error bound: dimensions are the same, also of what efforts there are, for
+        bounds a thousand times as large, and for a thousandth. Else floats may find what rational numbers do not.
+        """
+        if self.point.field.decides:
+            return True
+        fields = (Rounded(share * ROUNDED) for share in (1e-3, 1e3))
+        others = (replace(self, point=replace(self.point, field=field)) for field in fields)
+        return all(other.dimensions == self.dimensions for other in others)
 
     def same(self, other: "Instant") -> bool:
         """Whether it is the same relation, to the error bounds; two empty ones are the same."""
