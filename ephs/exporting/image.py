@@ -187,7 +187,7 @@ def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[ImageNumb
     reduced = eq.reduced
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
     state = leg.state
-    eq.rows_of([state])  # which of a pose's two quaternions is meant
+    eq.row(state)  # which of a pose's two quaternions is meant
     model, (turning, momentum) = eq.model.tables, eq.booking.paper.inertias()
     parts = {
         "tables": eq.engine.tables, "work": eq.engine.work, **eq.booking.paper.parts(),

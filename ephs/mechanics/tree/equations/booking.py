@@ -1,6 +1,5 @@
 """Totals of a step on the reduced form: what its components passed on and made, and the work that it took."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
@@ -96,12 +95,14 @@ class Booking:
         """All arrays of the tables that states are made from."""
         return self.paper.arrays()
 
-    def energies(self, states: Sequence["ReducedState"]) -> tuple[Array, Array]:
-        """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold."""
+    def energies(self, q: Array, r: Array, heats: Array) -> tuple[Array, Array]:
+        """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold.
+
+        Of rows of elements, rates and heats.
+        """
         eq = self._equations
-        q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
-        x = self.paper.rows(np.array(q), np.array(r), eq.heats.entropies(np.array(heats)))
-        energies, fault = np.zeros((len(states), len(eq.problem.descriptor.components))), np.zeros(1, dtype=np.int64)
+        x = self.paper.rows(q, np.ascontiguousarray(r), eq.heats.entropies(heats))
+        energies, fault = np.zeros((len(x), len(eq.problem.descriptor.components))), np.zeros(1, dtype=np.int64)
         eq.refuse(self.weighed(x, energies, fault)(), int(fault[0]))
         return x, energies
 

@@ -35,6 +35,7 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Status
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
+from ephs.solve.result.record import Record
 from ephs.solve.stepping import Row
 
 __all__ = ["Equations", "ReducedState"]
@@ -320,21 +321,35 @@ class Equations:
 
     def row(self, state: ReducedState) -> Row:
         """Record of a state."""
-        return self.rows_of([state])[0]
+        return self.record_of([state], np.array([state.t]), np.zeros(1)).rows[0]
 
-    def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
-        """Records of many states."""
-        if not states:
-            return []
-        x, energies = self.booking.energies(states)
-        out: list[Row] = []
-        for state, point, energy in zip(states, x, energies, strict=True):
-            heat, work = state.totals[0], self.led.work(state.t, energy, state.totals)
-            self.accounts.note(state)
-            energy[self._makers] = 0.0
-            np.add.at(energy, self._makers, state.totals[2:])
-            out.append(Row(point, energy, np.array([heat, work, work, state.totals[2:].sum()])))
-        return out
+    def record_of(self, states: Sequence[ReducedState], times: Array, least: Array) -> Record:
+        """`record` of states one by one."""
+        q = np.array([state.q for state in states]).reshape(-1, self.reduced.coordinates)
+        rest = [np.concatenate([state.r, state.heats, state.totals]) for state in states]
+        put = np.array([state.account[2:4] for state in states if state.account.size]).reshape(-1, 2)
+        return self.record(times, q, np.array(rest).reshape(-1, self.size - self.nv), put, least)
+
+    def record(self, times: Array, q: Array, rest: Array, put: Array, least: Array) -> Record:
+        """Records of many states.
+
+        Parameters
+        ----------
+        times, q, rest
+            (rows,) in s, (rows, ·) elements, (rows, ·) rates, heats and totals.
+        put
+            (rows, 2) what corrections put in and the sum of its sizes, in J; of the last states, those with an account.
+        least
+            (rows,) least entropy production in the step before, in J/K.
+        """
+        r, heats, totals = np.split(rest, [self.n, self.n + self.ns], axis=1)
+        x, energies = self.booking.energies(q, r, heats)
+        heat, work = totals[:, 0], self.led.work(times, energies, totals)
+        self.accounts.noted.note(times[times.size - len(put) :], put)
+        energies[:, self._makers] = 0.0
+        np.add.at(energies.T, self._makers, totals[:, 2:].T)
+        ledgers = np.stack([heat, work, work, totals[:, 2:].sum(axis=1), least], axis=1)
+        return Record(times, x, energies, ledgers)
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""
