@@ -86,7 +86,11 @@ def started_system(scene: Scene) -> System:
 
 
 def initial_state(scene: Scene) -> dict[Path, Array]:
-    """Values of all states of the scene's system at the start."""
+    """Values of all states of the scene's system at the start; the values are made once and kept with the scene."""
+    return dict(once(scene, "initial state", lambda: _initial_state(scene)))
+
+
+def _initial_state(scene: Scene) -> dict[Path, Array]:
     out: dict[Path, Array] = {}
     poses: dict[str, Array] = {GROUND: SE3.identity()}
     for name, body in scene.all_bodies():
@@ -131,7 +135,11 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
     for prefix, part in _levels(scene):
         if _needs_environment(part):
             out[prefix / "environment" / "s"] = np.zeros(1)
-    return scene_system(scene).state() | out if any(True for _ in scene.all_elements()) else out
+    if any(True for _ in scene.all_elements()):
+        out = scene_system(scene).state() | out
+    for value in out.values():
+        value.flags.writeable = False
+    return out
 
 
 def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
