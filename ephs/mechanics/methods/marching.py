@@ -30,6 +30,8 @@ WINDOW, LATEST = 10, 30
 after so many without one."""
 
 
+FAILING = "its steps fail"
+"""The reason to leave explicit steps that have no solution."""
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
 
@@ -214,7 +216,7 @@ class March:
             self._step()
         elif self._leave is not None and found in (Ending.STIFF, Ending.REFUSED + Status.UNSETTLED):
             failing = found != Ending.STIFF or c.refusals > PATIENCE
-            reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
+            reason = FAILING if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
             self._leave(self.time, float(c.step), reason)
             self.left = True
         elif found == Ending.PAUSED and self._rival is not None and not self._unweighed:
