@@ -32,7 +32,7 @@ NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 PIVOTING = ("swap", "swaps", "end", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
-FACTORS, FACTORED, SOLVED = 2, 120, 40
+FACTORS, FACTORED, SUBSTITUTED = 2, 120, 40
 """Evaluations that cost as much as factors of a matrix of n freedoms, and solutions: 2 + n²/120 and 1 + n/40.
 
 An evaluation takes some 400 n operations, factors of a real and a complex matrix 10 n³/3, solutions with them 10 n²."""
@@ -44,7 +44,7 @@ FAST = 2e-3
 
 def costs(freedoms: int) -> tuple[int, int]:
     """Cost of factors and of solutions with them, in evaluations of the rates."""
-    return FACTORS + freedoms * freedoms // FACTORED, 1 + freedoms // SOLVED
+    return FACTORS + freedoms * freedoms // FACTORED, 1 + freedoms // SUBSTITUTED
 
 
 @final
