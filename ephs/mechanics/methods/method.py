@@ -109,9 +109,9 @@ class ReducedMethod(ABC):
         """Records of many instants."""
         if isinstance(taken, Taken):
             q, rest, put = taken.data
-            return self.equations.record(taken.times, q, rest, put, taken.least)
+            return self.equations.booking.record(taken.times, q, rest, put, taken.least)
         times, states, least = zip(*taken, strict=True)
-        return self.equations.record_of(states, np.array(times), np.array(least))
+        return self.equations.booking.record_of(states, np.array(times), np.array(least))
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""

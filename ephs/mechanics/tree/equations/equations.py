@@ -4,7 +4,7 @@ What every method on the reduced form shares. A step moves q = q⁰·exp(v): the
 spaces, v̇ = dexp⁻¹(v) r.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, final
 
@@ -35,7 +35,6 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Status
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
-from ephs.solve.result.record import Record
 from ephs.solve.stepping import Row
 
 __all__ = ["Equations", "ReducedState"]
@@ -77,14 +76,12 @@ class Equations:
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
-        number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
         self.heats = heats_of(reduced, model.reference.temperature)
         self.led = Led(
             problem,
             frozenset(reduced.entropies[: self.ns - len(reduced.attaching.network.states)]),
             moved=self.prescribed.freedoms.size > 0,
         )
-        self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
         self.given = Given(problem, reduced, self.nv, self.prescribed)
         self.drive, self.wrench = self.given.drive, self.given.wrench
@@ -321,35 +318,7 @@ class Equations:
 
     def row(self, state: ReducedState) -> Row:
         """Record of a state."""
-        return self.record_of([state], np.array([state.t]), np.zeros(1)).rows[0]
-
-    def record_of(self, states: Sequence[ReducedState], times: Array, least: Array) -> Record:
-        """`record` of states one by one."""
-        q = np.array([state.q for state in states]).reshape(-1, self.reduced.coordinates)
-        rest = [np.concatenate([state.r, state.heats, state.totals]) for state in states]
-        put = np.array([state.account[2:4] for state in states if state.account.size]).reshape(-1, 2)
-        return self.record(times, q, np.array(rest).reshape(-1, self.size - self.nv), put, least)
-
-    def record(self, times: Array, q: Array, rest: Array, put: Array, least: Array) -> Record:
-        """Records of many states.
-
-        Parameters
-        ----------
-        times, q, rest
-            (rows,) in s, (rows, ·) elements, (rows, ·) rates, heats and totals.
-        put
-            (rows, 2) what corrections put in and the sum of its sizes, in J; of the last states, those with an account.
-        least
-            (rows,) least entropy production in the step before, in J/K.
-        """
-        r, heats, totals = np.split(rest, [self.n, self.n + self.ns], axis=1)
-        x, energies = self.booking.energies(q, r, heats)
-        heat, work = totals[:, 0], self.led.work(times, energies, totals)
-        self.accounts.noted.note(times[times.size - len(put) :], put)
-        energies[:, self._makers] = 0.0
-        np.add.at(energies.T, self._makers, totals[:, 2:].T)
-        ledgers = np.stack([heat, work, work, totals[:, 2:].sum(axis=1), least], axis=1)
-        return Record(times, x, energies, ledgers)
+        return self.booking.record_of([state], np.array([state.t]), np.zeros(1)).rows[0]
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""
