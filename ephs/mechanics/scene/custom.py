@@ -23,10 +23,6 @@ from ephs.semantics.bundle import Array
 if TYPE_CHECKING:
     from ephs.mechanics.scene.site import Site
 
-AXIS: Final = "axis"
-"""Kind of a joint with one degree of freedom and no prescribed motion, on whose rate an element acts."""
-KINDS: Final = (*OUTSIDE, AXIS)
-"""Kinds of what keys may name."""
 _TEXTS: Final[Mapping[str, tuple[str, str]]] = {
     "class": ("a subclass of ephs.mechanics.Element", "derive it from Element"),
     "section": ("section= in the class statement, a name of letters, digits and underscores", "add it"),
@@ -37,7 +33,7 @@ _TEXTS: Final[Mapping[str, tuple[str, str]]] = {
     "form": ("a number, a text, true or false, or a list of these", "take several keys instead of tables in a table"),
     "unit": ('unit= of each number, "1" where it has none', "give its unit"),
     "symbols": ("a unit such as N m/rad, kg m², m³/(s Pa)", "correct the unit"),
-    "names": (f"names= one of {', '.join(KINDS)}, of a text or a list of texts", "correct it"),
+    "names": (f"names= one of {', '.join(OUTSIDE)}, of a text or a list of texts", "correct it"),
     "rule": ("a rule of keys of this class", "name these keys"),
     "validator": ("rules instead of pydantic's validators", "write a method with @rule, which has its own texts"),
 }
@@ -203,7 +199,7 @@ class Element(Entry):
             The table is not sound.
         """
         try:
-            found = cls.model_validate(dict(table))
+            found = cls.model_validate({key: value for key, value in table.items() if key != "name"})
         except ValidationError as error:
             where, what = error.errors(include_url=False)[0]["loc"], error.errors(include_url=False)[0]["msg"]
             raise ValueError(f"{cls.section}.{name}.{'.'.join(map(str, where))}: {what}") from None
@@ -218,6 +214,10 @@ class Element(Entry):
     def changed(self, **keys: Any) -> Self:
         """Itself with other values at some keys, which are not checked."""
         return self.model_copy(update=keys)
+
+    def values(self) -> dict[str, Any]:
+        """Its numbers by key."""
+        return {name: getattr(self, name) for name in type(self).numbers}
 
     def references(self) -> Iterator[tuple[str, str, str]]:
         """Key, kind and name of all that it names."""
@@ -238,7 +238,7 @@ class Element(Entry):
             return self
         changes: dict[str, Any] = {}
         for name, kind in type(self).names.items():
-            same, given = OUTSIDE.get(kind, frozenset[str]()), getattr(self, name)
+            same, given = OUTSIDE[kind], getattr(self, name)
             if isinstance(given, str):
                 changes[name] = given if given in same else path + given
             elif given is not None:
@@ -333,7 +333,7 @@ def _check_keys(kind: type[Element]) -> None:
         of = field.json_schema_extra
         if ("number" in forms) != bool(of.unit) and not ("integer" in forms and of.unit == "1"):
             raise ElementError("unit", where, f'unit "{of.unit}"')
-        if of.names and (of.names not in KINDS or forms - {"string", "null"}):
+        if of.names and (of.names not in OUTSIDE or forms - {"string", "null"}):
             raise ElementError("names", where, f'names "{of.names}"')
     for each in kind.rules:
         unknown = [name for name in (*each.keys, each.at) if name not in kind.model_fields]

@@ -20,6 +20,8 @@ from ephs.semantics.bundle import Array
 T = TypeVar("T")
 GROUND = "ground"
 ENVIRONMENT = "environment"
+AXIS = "axis"
+"""Kind of a joint with one degree of freedom and no prescribed motion, on whose rate an element acts."""
 FREE_END = "free"
 """A free end of a beam."""
 OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
@@ -27,6 +29,7 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "end": frozenset({GROUND, FREE_END}),
     "node": frozenset({ENVIRONMENT}),
     "joint": frozenset(),
+    AXIS: frozenset(),
     "tendon": frozenset(),
     "surface": frozenset(),
 }

@@ -32,7 +32,6 @@ _NEUTRAL: dict[str, Any] = {
     "at2": [0.0, 0.0, 0.0],
     "capacity": 1.0,
     "temperature": 1.0,
-    "between": ["environment", "environment"],
     "conductance": 1.0,
     "use": "?",
     "body": "ground",

@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.attached import ATTACHED
+from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
@@ -14,6 +15,7 @@ from ephs.mechanics.scene.model import (
     ELEMENTS,
     GROUND,
     IDENTITY_POSE,
+    KINDS,
     Joint,
     Scene,
     World,
@@ -103,7 +105,7 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
 
 
 def _attributes(kind: str) -> dict[str, Field]:
-    return {key: _attribute(kind, key) for key in ELEMENTS[kind].numbers}
+    return _registered(KINDS[kind]) if kind in KINDS else {key: _attribute(kind, key) for key in ELEMENTS[kind].numbers}
 
 
 def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
@@ -300,8 +302,9 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     return []
 
 
-def _registered(section: str) -> dict[str, Field]:
-    """The numbers of elements of a registered section, with the checks of their tables."""
+def _registered(kind: type[Element]) -> dict[str, Field]:
+    """The numbers of elements that build themselves, with the checks of their tables."""
+    section = kind.section
 
     def field(key: str) -> Field:
         def get(scene: Scene, name: str) -> Array:
@@ -318,12 +321,12 @@ def _registered(section: str) -> dict[str, Field]:
 
         return list(number_faults(_thing(scene, section, name), f"{section}.{name}"))
 
-    return {key: field(key) for key in REGISTERED[section].numbers}
+    return {key: field(key) for key in kind.numbers}
 
 
 def fields_of(kind: str) -> Mapping[str, Field]:
     """Key of the scene file -> its numbers, of a kind of element; none where there is no such kind."""
-    return _registered(kind) if kind in REGISTERED else FIELDS.get(kind, {})
+    return _registered(REGISTERED[kind]) if kind in REGISTERED else FIELDS.get(kind, {})
 
 
 FIELDS: Mapping[str, Mapping[str, Field]] = {

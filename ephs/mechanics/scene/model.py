@@ -13,15 +13,16 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.scene import attached
 from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, Marker, Spring, World, free_joint
+from ephs.mechanics.scene.conduction import Conduction
+from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, SceneElement, frozen
 from ephs.mechanics.scene.flexible import Beam, Load, Tendon
 from ephs.mechanics.scene.surfaces import Contact, Surface
-from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept
 
 if TYPE_CHECKING:
-    from ephs.mechanics.scene.custom import Element
     from ephs.semantics import System
 
 __all__ = [
@@ -81,7 +82,7 @@ class Scene:
     cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
     gas_springs: Mapping[str, attached.GasSpring] = field(default_factory=dict)
     actuators: Mapping[str, attached.Actuator] = field(default_factory=dict)
-    elements: Mapping[str, Mapping[str, "Element"]] = field(default_factory=dict)
+    elements: Mapping[str, Mapping[str, Element]] = field(default_factory=dict)
     origin: Array = field(default_factory=lambda: IDENTITY_POSE)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
@@ -145,7 +146,7 @@ class Scene:
         """The elements of a section of this level, registered ones included."""
         return getattr(self, name) if name in ELEMENTS else self.elements.get(name, {})
 
-    def all_elements(self) -> "Iterator[tuple[str, str, Element]]":
+    def all_elements(self) -> Iterator[tuple[str, str, Element]]:
         """Section, dotted name and value of every element of registered sections; what it names is dotted, too."""
         for path, scene in self.levels():
             for section, own in scene.elements.items():
@@ -248,21 +249,29 @@ class Scene:
             yield from part.levels(f"{path}{name}.")
 
 
-ELEMENTS: Mapping[str, type[SceneElement]] = {
+ELEMENTS: Mapping[str, type[SceneElement] | type[Element]] = {
     "bodies": Body,
     "joints": Joint,
     "springs": Spring,
-    "thermal": ThermalNode,
-    "conduction": Conduction,
-    "markers": Marker,
     "surfaces": Surface,
     "contacts": Contact,
     "beams": Beam,
-    "loads": Load,
     "tendons": Tendon,
+    "loads": Load,
     **attached.ATTACHED,
+    "thermal": ThermalNode,
+    "conduction": Conduction,
+    "markers": Marker,
 }
-"""Sections of a scene -> what stands in them."""
+"""Sections of a scene -> what stands in them, in the order of the page of keys."""
+KINDS: Mapping[str, type[Element]] = {key: kind for key, kind in ELEMENTS.items() if issubclass(kind, Element)}
+"""Those whose elements build themselves, as registered ones do."""
+
+
+def elements_of(scene: Scene) -> Iterator[Element]:
+    """The elements of a level that build themselves."""
+    for own in (*(scene.section(key) for key in KINDS), *scene.elements.values()):
+        yield from own.values()
 
 
 def mapped(
@@ -276,7 +285,7 @@ def mapped(
     made = {
         section: {name: change(path, each) for name, each in own.items()}
         for section, change in changes.items()
-        if (own := scene.section(section)) or section in ELEMENTS
+        if (own := scene.section(section))
     }
     parts = {name: mapped(part, changes, world, f"{path}{name}.") for name, part in scene.parts.items()}
     return with_sections(scene, made, parts=parts, world=world or scene.world)

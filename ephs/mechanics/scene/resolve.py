@@ -238,8 +238,6 @@ def resolve_plain(section: str, document: Document, names: Names, faults: list[F
         found[name] = kind(name=name, **attributes(kind, table.entry))
         if section == "loads" and table.sound("body") and table.entry.body == GROUND:
             faults.append(fault("load ground", f"{key}.body", shown(GROUND)))
-        if section == "conduction" and table.sound("between") and len(set(table.entry.between)) == 1:
-            faults.append(fault("same ends", f"{key}.between", f'"{table.entry.between[0]}" twice'))
     return found
 
 

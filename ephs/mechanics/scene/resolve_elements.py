@@ -5,16 +5,19 @@ from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import AXIS, Element, KeyRule, number_of
+from ephs.mechanics.scene.custom import Element, KeyRule, number_of
+from ephs.mechanics.scene.element import AXIS
 from ephs.mechanics.scene.entries import Checked, Document, shown, validate
 from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
-from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.model import KINDS, Scene, elements_of
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
-from ephs.mechanics.scene.site import trial
+from ephs.mechanics.scene.site import Level, Site, built
 from ephs.operad import PatternError
 from ephs.semantics.errors import SemanticsError
+
+_ERRORS = (SemanticsError, PatternError, ValueError, ArithmeticError)
 
 
 def resolve_elements(
@@ -26,10 +29,11 @@ def resolve_elements(
         for kind, section in (("joint", "joints"), ("tendon", "tendons"), ("surface", "surfaces"))
     }
     found: dict[str, dict[str, Element]] = {}
-    for section in REGISTERED:
+    for section in (*KINDS, *REGISTERED):
+        found[section] = {}
         for name, table in document.sections[section].items():
             faults += check_table(table, f"{section}.{name}", names, known)
-            found.setdefault(section, {})[name] = table.entry.called(name)
+            found[section][name] = table.entry.called(name)
     return found
 
 
@@ -78,32 +82,37 @@ def broken(of: KeyRule, element: Element, key: str) -> Fault:
     return Fault(legible(f"{key}.{of.at}"), legible(there), legible(expected), legible(advice))
 
 
-def placed_faults(scene: Scene) -> Iterator[Fault]:
+def placed_faults(scene: Scene) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
-    for section, own in scene.elements.items():
-        for name, element in own.items():
-            yield from element_faults(scene, element, f"{section}.{name}")
+    own = list(elements_of(scene))
+    faults = [each for element in own for each in _placed(scene, element)]
+    if not faults:
+        try:
+            built(scene)
+        except _ERRORS:
+            faults = [each for element in own for each in _unbuilt(scene, element)]
+    return faults
 
 
-def element_faults(scene: Scene, element: Element, key: str) -> Iterator[Fault]:
-    """The same of one element of a level."""
+def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
+    key = f"{element.section}.{element.name}"
     for place, kind, name in element.references():
         if kind == AXIS:
             joint = scene.joint(name)
             if joint.dim != 1 or joint.motion is not None:
                 yield fault("motor joint", f"{key}.{place}", f"{joint.name}, {joint.kind}")
                 return
-    site, _ = trial(scene, element)
-    faults = [
-        broken(each, element, key) for each in type(element).rules if each.placed and not each.holds(element, site)
-    ]
-    if faults:
-        yield from faults
-        return
+    site = Site(scene, element, Level())
+    for each in type(element).rules:
+        if each.placed and not each.holds(element, site):
+            yield broken(each, element, key)
+
+
+def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
     try:
-        element.build(site)
-    except (SemanticsError, PatternError, ValueError, ArithmeticError) as error:
-        yield fault("not built", key, str(error))
+        element.build(Site(scene, element, Level()))
+    except _ERRORS as error:
+        yield fault("not built", f"{element.section}.{element.name}", str(error))
 
 
 def number_faults(element: Element, key: str) -> Iterator[Fault]:

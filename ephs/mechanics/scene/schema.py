@@ -12,6 +12,7 @@ from pydantic import Field, create_model
 from ephs.mechanics.scene.attached import Actuator, Cylinder, GasSpring, Gear, Motor
 from ephs.mechanics.scene.bodies import Marker, Spring, World
 from ephs.mechanics.scene.flexible import Load, Tendon
+from ephs.mechanics.scene.model import ELEMENTS, KINDS
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_elements import table_of
@@ -36,7 +37,7 @@ from ephs.mechanics.scene.schema_numbers import (
     key,
 )
 from ephs.mechanics.scene.schema_touching import ContactEntry, SurfaceEntry
-from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.mechanics.scene.thermal import ThermalNode
 
 
 class AssemblyEntry(Entry):
@@ -156,7 +157,7 @@ WorldEntry: Any = table_of(World, "world")
 _LENGTH = key("without force, m; default: as at the start", None)
 _POINTS = key("one in each, in its centre-of-mass frame (ground: world), m")
 _LIMITS = key("least and largest control", None)
-_SECTIONS: dict[str, tuple[type[Entry], str]] = {
+_TABLES: dict[str, tuple[type[Entry], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
     "springs": (
@@ -185,10 +186,10 @@ _SECTIONS: dict[str, tuple[type[Entry], str]] = {
         "actuators: forces on joints by a control",
     ),
     "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
-    "conduction": (table_of(Conduction, "conduction.NAME"), "heat conduction between thermal nodes"),
     "markers": (table_of(Marker, "markers.NAME"), "points on bodies"),
-    "parts": (PartEntry, "other scene files as subsystems"),
 }
+_SECTIONS = {name: (KINDS[name], KINDS[name].said) if name in KINDS else _TABLES[name] for name in ELEMENTS}
+_SECTIONS["parts"] = PartEntry, "other scene files as subsystems"
 SECTIONS: dict[str, type[Entry]] = {key: table for key, (table, _) in _SECTIONS.items()}
 _Name: TypeAlias = Text | None
 _FILE: dict[str, Any] = {
