@@ -16,8 +16,6 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.elements.beam import thermoelastic
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
-from ephs.mechanics.scene.attached import Actuator
-from ephs.mechanics.scene.attaching import SUPPLIED, starts_of, supplies, supplies_of, system_of
 from ephs.mechanics.scene.demands import Demands, demands_on_parts
 from ephs.mechanics.scene.made import Made, spring_system
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
@@ -103,10 +101,6 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
                 out[place / "env" / "s"] = np.zeros(1)
         if j.armature:
             out[component_path("armatures", name) / "p"] = j.armature * j.rate
-    for section, name, each in scene.all_attachments():
-        at = component_path(section, name)
-        found = starts_of(each, [scene.joint(tied) for tied in each.tied])
-        out |= {Path([*at, *path.split(".")]): value.copy() for path, value in found.items()}
     for name, tendon in scene.all_tendons():
         at = component_path("tendons", name)
         out |= {Path([*at, *path.split(".")]): value for path, value in tendon_starts(tendon, poses).items()}
@@ -150,11 +144,10 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Signal]:
-    """Prescribed drives as flows, motions and supplies as efforts, at the ports of `drive_ports` and `supplies`; of
-    tendons no force but their own.
+    """Prescribed drives as flows, motions as efforts at the ports of `drive_ports`, inputs of elements; of tendons no
+    force but their own.
     """
-    out = {supply.outer: Signal(supply.value, effort=True) for supply in supplies(scene)}
-    out |= {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
+    out = {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
     out |= {port: signal for ports in element_inputs(scene).values() for port, signal in ports.items()}
     for _, j in scene.all_joints():
         if _is_driven(j):
@@ -232,11 +225,6 @@ class _Builder:
         self.junctions[path] = junction(of, exposed=name in self.demands.joints)
         return str(path)
 
-    def supply(self, path: Path) -> str:
-        """An exposed junction of an attachment's supply."""
-        self.junctions[path] = junction(SUPPLIED[path[0]], exposed=True)
-        return str(path)
-
     def tension(self, tendon: str) -> str:
         """The exposed junction at which forces act on a tendon's length."""
         path = tension_port(tendon)
@@ -295,16 +283,6 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
         system = _level(part, inner.of_part(name), top=False)
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
-    for section, name, each in scene.attachments():
-        if isinstance(each, Actuator):
-            continue  # forces on joints, as in runs
-        at = [_at("drives", tied) for tied in each.tied]
-        made = system_of(each, [b.junctions[path].quantity for path in at])
-        ports = dict(zip(made[1], map(str, at), strict=True))
-        ports |= {supply.port: b.supply(supply.outer) for supply in supplies_of(each)}
-        if each.warms and each.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(each.heat)
-        b.add(Path([section, name]), made[0], ports)
     own = built(scene)
     for path, of in own.junctions.items():
         group, name = path[0], ".".join(path[1:])

@@ -67,7 +67,8 @@ def _array(value: Any) -> Any:
 def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
     if issubclass(cls, Element):
-        return cls.of_table(data["name"], data)
+        plain = {key: value["values"] if isinstance(value, dict) else value for key, value in data.items()}
+        return cls.of_table(data["name"], {key: plain[key] for key in plain if key in cls.model_fields})
 
     def made(key: str, value: Any) -> Any:
         if np.ndarray in types[key]:

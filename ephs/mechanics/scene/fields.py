@@ -6,12 +6,12 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import (
+    ATTACHED,
     ELEMENTS,
     GROUND,
     IDENTITY_POSE,

@@ -13,17 +13,15 @@ import numpy as np
 
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
-from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told, warn_caller
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World, with_sections
+from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved, spring_length
-from ephs.mechanics.scene.resolve_attached import resolve_attached
 from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements
 from ephs.mechanics.scene.state import Asked, adjusted
-from ephs.mechanics.scene.tendons import resolve_tendons, with_pulls
+from ephs.mechanics.scene.tendons import pulls, resolve_tendons
 from ephs.mechanics.scene.text import file_text, lost
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
@@ -168,8 +166,8 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         loads=loads,
         tendons=tendons,
     )
-    scene = with_sections(scene, elements | resolve_attached(document, scene, names, faults))
-    scene = replace(scene, actuators=with_pulls(scene.actuators, document, tendons, faults))
+    elements["actuators"] |= pulls(document, elements["actuators"], tendons, faults)
+    scene = with_sections(scene, elements)
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
         return None

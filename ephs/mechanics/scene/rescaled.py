@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Attachment
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import SceneElement
+from ephs.mechanics.scene.element import JOINTS, SceneElement
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
@@ -26,8 +25,8 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
         match x:
             case Joint():
                 return _joint(x, *units)
-            case Attachment() | Element():
-                tied = (scene.joint(path + name) for kind in ("axis", "joint") for name in x.named(kind))
+            case Element():
+                tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
                 return x.rescaled(*units, _firsts(tied, length))
             case Tendon():
                 return replace(x.rescaled(*units), points=frozen(x.points * length))

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import Element, KeyRule, number_of
-from ephs.mechanics.scene.element import AXIS
+from ephs.mechanics.scene.custom import Element, number_of
+from ephs.mechanics.scene.element import AXIS, JOINTS, SINGLE
 from ephs.mechanics.scene.entries import Checked, Document, shown, validate
 from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
 from ephs.mechanics.scene.model import KINDS, Scene, elements_of
@@ -33,7 +33,8 @@ def resolve_elements(
         found[section] = {}
         for name, table in document.sections[section].items():
             faults += check_table(table, f"{section}.{name}", names, known)
-            found[section][name] = table.entry.called(name)
+            if not table.spoiled:
+                found[section][name] = table.entry.normalised().called(name)
     return found
 
 
@@ -55,13 +56,11 @@ def check_table(
     named: list[Fault] = []
     names.check_all(_Names(type(entry).names), sound, key, named)  # pyright: ignore[reportArgumentType]
     for place, kind, name in _sound_references(sound):
-        of = "joint" if kind == AXIS else kind
+        of = "joint" if kind in JOINTS else kind
         if of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
             named.append(unknown(of, f"{key}.{place}", name, known[of]))
     yield from named
-    for each in type(entry).rules:
-        if not each.placed and sound.sound(*each.keys) and not each.holds(entry):
-            yield broken(each, entry, key)
+    yield from broken(sound, key)
 
 
 class _Names:
@@ -75,11 +74,12 @@ def _sound_references(table: Checked[Element]) -> Iterable[tuple[str, str, str]]
     return (each for each in table.entry.references() if table.sound(each[0].partition("[")[0]))
 
 
-def broken(of: KeyRule, element: Element, key: str) -> Fault:
-    """The fault of a rule that does not hold."""
-    expected, advice = of.texts(element)
-    there = of.found_in(element) if of.found else shown(getattr(element, of.at))
-    return Fault(legible(f"{key}.{of.at}"), legible(there), legible(expected), legible(advice))
+def broken(table: Checked[Element], key: str, *site: Site) -> Iterator[Fault]:
+    """The faults of rules that do not hold: of those that are asked at a site, or of the others."""
+    for each in type(table.entry).rules:
+        if each.placed == bool(site) and table.sound(*each.keys) and (texts := each.texts(table.entry, *site)):
+            found = texts[0] or shown(getattr(table.entry, each.at))
+            yield Fault(*map(legible, (f"{key}.{each.at}".rstrip("."), found, *texts[1:])))
 
 
 def placed_faults(scene: Scene) -> list[Fault]:
@@ -97,15 +97,14 @@ def placed_faults(scene: Scene) -> list[Fault]:
 def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
     key = f"{element.section}.{element.name}"
     for place, kind, name in element.references():
-        if kind == AXIS:
+        if kind in (AXIS, SINGLE):
             joint = scene.joint(name)
-            if joint.dim != 1 or joint.motion is not None:
-                yield fault("motor joint", f"{key}.{place}", f"{joint.name}, {joint.kind}")
+            if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
+                yield fault(
+                    "motor joint" if kind == AXIS else "gear freedoms", f"{key}.{place}", f"{name}, {joint.kind}"
+                )
                 return
-    site = Site(scene, element, Level())
-    for each in type(element).rules:
-        if each.placed and not each.holds(element, site):
-            yield broken(each, element, key)
+    yield from broken(Checked(element), key, Site(scene, element, Level()))
 
 
 def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:

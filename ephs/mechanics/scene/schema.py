@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.attached import Actuator, Cylinder, GasSpring, Gear, Motor
 from ephs.mechanics.scene.bodies import Marker, Spring, World
 from ephs.mechanics.scene.flexible import Load, Tendon
 from ephs.mechanics.scene.model import ELEMENTS, KINDS
@@ -29,7 +28,6 @@ from ephs.mechanics.scene.schema_numbers import (
     Numbers,
     Pair,
     Positive,
-    Range,
     Series,
     Sizes,
     Text,
@@ -156,7 +154,6 @@ class PartEntry(Entry):
 WorldEntry: Any = table_of(World, "world")
 _LENGTH = key("without force, m; default: as at the start", None)
 _POINTS = key("one in each, in its centre-of-mass frame (ground: world), m")
-_LIMITS = key("least and largest control", None)
 _TABLES: dict[str, tuple[type[Entry], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
@@ -177,14 +174,6 @@ _TABLES: dict[str, tuple[type[Entry], str]] = {
         "tendons through points of bodies",
     ),
     "loads": (table_of(Load, "loads.NAME"), "forces and moments on bodies"),
-    "motors": (table_of(Motor, "motors.NAME"), "motors with circuit and gear on joints"),
-    "gears": (table_of(Gear, "gears.NAME"), "linear relations between the rates of joints"),
-    "cylinders": (table_of(Cylinder, "cylinders.NAME"), "hydraulic cylinders on joints"),
-    "gas_springs": (table_of(GasSpring, "gas_springs.NAME"), "gas springs on joints"),
-    "actuators": (
-        table_of(Actuator, "actuators.NAME", limits=(Range | None, _LIMITS)),
-        "actuators: forces on joints by a control",
-    ),
     "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
     "markers": (table_of(Marker, "markers.NAME"), "points on bodies"),
 }

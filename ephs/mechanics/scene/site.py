@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.elements.components import joint_momentum
 from ephs.mechanics.scene.bodies import IDENTITY_POSE
-from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
+from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, SINGLE
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.operad import Path, Quantity, junction, quantity
 from ephs.semantics import library
@@ -117,9 +117,13 @@ class Site:
         self._level.junctions[path] = junction(quantity.entropy)
         return str(path)
 
+    def heated(self, node: str) -> dict[str, str]:
+        """The port s of a box at the junction of a thermal node; none at the environment, which such a box contains."""
+        return {} if node == ENVIRONMENT else {"s": self.entropy(node)}
+
     def drive(self, joint: str) -> str:
         """The junction of the momentum of a joint that a key of kind ``axis`` names."""
-        self._known("axis", name=joint)
+        self._known(AXIS, SINGLE, name=joint)
         path = Path(["drives", *joint.split(".")])
         self._level.junctions[path] = junction(self.quantity(joint))
         return str(path)
@@ -134,18 +138,23 @@ class Site:
         self._level.junctions[path] = junction(of)
         return str(path)
 
-    def input(self, of: Quantity, value: "ArrayLike" = 0.0, port: str = "", *, effort: bool = True) -> str:
+    def input(
+        self, of: Quantity, value: "ArrayLike" = 0.0, port: str = "", *, at: str = INPUTS, effort: bool = True
+    ) -> str:
         """A junction that an input of runs drives, ``"SECTION.NAME"`` or with ``.PORT``.
 
         Parameters
         ----------
         value
             The effort or flow where no input is given: a number, or one for each dimension.
+        at
+            Another first name of the outer port than ``inputs``; then ``"SECTION.NAME"`` drives all of them in a row.
         """
-        path = Path([INPUTS, *self._own(port)])
+        section, *own = self._own(port)
+        path = Path([at, section, *own] if at == INPUTS else [at, *own])
         self._level.junctions[path] = junction(of, exposed=True)
         given = np.broadcast_to(np.asarray(value, dtype=float), (of.space.dim,)).copy()
-        self._level.inputs[path] = ".".join(path[1:]), Signal(given, effort=effort)
+        self._level.inputs[path] = str(self._own(port if at == INPUTS else "")), Signal(given, effort=effort)
         return str(path)
 
     # ---- boxes ---------------------------------------------------------------------------------------------------

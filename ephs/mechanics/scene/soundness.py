@@ -10,9 +10,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Attachment
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import OUTSIDE, SceneElement
+from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
@@ -46,14 +45,14 @@ def check_scene(scene: Scene) -> None:
         "node": {name for name, _ in scene.all_thermal()},
         "tendon": {name for name, _ in scene.all_tendons()},
     }
-    there |= {"end": there["body"], "axis": there["joint"]}
+    there |= {"end": there["body"]} | dict.fromkeys(JOINTS, there["joint"])
     named = [(kind, name) for _, each in _all(scene) for kind in set(each.names.values()) for name in each.named(kind)]
     beams = [beam for _, beam in scene.all_beams()]
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
     for kind, name in named:
         if name not in OUTSIDE[kind] and name not in there[kind]:
-            what = {"end": "body", "axis": "joint", "node": "thermal node"}.get(kind, kind)
+            what = ({"end": "body", "node": "thermal node"} | dict.fromkeys(JOINTS, "joint")).get(kind, kind)
             raise ValueError(f"there is no {what} {legible(str(name))}")
 
 
@@ -99,8 +98,6 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
                 yield name, each.values() | _surface(name, each)
             case Contact():
                 yield name, {key: (number, ()) for key, number in each.law.numbers}
-            case Attachment():
-                yield name, each.values(len(each.tied) or 1)
             case Tendon():
                 yield name, each.values() | {"points": (each.points, (len(each.bodies), 3))}
             case SceneElement():
