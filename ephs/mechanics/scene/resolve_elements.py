@@ -1,6 +1,6 @@
 """Elements of registered sections: checks of their tables, of what they name, and of their rules."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -54,24 +54,16 @@ def check_table(
             yield fault("large", f"{key}.{name}", shown(getattr(entry, name)), most=LARGEST)
     sound = Checked(entry, frozenset(spoiled))
     named: list[Fault] = []
-    names.check_all(_Names(type(entry).names), sound, key, named)  # pyright: ignore[reportArgumentType]
-    for place, kind, name in _sound_references(sound):
+    for place, kind, name in entry.references():
         of = "joint" if kind in JOINTS else kind
-        if of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
+        if not sound.sound(place.partition("[")[0]):
+            continue
+        if of in ("body", "end", "node"):
+            names.check(name, f"{key}.{place}", "thermal" if of == "node" else "body", named)
+        elif of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
             named.append(unknown(of, f"{key}.{place}", name, known[of]))
     yield from named
     yield from broken(sound, key)
-
-
-class _Names:
-    """What `Names.check_all` asks of a kind of element: the ends of beams are bodies here."""
-
-    def __init__(self, names: Mapping[str, str]) -> None:
-        self.names = {key: "body" if kind == "end" else kind for key, kind in names.items()}
-
-
-def _sound_references(table: Checked[Element]) -> Iterable[tuple[str, str, str]]:
-    return (each for each in table.entry.references() if table.sound(each[0].partition("[")[0]))
 
 
 def broken(table: Checked[Element], key: str, *site: Site) -> Iterator[Fault]:
@@ -96,15 +88,13 @@ def placed_faults(scene: Scene) -> list[Fault]:
 
 def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
     key = f"{element.section}.{element.name}"
+    odd: list[Fault] = []
     for place, kind, name in element.references():
         if kind in (AXIS, SINGLE):
-            joint = scene.joint(name)
+            joint, what = scene.joint(name), "motor joint" if kind == AXIS else "gear freedoms"
             if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
-                yield fault(
-                    "motor joint" if kind == AXIS else "gear freedoms", f"{key}.{place}", f"{name}, {joint.kind}"
-                )
-                return
-    yield from broken(Checked(element), key, Site(scene, element, Level()))
+                odd.append(fault(what, f"{key}.{place}", f"{name}, {joint.kind}"))
+    yield from odd or broken(Checked(element), key, Site(scene, element, Level()))
 
 
 def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
