@@ -95,13 +95,18 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
     """A number or an array that is an attribute."""
 
     def get(scene: Scene, name: str) -> Array:
-        return np.asarray(getattr(_thing(scene, kind, name), key), dtype=float)
+        value = getattr(_thing(scene, kind, name), key)
+        return np.zeros(0) if value is None else np.asarray(value, dtype=float)
 
     def put(scene: Scene, name: str, values: Array) -> Scene:
-        value = frozen(values) if values.ndim else float(values)
-        return _edited(scene, kind, name, lambda thing: replace(thing, **{key: value}))
+        def edited(thing: Any) -> Any:
+            if isinstance(thing, Element):
+                return thing.changed(**{key: values.tolist()})
+            return replace(thing, **{key: frozen(values) if values.ndim else float(values)})
 
-    return Field(get, put, ELEMENTS[kind].numbers[key].least, **more)
+        return _edited(scene, kind, name, edited)
+
+    return Field(get, put, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
 
 
 def _attributes(kind: str) -> dict[str, Field]:
@@ -304,24 +309,13 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
 
 def _registered(kind: type[Element]) -> dict[str, Field]:
     """The numbers of elements that build themselves, with the checks of their tables."""
-    section = kind.section
-
-    def field(key: str) -> Field:
-        def get(scene: Scene, name: str) -> Array:
-            value = getattr(_thing(scene, section, name), key)
-            return np.zeros(0) if value is None else np.asarray(value, dtype=float)
-
-        def put(scene: Scene, name: str, values: Array) -> Scene:
-            return _edited(scene, section, name, lambda of: of.changed(**{key: values.tolist()}))
-
-        return Field(get, put, faults=faults)
 
     def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         from ephs.mechanics.scene.resolve_elements import number_faults
 
-        return list(number_faults(_thing(scene, section, name), f"{section}.{name}"))
+        return list(number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}"))
 
-    return {key: field(key) for key in kind.numbers}
+    return {key: _attribute(kind.section, key, faults=faults) for key in kind.numbers}
 
 
 def fields_of(kind: str) -> Mapping[str, Field]:

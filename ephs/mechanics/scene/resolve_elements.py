@@ -78,7 +78,7 @@ def placed_faults(scene: Scene) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
     own = list(elements_of(scene))
     faults = [each for element in own for each in _placed(scene, element)]
-    if not faults:
+    if not faults and any(scene.elements.values()):  # those that users wrote may not be built
         try:
             built(scene)
         except _ERRORS:
