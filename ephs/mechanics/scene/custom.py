@@ -124,9 +124,8 @@ def rule(
 ) -> Callable[[Callable[..., bool | Mapping[str, object]]], KeyRule]:
     """Mark a method as a condition on keys of the table: where it is false there is a fault.
 
-    In place of False it may return values by name, which may stand in braces, too.
-
-    It is asked where none of these keys has a fault of its own.
+    In place of False it may return values by name, which may stand in braces, too. It is asked where none of
+    these keys has a fault of its own.
 
     Parameters
     ----------
@@ -135,7 +134,7 @@ def rule(
     expected, advice
         Texts of the message; values of keys may stand in braces.
     found
-        Text of the found value, with values of keys in braces; default: the value at the key.
+        Text of the found value, with values of keys in braces; default: the value at the key, or ``a table``.
     at
         The key that the message names, ``""`` for the whole table; default: the first one.
     placed

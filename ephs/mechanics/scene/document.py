@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.flexible import Strain
@@ -68,7 +69,9 @@ def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
     if issubclass(cls, Element):
         plain = {key: value["values"] if isinstance(value, dict) else value for key, value in data.items()}
-        return cls.of_table(data["name"], {key: plain[key] for key in plain if key in cls.model_fields})
+        if cls is Actuator:  # older files have a place for their heat
+            plain.pop("heat", None)
+        return cls.of_table(data["name"], plain)
 
     def made(key: str, value: Any) -> Any:
         if np.ndarray in types[key]:

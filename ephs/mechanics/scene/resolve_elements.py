@@ -70,7 +70,7 @@ def broken(table: Checked[Element], key: str, *site: Site) -> Iterator[Fault]:
     """The faults of rules that do not hold: of those that are asked at a site, or of the others."""
     for each in type(table.entry).rules:
         if each.placed == bool(site) and table.sound(*each.keys) and (texts := each.texts(table.entry, *site)):
-            found = texts[0] or shown(getattr(table.entry, each.at))
+            found = texts[0] or shown(getattr(table.entry, each.at) if each.at else {})
             yield Fault(*map(legible, (f"{key}.{each.at}".rstrip("."), found, *texts[1:])))
 
 
