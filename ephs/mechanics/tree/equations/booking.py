@@ -102,10 +102,10 @@ class Booking:
     def record_of(self, states: Sequence["ReducedState"], times: Array, least: Array) -> Record:
         """`record` of states one by one."""
         eq = self._equations
-        q = np.array([state.q for state in states]).reshape(-1, eq.reduced.coordinates)
+        q = np.array([state.q for state in states]).reshape(len(states), eq.reduced.coordinates)
         rest = [np.concatenate([state.r, state.heats, state.totals]) for state in states]
         put = np.array([state.account[2:4] for state in states if state.account.size]).reshape(-1, 2)
-        return self.record(times, q, np.array(rest).reshape(-1, eq.size - eq.nv), put, least)
+        return self.record(times, q, np.array(rest).reshape(len(states), eq.size - eq.nv), put, least)
 
     def record(self, times: Array, q: Array, rest: Array, put: Array, least: Array) -> Record:
         """Records of many states.
