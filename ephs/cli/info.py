@@ -64,8 +64,7 @@ def _of_scene(scene: "Scene") -> list[str]:
     lines += [f"{kind}: {', '.join(_few(names))}" for kind, given in rest.items() if (names := list(given))]
     markers = [f"markers.{name}" for name, _ in scene.all_markers()]
     inputs = [f"joints.{name}" for name, j in joints if j.dim and j.motion is None]
-    inputs += [f"{section}.{name}" for section, name, each in scene.all_attachments() if each.commanded]
-    inputs += element_inputs(scene)
+    inputs += [*element_inputs(scene), *(f"actuators.{name}" for name, _ in scene.every("actuators"))]
     return [
         *lines,
         f"inputs: {', '.join(_few([*inputs, *markers]))}, bodies.NAME",

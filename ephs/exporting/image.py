@@ -12,7 +12,7 @@ from ephs.exporting.outputs import outputs_program
 from ephs.exporting.parameters import ParameterPolynomial, dependence
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
-from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path, tension_port
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
@@ -187,7 +187,7 @@ def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[ImageNumb
     reduced = eq.reduced
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
     state = leg.state
-    eq.rows_of([state])  # which of a pose's two quaternions is meant
+    eq.row(state)  # which of a pose's two quaternions is meant
     model, (turning, momentum) = eq.model.tables, eq.booking.paper.inertias()
     parts = {
         "tables": eq.engine.tables, "work": eq.engine.work, **eq.booking.paper.parts(),
@@ -219,8 +219,7 @@ def _numbers(parts: Mapping[str, Any]) -> Iterator[Array]:
 
 def _actuators(scene: Scene) -> dict[str, Actuator]:
     """The actuators of a scene by the names of their controls."""
-    found = {f"{section}.{name}": each for section, name, each in scene.all_attachments()}
-    return {name: each for name, each in found.items() if isinstance(each, Actuator)}
+    return {f"actuators.{name}": each for name, each in scene.every("actuators")}
 
 
 def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[ImageNumber]:
@@ -247,15 +246,15 @@ def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tup
     """The control of an actuator, with its forces on joints, or on the length of its tendon."""
     shares: list[Share] = []
     if of.tendon is None:
-        for joint, ratio in zip(of.joints, of.ratio.tolist(), strict=True):
+        for joint, ratio in zip(of.joints, np.atleast_1d(of.ratio), strict=True):
             shares.append(Share(False, driven(str(component_path("joints", joint)))[0], ratio))
     else:
-        net, (ratio,) = eq.reduced.attaching.network, of.ratio.tolist()
+        net, ratio = eq.reduced.attaching.network, float(np.ravel(of.ratio)[0])
         for one in net.injections:
             if one.port == tension_port(of.tendon):
                 rows = enumerate(one.row.tolist(), len(net.inputs))
                 shares += [Share(True, place, ratio * row) for place, row in rows if row]
-    limits = (-math.inf, math.inf) if of.limits is None else (float(of.limits[0]), float(of.limits[1]))
+    limits = (-math.inf, math.inf) if of.limits is None else (of.limits[0], of.limits[1])
     return ImageNumber(name, "", 0, 0.0, tuple(shares), limits)
 
 

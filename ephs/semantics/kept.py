@@ -6,7 +6,7 @@ from typing import Any, TypeVar, cast, final
 
 T = TypeVar("T")
 
-MOST = 8
+MOST = 16
 """Number of results that one value keeps."""
 
 

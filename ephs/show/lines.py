@@ -5,7 +5,8 @@ from itertools import pairwise
 from typing import Any, final
 
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
-from ephs.mechanics.scene.site import trial
+from ephs.mechanics.scene.model import elements_of
+from ephs.mechanics.scene.site import Level, Site
 from ephs.show.motion import Array
 
 
@@ -30,8 +31,8 @@ def lines_of(scene: Any) -> dict[str, BodyLine]:
         for k, ((one, here), (two, there)) in enumerate(ends, 1):
             found[f"{name}-{k}"] = BodyLine(one, two, here, there, tendon.heat, coiled=False)
     for path, level in scene.levels():
-        for element in (each for own in level.elements.values() for each in own.values()):
-            site, _ = trial(level, element)
+        for element in elements_of(level):
+            site = Site(level, element, Level())
             for k, (one, here, two, there) in enumerate(element.lines(site), 1):
                 ends = [
                     (body if body == GROUND else path + body, site.point(body, at))

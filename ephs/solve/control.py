@@ -81,7 +81,7 @@ class Tolerance:
         OptionError
             It names the key.
         """
-        listed = [(str(path), kind) for path, kind in states]
+        listed = [(str(path), kind) for path, kind in states] if self.special else []
         for key in self.special:
             if not any(key == kind or text == key or text.startswith(f"{key}.") for text, kind in listed):
                 kinds = ", ".join(sorted({kind for _, kind in listed}))

@@ -7,11 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ephs.operad import Quantity
-from ephs.semantics.bundle import Array
 from ephs.semantics.errors import SemanticsError
-from ephs.semantics.spaces import Pair
-from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.passing import TURNED
 from ephs.solve.auditing.resolution import Trials
@@ -22,6 +18,7 @@ from ephs.solve.result.labels import labels_of
 from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import Record, joined
 from ephs.solve.result.solution import Solution
+from ephs.solve.result.states import RecordedStates
 
 
 class Run(Protocol):
@@ -137,14 +134,6 @@ def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> S
     """Kept part of a run, as a solution."""
     while problem.shown is not None:
         problem, record, stats = problem.shown(record, stats)
-    states = {slot.path: coordinates(slot.quantity, record.x[:, slot.point]) for slot in problem.descriptor.states}
+    states = RecordedStates(problem.descriptor, record.x)
     labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
     return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels)
-
-
-def coordinates(quantity: Quantity, x: Array) -> Array:
-    """States (n, size) as users read them: scalars (n,), relative poses as the pair's coordinates (n, d)."""
-    if quantity.kind == "relative_pose":
-        pair = Pair.from_space(quantity.space)
-        return x if pair.manifold.code == VECTOR else pair.coordinates(x)
-    return x[:, 0] if x.shape[1] == 1 else x

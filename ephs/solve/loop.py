@@ -1,7 +1,7 @@
 """Time loop of all methods: control, events, records, progress and interruption."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
@@ -23,7 +23,7 @@ from ephs.solve.problem import Problem, States
 from ephs.solve.result.record import Record, Rows, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Attempt, Counts, Leg, Row, Span, Stepper, too_fast
+from ephs.solve.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, too_fast
 from ephs.solve.watching import Balance, Progress
 
 S = TypeVar("S")
@@ -120,8 +120,8 @@ class _Run(Generic[S]):
         self.steps = self.rejected = self.saved = 0
         self.way = Advance(t0, abs(until - t0) if policy else 0.0)
         self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
-        self.blocks: list[Sequence[tuple[float, S, float]]] = []
-        self.pending: list[tuple[float, S, float]] = []
+        self.blocks: list[Instants[S]] = []
+        self.pending: list[Instant[S]] = []
         self.kept = Rows()
         self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
         self.watch = Watch((), t0, {})
@@ -341,7 +341,7 @@ class _Run(Generic[S]):
     def _settle(self) -> None:
         """Pending part, as it is kept."""
         for block in (*self.blocks, self.pending):
-            if block:
+            if len(block):
                 self.kept.add(self.stepper.record(block))
         self.blocks, self.pending = [], []
 

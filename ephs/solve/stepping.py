@@ -1,8 +1,8 @@
 """Interface between the time loop and a method: one or many steps per call; steps and records."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, final
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, final
 
 import numpy as np
 
@@ -71,6 +71,44 @@ class Attempt(Generic[S]):
     happened: tuple[tuple[float, str, S], ...] = ()
 
 
+Instant: TypeAlias = tuple[float, S_co, float]
+"""A time in s, the method's state then, and the least production in the step before."""
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken(Generic[S_co]):
+    """Instants of many steps as arrays; states are made of them where one is asked for.
+
+    Parameters
+    ----------
+    times, least
+        (n,) in s; least entropy production in the step before, in J/K.
+    data
+        Arrays of n rows each, as the method reads them.
+    state
+        The method's state at the instant of a number.
+    """
+
+    times: Array
+    least: Array
+    data: tuple[Array, ...]
+    state: Callable[[int], S_co]
+
+    def __len__(self) -> int:
+        return int(self.times.size)
+
+    def __getitem__(self, number: int) -> Instant[S_co]:
+        at = range(len(self))[number]
+        return float(self.times[at]), self.state(at), float(self.least[at])
+
+    def __iter__(self) -> Iterator[Instant[S_co]]:
+        return (self[number] for number in range(len(self)))
+
+
+Instants: TypeAlias = Taken[S_co] | Sequence[Instant[S_co]]
+
+
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Span(Generic[S]):
@@ -125,8 +163,8 @@ class Leg(Protocol[S_co]):
         """
         ...
 
-    def rows(self) -> Sequence[tuple[float, S_co, float]]:
-        """Instants to keep since the last call: time, state, the least production in its step."""
+    def rows(self) -> Instants[S_co]:
+        """Instants to keep since the last call."""
         ...
 
     @property
@@ -200,8 +238,8 @@ class Stepper(Protocol[S]):
         """Record of a state."""
         ...
 
-    def record(self, taken: "Sequence[tuple[float, S, float]]") -> "Record":
-        """Records of many instants: time, state, least production in the step before."""
+    def record(self, taken: Instants[S]) -> "Record":
+        """Records of many instants."""
         ...
 
     def stats(self) -> dict[str, Any]:

@@ -7,9 +7,10 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.errors import InvalidArgument
 
+from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.geometry import coupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Body, Joint, Scene, Spring, World, frozen
-from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.testing.primitives import generators
@@ -133,7 +134,7 @@ class _Maker:
             self.joints,
             springs,
             {"node": ThermalNode("node", 20.0, 310.0)} if heated else {},
-            {"fins": Conduction("fins", ("node", ENVIRONMENT), 0.5)} if heated else {},
+            {"fins": Conduction(between=["node", ENVIRONMENT], conductance=0.5).called("fins")} if heated else {},
         )
 
     def _motion(self, name: str) -> tuple[Array, Array]:

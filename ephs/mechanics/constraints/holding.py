@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Gear
+from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.kinematics import Link, elements
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
@@ -92,8 +92,8 @@ class Mechanism:
         points = np.array([*ends, *now.poses[:, 4:]]).reshape(-1, 3)
         centre = points.mean(axis=0) if len(points) else np.zeros(3)
         length = float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
-        gears = [(name, each) for _, name, each in scene.all_attachments() if isinstance(each, Gear)]
-        return Mechanism(now, centre, length or 1.0, tuple((n, g) for n, g in gears if not g.stiffness))
+        rigid = tuple((name, gear) for name, gear in scene.every("gears") if not gear.stiffness)
+        return Mechanism(now, centre, length or 1.0, rigid)
 
     def holds(self, poses: Array, *, motions: bool = True) -> list[Hold]:
         """Constraints of all joints in a configuration, then of the prescribed motions."""
@@ -113,7 +113,7 @@ class Mechanism:
                 link.name: self._hold(link, poses, x, moved=True).rows[0] / self._unit(link, x) for link, x in chosen
             }
             row = -rates[gear.joints[0]]
-            for joint, ratio in zip(gear.joints[1:], gear.ratio, strict=True):
+            for joint, ratio in zip(gear.joints[1:], np.atleast_1d(gear.ratio), strict=True):
                 row = row + ratio * rates[joint]
             row = row / max(float(np.linalg.norm(row)), TINY)
             out.append(GearHold(name, chosen[0][0].body2, chosen[1][0].body2, row[None], rates))

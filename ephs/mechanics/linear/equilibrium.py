@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Attachment, Cylinder, GasSpring, Gear, Motor
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.custom import Element
+from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundle import Array, Reference
@@ -132,9 +134,9 @@ def _equilibrium(
 # ---- scenes ------------------------------------------------------------------------------------------------------
 
 
-def _keeps(of: Attachment) -> bool:
+def _keeps(of: Element) -> bool:
     """Whether an attachment has states beside those of its joints."""
-    return isinstance(of, Motor | Cylinder | GasSpring) or (isinstance(of, Gear) and bool(of.stiffness))
+    return bool(of.stiffness) if isinstance(of, Gear) else not isinstance(of, Actuator)
 
 
 def _of_scene(scene: Scene) -> Equilibrium:

@@ -4,15 +4,20 @@ Where surfaces may touch and tolerances are coarse, steps are semi-implicit: los
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
-Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less.
+Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less. Where surfaces may
+touch, radau is tried when explicit steps have cost as much as a trial does, which grows with the cube of the freedoms;
+after a trial in vain, when they have cost twice as much as before.
 """
 
 from typing import TYPE_CHECKING, Any, final
 
+import numpy as np
+
 from ephs.mechanics.methods.explicit import Explicit, tableau
-from ephs.mechanics.methods.marching import Rival
+from ephs.mechanics.methods.marching import FAILING, WINDOW, Rival
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.semi import cheap, semi_implicit
+from ephs.mechanics.methods.stages import costs
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundle import Array
 from ephs.solve.control import Control
@@ -31,6 +36,8 @@ FREEDOMS = 64
 """Degrees of freedom up to which factorising their matrix costs less than an explicit method's shorter steps."""
 TRIAL = 400
 """Explicit steps between surfaces that may touch, after which radau is tried: a stop at slip 0 hides its stiffness."""
+SOLUTIONS = 6
+"""Solutions with the factors of a matrix that a step of radau takes, about."""
 LOOSE = 1e-2
 """Tolerances above this are for radau where surfaces may touch: explicit steps may gain more than is mended."""
 COARSE = 3e-4
@@ -53,27 +60,32 @@ class Auto(ReducedMethod):
         self._begun: Implicit | None = None
         self._held = self._free = self._failures = 0
         self._trial: int | None = None
+        self._waits = self._asleep = 0
+        self._returns = _touches(equations)
         self._semi: Explicit | None = None
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
-        if name == "rk54" and _touches(equations):
-            if control.rtol.value > COARSE and cheap(equations):
-                self._semi = semi_implicit(equations, control)
-                self.name = self.counts["chosen"] = self._semi.name
-                self.exponent, self.share = self._semi.exponent, self._semi.share
-            elif equations.n <= FREEDOMS:
-                self._begin()
+        if self._returns and name == "rk54" and control.rtol.value > COARSE and cheap(equations):
+            self._semi = semi_implicit(equations, control)
+            self.name = self.counts["chosen"] = self._semi.name
+            self.exponent, self.share = self._semi.exponent, self._semi.share
+        elif self._returns:
+            self._begin()
 
     def _begin(self) -> None:
         """Begin without semi-implicit steps, as tolerances ask for where surfaces may touch."""
         self._semi = None
         self.exponent, self.share = self._explicit.exponent, self._explicit.share
-        self.name, self._trial = self._explicit.name, TRIAL
-        if self.control.rtol.value > LOOSE:
-            self._trial = None
-            self._go_implicit()
-            self.name = "radau"
+        self.name = self._explicit.name
+        factors, solutions = costs(self.equations.n)
+        self._waits = self._asleep = WINDOW * (factors + SOLUTIONS * solutions) // self._explicit.method.c.size
+        if self.name == "rk54" and self.equations.n <= FREEDOMS:
+            self._trial = TRIAL
+            if self.control.rtol.value > LOOSE:
+                self._trial, self._returns = None, False
+                self._go_implicit()
+                self.name = "radau"
         self.counts["chosen"] = self.name
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
@@ -89,11 +101,13 @@ class Auto(ReducedMethod):
         except SolveError as error:
             self._failures += 1
             if self._failures > PATIENCE and error.outcome not in FINAL:
-                self._switch(state.t, h, "its steps fail")
+                self._switch(state.t, h, FAILING)
             raise
         if found.error <= 1.0:
             self._failures = 0
-            if self._explicit.stiffness > self._limit:
+            if self._asleep:
+                self._asleep -= 1
+            elif self._explicit.stiffness > self._limit:
                 self._held, self._free = self._held + 1, 0
                 if self._held == HELD:
                     self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
@@ -110,10 +124,17 @@ class Auto(ReducedMethod):
         if self._semi is not None:
             self._begin()
         if self._implicit is not None:
-            if self._trial is None:
-                return self._implicit.many(span)
-            return self._implicit.many(span, Rival(self._limit, self._explicit.method.c.size, self._return))
+            rival = Rival(self._limit, self._explicit.method.c.size, self._return) if self._returns else None
+            return self._implicit.many(span, rival)
+        if self._asleep:
+            return self._explicit.many(span, np.inf, self._wake, self._asleep)
         return self._explicit.many(span, self._limit, self._switch, self._trial)
+
+    def _wake(self, t: float, h: float, reason: str) -> None:
+        """Heed stiffness from here on: a trial of radau costs less than the steps so far did."""
+        self._asleep = 0
+        if reason == FAILING:
+            self._switch(t, h, reason)
 
     def _switch(self, t: float, h: float, reason: str) -> None:
         self._go_implicit()
@@ -121,7 +142,9 @@ class Auto(ReducedMethod):
 
     def _return(self, t: float, h: float, reason: str, vain: bool) -> None:
         self._implicit = None
-        self._trial = 2 * (self._trial or TRIAL) if vain else TRIAL
+        if self._trial is not None:
+            self._trial = 2 * self._trial if vain else TRIAL
+        self._asleep = self._waits = 2 * self._waits if vain else self._waits
         self.exponent, self.share = self._explicit.exponent, self._explicit.share
         name = self._explicit.name
         self.counts["switches"].append({"t": float(t), "to": name, "step": float(h), "reason": reason})
@@ -143,7 +166,7 @@ class Auto(ReducedMethod):
         return {
             "explicit": self._explicit.taken(state),
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
-            "nearness": [self._held, self._free, self._failures, self._trial],
+            "nearness": [self._held, self._free, self._failures, self._trial, self._waits, self._asleep],
             "name": self.name,
             "semi": self._semi is not None,
         }
@@ -155,7 +178,7 @@ class Auto(ReducedMethod):
         self._explicit.take(own["explicit"], state)
         if own["implicit"] is not None:
             self._go_implicit().restore(own["implicit"], state)
-        self._held, self._free, self._failures, self._trial = own["nearness"]
+        self._held, self._free, self._failures, self._trial, self._waits, self._asleep = own["nearness"]
         self.name = own["name"]
 
 

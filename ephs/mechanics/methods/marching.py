@@ -18,7 +18,7 @@ from ephs.solve.march import STEPS, Account, Ending, Status
 from ephs.solve.march import Control as Steering
 from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Counts, Span
+from ephs.solve.stepping import Attempt, Counts, Span, Taken
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.semi import Semi
@@ -30,6 +30,8 @@ WINDOW, LATEST = 10, 30
 after so many without one."""
 
 
+FAILING = "its steps fail"
+"""The reason to leave explicit steps that have no solution."""
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
 
@@ -214,7 +216,7 @@ class March:
             self._step()
         elif self._leave is not None and found in (Ending.STIFF, Ending.REFUSED + Status.UNSETTLED):
             failing = found != Ending.STIFF or c.refusals > PATIENCE
-            reason = "its steps fail" if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
+            reason = FAILING if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
             self._leave(self.time, float(c.step), reason)
             self.left = True
         elif found == Ending.PAUSED and self._rival is not None and not self._unweighed:
@@ -346,20 +348,24 @@ class March:
         heats, totals = rest[n : n + ns].copy(), rest[n + ns :].copy()
         return ReducedState(t, q.copy(), rest[:n].copy(), heats, totals, account=account)
 
-    def rows(self) -> list[tuple[float, ReducedState, float]]:
-        """Records since the last call: time, state, the step's least production."""
-        end = abs(float(self.control.end))
-        out: list[tuple[float, ReducedState, float]] = []
-        for row, (times, q, y) in enumerate(zip(*self.kept(), strict=True)):
-            passed, least, *put = times.tolist()
-            t = self.span.until if passed == end else self.span.t0 + self._sign * passed
-            if self.span.save_at is not None:
-                t = float(self.span.save_at[self.span.saved + self._handed + row])
-            account = np.concatenate([[self.account[0].anchor, 0.0, *put], self.momenta, 0.0 * self.memory["carry"]])
-            out.append((t, self._state(t, q, y, account), least))
-        self._handed += len(out)
+    def rows(self) -> Taken[ReducedState]:
+        """Instants since the last call."""
+        times, q, y = (each.copy() for each in self.kept())
+        passed, least, put = times[:, 0], times[:, 1], times[:, 2:]
+        if self.span.save_at is None:
+            t = np.where(passed == abs(self.control.end), self.span.until, self.span.t0 + self._sign * passed)
+        else:
+            first = self.span.saved + self._handed
+            t = np.array(self.span.save_at[first : first + len(q)])
+        anchor, momenta, carry = self.account[0].anchor, self.momenta.copy(), 0.0 * self.memory["carry"]
+
+        def state(k: int) -> ReducedState:
+            account = np.concatenate([[anchor, 0.0, *put[k]], momenta, carry])
+            return self._state(float(t[k]), q[k], y[k], account)
+
+        self._handed += len(q)
         self.control.rows = 0
-        return out
+        return Taken(t, least, (q, y, put), state)
 
     def kept(self) -> tuple[Array, Array, Array]:
         """The rows that `rows` would hand over, views of the memory: (n, 4) time from the start, least production, what

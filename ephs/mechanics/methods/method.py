@@ -1,16 +1,17 @@
 """Base of the methods on the reduced form: a step, and the interface to the time loop."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
-from ephs.solve.result.record import Record, record_of
+from ephs.solve.result.record import Record
 from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Leg, Row, Span, too_fast
+from ephs.solve.stepping import Attempt, Instants, Leg, Row, Span, Taken, too_fast
 
 HALVINGS = 4
 """Number of halvings of a failing part of a step whose whole succeeded."""
@@ -104,9 +105,13 @@ class ReducedMethod(ABC):
         """Record of a state."""
         return self.equations.row(state)
 
-    def record(self, taken: Sequence[tuple[float, ReducedState, float]]) -> Record:
+    def record(self, taken: Instants[ReducedState]) -> Record:
         """Records of many instants."""
-        return record_of(taken, self.equations.rows_of([state for _, state, _ in taken]))
+        if isinstance(taken, Taken):
+            q, rest, put = taken.data
+            return self.equations.booking.record(taken.times, q, rest, put, taken.least)
+        times, states, least = zip(*taken, strict=True)
+        return self.equations.booking.record_of(states, np.array(times), np.array(least))
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""

@@ -32,7 +32,7 @@ def options_of(method: MethodEntry, problem: Problem, given: Mapping[str, Any] |
             "options", unknown[0], f"options of {method.name}: {known}{nearest_of(unknown[0], method.options)}"
         )
     energy, both = KEEP
-    hard = strikes(problem.descriptor.components)
+    hard = strikes(problem.descriptor)
     if hard is not None and given.get("keep") == both:
         expected = f"{energy!r}: {hard} acts by impulses, beside which steps keep no momenta"
         raise OptionError("options['keep']", both, expected)

@@ -104,7 +104,7 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         from ephs.mechanics.tree.equations.equations import Equations  # its kernels take a quarter of a second to load
 
-        hard = strikes(setting.problem.descriptor.components)
+        hard = strikes(setting.problem.descriptor)
         try:
             equations = setting.equations or Equations(setting.problem, setting.t0, pushed=hard is not None)
         except Unplaced as error:
@@ -332,7 +332,7 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
     OptionError
         There is no such method, or it does not serve this problem.
     """
-    hard = strikes(problem.descriptor.components)
+    hard = strikes(problem.descriptor)
     if name == "auto":
         if hard is not None:
             return (AUTO, "a mechanism with hard contacts") if step is None else (METHODS["rk54"], "hard contacts")

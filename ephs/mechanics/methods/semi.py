@@ -138,7 +138,7 @@ def cheap(equations: Equations) -> bool:
     """Whether the masses of a tree are factorised in little time, and no contact is hard."""
     reach = chains(links_of(equations.reduced).parts)["reach"]
     narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
-    return bool(narrow) and strikes(equations.problem.descriptor.components) is None
+    return bool(narrow) and strikes(equations.problem.descriptor) is None
 
 
 def _relations(equations: Equations) -> Iterator[tuple[int, Irreversible]]:

@@ -32,12 +32,19 @@ NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 PIVOTING = ("swap", "swaps", "end", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
-FACTORS = 2
-"""Evaluations that cost as much as factors do; a solution is one."""
+FACTORS, FACTORED, SUBSTITUTED = 2, 120, 40
+"""Evaluations that cost as much as factors of a matrix of n freedoms, and solutions: 2 + n²/120 and 1 + n/40.
+
+An evaluation takes some 400 n operations, factors of a real and a complex matrix 10 n³/3, solutions with them 10 n²."""
 POWERS = 12
 """Powers of a matrix after which its largest eigenvalue shows, and over which it is averaged."""
 FAST = 2e-3
 """Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
+
+
+def costs(freedoms: int) -> tuple[int, int]:
+    """Cost of factors and of solutions with them, in evaluations of the rates."""
+    return FACTORS + freedoms * freedoms // FACTORED, 1 + freedoms // SUBSTITUTED
 
 
 @final
@@ -239,7 +246,8 @@ class Kept:
     def cost(self) -> int:
         """Cost of matrices, factors and solutions so far, in evaluations, roughly."""
         n: Any = self.newton[0]
-        return self._stages.jacobian.cost + int(n.iterations) + FACTORS * int(n.factorisations)
+        factors, solutions = costs(self._stages.equations.n)
+        return self._stages.jacobian.cost + solutions * int(n.iterations) + factors * int(n.factorisations)
 
     def fastest(self) -> float:
         """The largest |λ| of the matrix in 1/s, roughly: by its powers."""

@@ -103,9 +103,7 @@ class Variational(ReducedMethod):
             work += float(first @ state.r[self._driven] + second @ closed.r[self._driven])
         closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
         if self._keep == "momentum":
-            eq.booking.energies(
-                [closed]
-            )  # which refuses an end without an energy: steps ask for forces in their middle
+            eq.row(closed)  # which refuses an end without an energy: steps ask for forces in their middle
         else:
             closed, _ = eq.accounts.corrected(
                 state, closed, h, np.full(eq.counted.size, np.inf), chosen=False, alone=True

@@ -7,8 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.runs.signals import View, signal
-from ephs.mechanics.scene.attached import Actuator
-from ephs.mechanics.scene.attaching import supplies_of
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path, element_inputs, tension_port
 from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
@@ -52,34 +51,30 @@ def scene_signals(
     others: dict[Path, Signal] = {}
     joints, bodies, markers = dict(scene.all_joints()), dict(scene.all_bodies()), dict(scene.all_markers())
     sizes = {f"joints.{name}": j.dim for name, j in joints.items()} | {f"bodies.{name}": 6 for name in bodies}
-    attached = {f"{section}.{name}": each for section, name, each in scene.all_attachments()}
-    supplied = {key: supplies_of(each) for key, each in attached.items()}
-    sizes |= {key: len(given) for key, given in supplied.items() if given}
-    sizes |= {key: 1 for key, each in attached.items() if isinstance(each, Actuator)}
+    actuators = {f"actuators.{name}": each for name, each in scene.every("actuators")}
+    sizes |= dict.fromkeys(actuators, 1)
     own = element_inputs(scene)
-    sizes |= {key: signal.at(0.0, {}).size for key, ports in own.items() for signal in ports.values()}
+    sizes |= {key: sum(signal.at(0.0, {}).size for signal in ports.values()) for key, ports in own.items()}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
         push = _of_load(load)
         wrenches[load.body] = sum_of(wrenches[load.body], push) if load.body in wrenches else push
     for key, given in _single(inputs, sizes, view):
         kind, _, name = key.partition(".")
-        if supplied.get(key):
-            parts = (part_of(given, slice(k, k + 1)) for k in range(len(supplied[key])))
-            others |= {s.outer: replace(part, effort=True) for s, part in zip(supplied[key], parts, strict=True)}
-            continue
         if key in own:
-            others |= {port: replace(given, effort=signal.effort) for port, signal in own[key].items()}
+            first = 0
+            for port, signal in own[key].items():
+                last = first + signal.at(0.0, {}).size
+                others[port] = replace(part_of(given, slice(first, last)), effort=signal.effort)
+                first = last
             continue
         if kind in ("joints", "actuators"):
-            of = attached.get(key)
-            if isinstance(of, Actuator) and of.tendon is not None:
+            of = actuators.get(key)
+            if of is not None and of.tendon is not None:
                 port, (share,) = tension_port(of.tendon), _shares(of, given)
                 others[port] = sum_of(others[port], share) if port in others else share
                 continue
-            shares = (
-                dict(zip(of.joints, _shares(of, given), strict=True)) if isinstance(of, Actuator) else {name: given}
-            )
+            shares = {name: given} if of is None else dict(zip(of.joints, _shares(of, given), strict=True))
             for joint, share in shares.items():
                 forces[joint] = sum_of(forces[joint], share) if joint in forces else share
             continue
@@ -108,14 +103,14 @@ def _single(inputs: Mapping[Any, Any], sizes: Mapping[str, int], view: View) -> 
 
 def _shares(of: Actuator, control: Signal) -> list[Signal]:
     """Force on each joint of an actuator, or on the length of its tendon, of its control within its limits."""
-    low, high = (-np.inf, np.inf) if of.limits is None else of.limits.tolist()
+    low, high = (-np.inf, np.inf) if of.limits is None else of.limits
 
     def share(ratio: float) -> Signal:
         if control.constant:
             return Signal(ratio * np.clip(control.at(0.0, {}), low, high))
         return replace(control, value=lambda t, state: ratio * np.clip(control.at(t, state), low, high))
 
-    return [share(ratio) for ratio in of.ratio.tolist()]
+    return [share(ratio) for ratio in np.atleast_1d(of.ratio)]
 
 
 @final

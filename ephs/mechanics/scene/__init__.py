@@ -6,6 +6,7 @@ and is imported where it is used.
 
 from ephs.mechanics.scene.adjustment import Adjustment as Adjustment
 from ephs.mechanics.scene.adjustment import Displacement as Displacement
+from ephs.mechanics.scene.conduction import Conduction as Conduction
 from ephs.mechanics.scene.errors import Fault as Fault
 from ephs.mechanics.scene.errors import ModelWarning as ModelWarning
 from ephs.mechanics.scene.errors import SceneError as SceneError
@@ -15,5 +16,4 @@ from ephs.mechanics.scene.model import Joint as Joint
 from ephs.mechanics.scene.model import Scene as Scene
 from ephs.mechanics.scene.model import Spring as Spring
 from ephs.mechanics.scene.model import World as World
-from ephs.mechanics.scene.thermal import Conduction as Conduction
 from ephs.mechanics.scene.thermal import ThermalNode as ThermalNode

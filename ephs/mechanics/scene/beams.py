@@ -16,6 +16,7 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.entries import Checked, shown
 from ephs.mechanics.scene.errors import Fault, fault
@@ -27,7 +28,7 @@ from ephs.mechanics.scene.resolve import JointDraft, Names
 from ephs.mechanics.scene.schema_touching import ContactLawEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
-from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -127,7 +128,9 @@ def _warmth(
     kept = given.temperature, axial * given.expansion, given.reference or given.temperature
     nodes = {name: ThermalNode(name, given.capacity * length, *kept) for name, length in of.items()}
     ways = {
-        one: Conduction(one, (one, other), given.conduction / (0.5 * (of[one] + of[other])))
+        one: Conduction.model_construct(
+            between=[one, other], conductance=given.conduction / (0.5 * (of[one] + of[other]))
+        ).called(one)
         for one, other in pairwise(beam.joints)
     }
     return nodes, ways if given.conduction else {}

@@ -1,10 +1,9 @@
 """Scenes as hierarchical systems.
 
-Boxes are ``bodies.NAME``, ``joints.NAME``, ``springs.NAME``, ``contacts.NAME``, ``thermal.NAME``, ``conduction.NAME``,
-``parts.NAME``, ``ground`` and ``environment``; they meet at the junctions ``momenta.BODY``, ``entropies.NODE``, and
-``lengthenings.NODE`` of nodes that expand. A driven joint's momentum is the outer port ``drives.JOINT``. What a part
-exposes is joined at ``momenta.PART.BODY`` and so on; a part's name is not taken by anything else of its level, so these
-never clash.
+Boxes are ``SECTION.NAME`` of bodies, joints, thermal nodes and other elements, ``parts.NAME``, ``ground`` and
+``environment``; they meet at the junctions ``momenta.BODY``, ``entropies.NODE``, and ``lengthenings.NODE`` of nodes
+that expand. A driven joint's momentum is the outer port ``drives.JOINT``. What a part exposes is joined at
+``momenta.PART.BODY`` and so on; a part's name is not taken by anything else of its level, so these never clash.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,18 +16,15 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.elements.beam import thermoelastic
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
-from ephs.mechanics.scene.attached import Actuator
-from ephs.mechanics.scene.attaching import SUPPLIED, starts_of, supplies, supplies_of, system_of
 from ephs.mechanics.scene.demands import Demands, demands_on_parts
 from ephs.mechanics.scene.made import Made, spring_system
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
-from ephs.mechanics.scene.site import INPUTS, Level, Site, trial
+from ephs.mechanics.scene.site import INPUTS, built
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.scene.tendons import tendon_ports, tendon_starts, tendon_system
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
-from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import once
 from ephs.semantics.primitives import Storage
@@ -86,7 +82,11 @@ def started_system(scene: Scene) -> System:
 
 
 def initial_state(scene: Scene) -> dict[Path, Array]:
-    """Values of all states of the scene's system at the start."""
+    """Values of all states of the scene's system at the start; the values are made once and kept with the scene."""
+    return dict(once(scene, "initial state", lambda: _initial_state(scene)))
+
+
+def _initial_state(scene: Scene) -> dict[Path, Array]:
     out: dict[Path, Array] = {}
     poses: dict[str, Array] = {GROUND: SE3.identity()}
     for name, body in scene.all_bodies():
@@ -105,10 +105,6 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
                 out[place / "env" / "s"] = np.zeros(1)
         if j.armature:
             out[component_path("armatures", name) / "p"] = j.armature * j.rate
-    for section, name, each in scene.all_attachments():
-        at = component_path(section, name)
-        found = starts_of(each, [scene.joint(tied) for tied in each.tied])
-        out |= {Path([*at, *path.split(".")]): value.copy() for path, value in found.items()}
     for name, tendon in scene.all_tendons():
         at = component_path("tendons", name)
         out |= {Path([*at, *path.split(".")]): value for path, value in tendon_starts(tendon, poses).items()}
@@ -128,10 +124,14 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
         out[at / "pe" / "q_r"] = SE3.normalise(SE3.compose(SE3.inverse(first), second))
     for name, node in scene.all_thermal():
         out |= {component_path("thermal", name) / state: np.zeros(1) for state in ("s", *["e"] * (node.pull > 0.0))}
-    for prefix, part in _levels(scene):
-        if _needs_environment(part):
-            out[prefix / "environment" / "s"] = np.zeros(1)
-    return scene_system(scene).state() | out if any(True for _ in scene.all_elements()) else out
+    for path, level in scene.levels():
+        if (own := built(level)).boxes:
+            system = System.of(Pattern(junctions=own.junctions, boxes=own.boxes), own.fillings)
+            at = Path([word for part in path.split(".")[:-1] for word in ("parts", part)])
+            out |= {Path([*at, *state]): value for state, value in system.state().items()}
+    for value in out.values():
+        value.flags.writeable = False
+    return out
 
 
 def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
@@ -150,11 +150,10 @@ def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[To
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Signal]:
-    """Prescribed drives as flows, motions and supplies as efforts, at the ports of `drive_ports` and `supplies`; of
-    tendons no force but their own.
+    """Prescribed drives as flows, motions as efforts at the ports of `drive_ports`, inputs of elements; of tendons no
+    force but their own.
     """
-    out = {supply.outer: Signal(supply.value, effort=True) for supply in supplies(scene)}
-    out |= {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
+    out = {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
     out |= {port: signal for ports in element_inputs(scene).values() for port, signal in ports.items()}
     for _, j in scene.all_joints():
         if _is_driven(j):
@@ -169,13 +168,9 @@ def element_inputs(scene: Scene) -> Mapping[str, Mapping[Path, Signal]]:
     def made() -> dict[str, dict[Path, Signal]]:
         out: dict[str, dict[Path, Signal]] = {}
         for path, level in scene.levels():
-            for of in (each for own in level.elements.values() for each in own.values()):
-                site, trying = trial(level, of)
-                of.build(site)
-                for port, signal in trying.inputs.items():
-                    _, section, name, *rest = port
-                    key = ".".join([section, path + name, *rest])
-                    out[key] = {Path.of(f"{INPUTS}.{key}"): signal}
+            for port, (name, signal) in built(level).inputs.items():
+                section, _, own = name.partition(".")
+                out.setdefault(f"{section}.{path}{own}", {})[_outside(port, path)] = signal
         return out
 
     return once(scene, "element inputs", made)
@@ -200,16 +195,6 @@ def _is_driven(j: Joint) -> bool:
 
 def _at(group: str, name: str) -> Path:
     return Path([group, *name.split(".")])
-
-
-def _levels(scene: Scene, prefix: Path = Path()) -> Iterable[tuple[Path, Scene]]:  # noqa: B008 - a frozen value
-    yield prefix, scene
-    for name, part in scene.parts.items():
-        yield from _levels(part, prefix / "parts" / name)
-
-
-def _needs_environment(scene: Scene) -> bool:
-    return any(ENVIRONMENT in c.between for c in scene.conduction.values())
 
 
 @dataclass(slots=True)
@@ -244,11 +229,6 @@ class _Builder:
     def drive(self, name: str, path: Path, of: Quantity) -> str:
         """The junction of a driven joint, exposed at the request of the level above."""
         self.junctions[path] = junction(of, exposed=name in self.demands.joints)
-        return str(path)
-
-    def supply(self, path: Path) -> str:
-        """An exposed junction of an attachment's supply."""
-        self.junctions[path] = junction(SUPPLIED[path[0]], exposed=True)
         return str(path)
 
     def tension(self, tendon: str) -> str:
@@ -305,30 +285,19 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
     for name, node in scene.thermal.items():
         ports = {"s": b.entropy(name)} | ({"e": b.lengthening(name)} if node.pull else {})
         b.add(Path(["thermal", name]), _storing(node), ports)
-    for name, c in scene.conduction.items():
-        ports = {"s1": b.entropy(c.between[0]), "s2": b.entropy(c.between[1])}
-        b.add(Path(["conduction", name]), library.heat_transfer(h=c.conductance), ports)
-    if _needs_environment(scene):
-        b.add(Path(["environment"]), library.environment(), {"s": b.entropy(ENVIRONMENT)})
     for name, part in scene.parts.items():
         system = _level(part, inner.of_part(name), top=False)
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
-    for section, name, each in scene.attachments():
-        if isinstance(each, Actuator):
-            continue  # forces on joints, as in runs
-        at = [_at("drives", tied) for tied in each.tied]
-        made = system_of(each, [b.junctions[path].quantity for path in at])
-        ports = dict(zip(made[1], map(str, at), strict=True))
-        ports |= {supply.port: b.supply(supply.outer) for supply in supplies_of(each)}
-        if each.warms and each.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(each.heat)
-        b.add(Path([section, name]), made[0], ports)
-    exposed = demands.bodies, demands.nodes
-    for of in (each for own in scene.elements.values() for each in own.values()):
-        of.build(Site(scene, of, Level(b.junctions, b.boxes, b.fillings), exposed))
-    if _at("entropies", ENVIRONMENT) in b.junctions and Path(["environment"]) not in b.boxes:
-        b.add(Path(["environment"]), library.environment(), {"s": b.entropy(ENVIRONMENT)})
+    own = built(scene)
+    for path, of in own.junctions.items():
+        group, name = path[0], ".".join(path[1:])
+        if group in ("momenta", "entropies"):
+            b.momentum(name) if group == "momenta" else b.entropy(name)
+        elif group != "drives":
+            b.junctions[path] = of
+    b.boxes.update(own.boxes)
+    b.fillings.update(own.fillings)
     if top and _at("momenta", GROUND) in b.junctions:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
@@ -356,13 +325,15 @@ def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
         return b.momentum(name)
     if group == "entropies":
         return b.entropy(name)
-    if group == "tensions":
-        return b.tension(name)
-    if group in SUPPLIED:
-        return b.supply(_at(group, name))
-    if group == INPUTS:
-        path = Path([INPUTS, rest[0], part, *rest[1:]])
+    path = _outside(port, f"{part}.")
+    if group != "drives":
         b.junctions[path] = junction(of, exposed=True)
         return str(path)
     joint_name = name if name in b.inner.joints else name.rpartition(".")[0]
-    return b.drive(joint_name, Path(["drives", part, *rest]), of)
+    return b.drive(joint_name, path, of)
+
+
+def _outside(port: Path, path: str) -> Path:
+    """An outer port as seen from outside of the part at a path, which ends in a dot."""
+    start = 2 if port[0] == INPUTS else 1
+    return Path([*port[:start], *path.split(".")[:-1], *port[start:]])

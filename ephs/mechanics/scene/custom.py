@@ -7,7 +7,7 @@ part follow from these.
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 
 import numpy as np
@@ -23,10 +23,6 @@ from ephs.semantics.bundle import Array
 if TYPE_CHECKING:
     from ephs.mechanics.scene.site import Site
 
-AXIS: Final = "axis"
-"""Kind of a joint with one degree of freedom and no prescribed motion, on whose rate an element acts."""
-KINDS: Final = (*OUTSIDE, AXIS)
-"""Kinds of what keys may name."""
 _TEXTS: Final[Mapping[str, tuple[str, str]]] = {
     "class": ("a subclass of ephs.mechanics.Element", "derive it from Element"),
     "section": ("section= in the class statement, a name of letters, digits and underscores", "add it"),
@@ -37,7 +33,7 @@ _TEXTS: Final[Mapping[str, tuple[str, str]]] = {
     "form": ("a number, a text, true or false, or a list of these", "take several keys instead of tables in a table"),
     "unit": ('unit= of each number, "1" where it has none', "give its unit"),
     "symbols": ("a unit such as N m/rad, kg m², m³/(s Pa)", "correct the unit"),
-    "names": (f"names= one of {', '.join(KINDS)}, of a text or a list of texts", "correct it"),
+    "names": (f"names= one of {', '.join(OUTSIDE)}, of a text or a list of texts", "correct it"),
     "rule": ("a rule of keys of this class", "name these keys"),
     "validator": ("rules instead of pydantic's validators", "write a method with @rule, which has its own texts"),
 }
@@ -51,7 +47,9 @@ class ElementError(ValueError):
         super().__init__(f"{where}: found {found}, expected {expected}; {advice}")
 
 
-def key(meaning: str, default: Any = ..., *, unit: str = "", names: str = "", **more: Any) -> Any:
+def key(
+    meaning: str, default: Any = ..., *, unit: str = "", shown: str | None = None, names: str = "", **more: Any
+) -> Any:
     """A key of an element's table; it is required where it has no default.
 
     Parameters
@@ -60,14 +58,17 @@ def key(meaning: str, default: Any = ..., *, unit: str = "", names: str = "", **
         In words. The unit stands where it has ``{}``, else at the end.
     unit
         Of a number, or of each in a list: it is a parameter of sweeps and fits, and changes with units. ``"1"`` where
-        it has no dimension; ``q`` is the unit of the coordinate of the joint that the table names first.
+        it has no dimension; ``q`` is the unit of the coordinate of the joint that the table names first, ``qᵢ`` of a
+        list that of each joint's own, from the last one on.
+    shown
+        The unit as the page has it; default: as above, with ``rad or m`` for ``q``.
     names
         Kind of the elements that it names: ``body``, ``node`` (of heat), ``joint``, ``axis`` (a joint with one free
-        degree of freedom), ``tendon``, ``surface``.
+        degree of freedom), ``single`` (with one, free or prescribed), ``tendon``, ``surface``.
     more
         Bounds, as of pydantic's ``Field``: ``ge``, ``gt``, ``le``, ``lt``, ``min_length``, ``max_length``.
     """
-    said = written(unit) if unit else ""
+    said = shown if shown is not None else written(unit) if unit else ""
     text = meaning.format(said) if "{}" in meaning else ", ".join(filter(None, (meaning, said)))
     extra = {name: value for name, value in (("unit", unit), ("names", names)) if value}
     return Field(default=default, description=text, json_schema_extra=_hidden(extra), **more)
@@ -95,29 +96,36 @@ class KeyRule:
     """A condition on keys of a table, with its texts."""
 
     keys: tuple[str, ...]
-    holds: Callable[..., bool]
+    holds: Callable[..., bool | Mapping[str, object]]
     expected: str
     advice: str
     found: str
     at: str
     placed: bool
 
-    def texts(self, element: "Element") -> tuple[str, str]:
-        """Texts of the expected value and of the advice, with the values of keys filled in."""
-        values = _values(element)
-        return self.expected.format_map(values), self.advice.format_map(values)
-
-    def found_in(self, element: "Element") -> str:
-        """Text of the found value, with the values of keys filled in."""
-        return self.found.format_map(_values(element))
+    def texts(self, element: "Element", *site: "Site") -> tuple[str, str, str] | None:
+        """Texts of the found value, the expected one and the advice; None where it holds."""
+        told = self.holds(element, *site)
+        if told and not isinstance(told, Mapping):
+            return None
+        values = {name: getattr(element, name, None) for name in type(element).model_fields}
+        values |= told or {}
+        found, expected, advice = (text.format_map(values) for text in (self.found, self.expected, self.advice))
+        return found, expected, advice
 
 
 def rule(
-    *keys: str, expected: str, advice: str = "correct the value", found: str = "", at: str = "", placed: bool = False
-) -> Callable[[Callable[..., bool]], KeyRule]:
+    *keys: str,
+    expected: str,
+    advice: str = "correct the value",
+    found: str = "",
+    at: str | None = None,
+    placed: bool = False,
+) -> Callable[[Callable[..., bool | Mapping[str, object]]], KeyRule]:
     """Mark a method as a condition on keys of the table: where it is false there is a fault.
 
-    It is asked where none of these keys has a fault of its own.
+    In place of False it may return values by name, which may stand in braces, too. It is asked where none of
+    these keys has a fault of its own.
 
     Parameters
     ----------
@@ -126,15 +134,15 @@ def rule(
     expected, advice
         Texts of the message; values of keys may stand in braces.
     found
-        Text of the found value, with values of keys in braces; default: the value at the key.
+        Text of the found value, with values of keys in braces; default: the value at the key, or ``a table``.
     at
-        The key that the message names; default: the first one.
+        The key that the message names, ``""`` for the whole table; default: the first one.
     placed
         Whether it is asked once all bodies are where they are at the start: then the method takes a `Site`, too.
     """
 
-    def marked(holds: Callable[..., bool]) -> KeyRule:
-        return KeyRule(keys, holds, expected, advice, found, at or keys[0], placed)
+    def marked(holds: Callable[..., bool | Mapping[str, object]]) -> KeyRule:
+        return KeyRule(keys, holds, expected, advice, found, keys[0] if at is None else at, placed)
 
     return marked
 
@@ -203,11 +211,15 @@ class Element(Entry):
             The table is not sound.
         """
         try:
-            found = cls.model_validate(dict(table))
+            found = cls.model_validate({key: value for key, value in table.items() if key != "name"})
         except ValidationError as error:
             where, what = error.errors(include_url=False)[0]["loc"], error.errors(include_url=False)[0]["msg"]
             raise ValueError(f"{cls.section}.{name}.{'.'.join(map(str, where))}: {what}") from None
-        return found.called(name)
+        return found.normalised().called(name)
+
+    def normalised(self) -> Self:
+        """Itself with one number written as a list where it may be both, and the like."""
+        return self
 
     def called(self, name: str) -> Self:
         """Itself with a name."""
@@ -218,6 +230,10 @@ class Element(Entry):
     def changed(self, **keys: Any) -> Self:
         """Itself with other values at some keys, which are not checked."""
         return self.model_copy(update=keys)
+
+    def number_values(self) -> dict[str, Any]:
+        """Its numbers by key."""
+        return {name: getattr(self, name) for name in type(self).numbers}
 
     def references(self) -> Iterator[tuple[str, str, str]]:
         """Key, kind and name of all that it names."""
@@ -238,7 +254,7 @@ class Element(Entry):
             return self
         changes: dict[str, Any] = {}
         for name, kind in type(self).names.items():
-            same, given = OUTSIDE.get(kind, frozenset[str]()), getattr(self, name)
+            same, given = OUTSIDE[kind], getattr(self, name)
             if isinstance(given, str):
                 changes[name] = given if given in same else path + given
             elif given is not None:
@@ -251,6 +267,8 @@ class Element(Entry):
         for name, number in type(self).numbers.items():
             given = getattr(self, name)
             if given is not None:
+                if number.others:
+                    number = replace(number, each=len(coordinates) - np.size(given))
                 unit = number.unit(length, mass, time, coordinates)
                 changes[name] = (np.asarray(given, dtype=float) * unit).tolist()
         return self.changed(**changes)
@@ -258,11 +276,6 @@ class Element(Entry):
     def __str__(self) -> str:
         """In a few words."""
         return " – ".join(name for _, _, name in self.references()) or self.said
-
-
-def _values(element: Element) -> dict[str, Any]:
-    """Values at keys; of a faulty one None."""
-    return {name: getattr(element, name, None) for name in type(element).model_fields}
 
 
 def _extra(given: Any) -> _Hidden:
@@ -333,10 +346,10 @@ def _check_keys(kind: type[Element]) -> None:
         of = field.json_schema_extra
         if ("number" in forms) != bool(of.unit) and not ("integer" in forms and of.unit == "1"):
             raise ElementError("unit", where, f'unit "{of.unit}"')
-        if of.names and (of.names not in KINDS or forms - {"string", "null"}):
+        if of.names and (of.names not in OUTSIDE or forms - {"string", "null"}):
             raise ElementError("names", where, f'names "{of.names}"')
     for each in kind.rules:
-        unknown = [name for name in (*each.keys, each.at) if name not in kind.model_fields]
+        unknown = [name for name in (*each.keys, each.at) if name and name not in kind.model_fields]
         if unknown:
             raise ElementError("rule", f"{kind.__name__}.{each.holds.__name__}", ", ".join(unknown))
 

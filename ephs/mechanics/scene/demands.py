@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.scene.attached import Actuator
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.site import built
 
 
 @final
@@ -28,22 +28,16 @@ class Demands:
 
 
 def demands_on_parts(scene: Scene, demands: Demands) -> Demands:
-    """Ports that the level above and this level's joints, springs and conductions need from its parts."""
+    """Ports that the level above and this level's joints, springs and other elements need from its parts."""
     pairs = [*scene.joints.values(), *scene.springs.values()]
     bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
     bodies |= {body for tendon in scene.tendons.values() for body in tendon.bodies}
-    nodes = {x.heat for x in (*pairs, *scene.contacts.values())} | {
-        name for c in scene.conduction.values() for name in c.between
-    }
-    attached = [each for _, _, each in scene.attachments()]
-    nodes |= {tendon.heat for tendon in scene.tendons.values()}
-    nodes |= {each.heat for each in attached if each.warms}
+    nodes = {x.heat for x in (*pairs, *scene.contacts.values(), *scene.tendons.values())}
     turned = {name for name, j in scene.joints.items() if j.armature}
-    turned |= {name for each in attached for name in each.tied if not isinstance(each, Actuator)}
-    for of in (each for own in scene.elements.values() for each in own.values()):
-        bodies |= {*of.named("body"), *of.named("end")}
-        nodes |= {*of.named("node")}
-        turned |= {*of.named("axis")}
+    for path in built(scene).junctions:
+        of = {"momenta": bodies, "entropies": nodes, "drives": turned}.get(path[0])
+        if of is not None:
+            of.add(".".join(path[1:]))
     return Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
 
 

@@ -9,11 +9,13 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
+from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ELEMENTS, IDENTITY_POSE, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
-from ephs.mechanics.scene.registry import REGISTERED, elements_from
+from ephs.mechanics.scene.registry import elements_from
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -43,8 +45,8 @@ def _types(annotation: Any) -> set[Any]:
 def _plain(value: Any) -> Any:
     if value is None or isinstance(value, str | float | int):
         return value
-    if type(value) in REGISTERED.values():
-        return {name: getattr(value, name) for name in type(value).model_fields}
+    if isinstance(value, Element):
+        return {"name": value.name} | value.model_dump()
     if isinstance(value, np.ndarray):
         return {
             "shape": value.shape,
@@ -65,6 +67,11 @@ def _array(value: Any) -> Any:
 
 def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
+    if issubclass(cls, Element):
+        plain = {key: value["values"] if isinstance(value, dict) else value for key, value in data.items()}
+        if cls is Actuator:  # older files have a place for their heat
+            plain.pop("heat", None)
+        return cls.of_table(data["name"], plain)
 
     def made(key: str, value: Any) -> Any:
         if np.ndarray in types[key]:

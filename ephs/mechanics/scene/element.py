@@ -20,18 +20,23 @@ from ephs.semantics.bundle import Array
 T = TypeVar("T")
 GROUND = "ground"
 ENVIRONMENT = "environment"
+AXIS, SINGLE = "axis", "single"
+"""Kinds of joints with one degree of freedom on whose rates elements act: without a prescribed motion, and all."""
 FREE_END = "free"
 """A free end of a beam."""
+JOINTS: Final[tuple[str, ...]] = (AXIS, SINGLE, "joint")
 OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "body": frozenset({GROUND}),
     "end": frozenset({GROUND, FREE_END}),
     "node": frozenset({ENVIRONMENT}),
     "joint": frozenset(),
+    AXIS: frozenset(),
+    SINGLE: frozenset(),
     "tendon": frozenset(),
     "surface": frozenset(),
 }
 """Kind of a name that refers to something -> the names that are the same in all parts."""
-POSITIVE, NON_NEGATIVE, ABOVE_ONE = (0.0, True), (0.0, False), (1.0, True)
+POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
 """A lower bound, and whether it is excluded."""
 
 

@@ -32,23 +32,12 @@ _NEUTRAL: dict[str, Any] = {
     "at2": [0.0, 0.0, 0.0],
     "capacity": 1.0,
     "temperature": 1.0,
-    "between": ["environment", "environment"],
-    "conductance": 1.0,
     "use": "?",
     "body": "ground",
     "shape": SurfaceShapeEntry(),
     "surfaces": ["?", "?"],
-    "joint": "?",
-    "joints": ["?", "!"],
-    "constant": 0.0,
-    "resistance": 1.0,
     "section": SectionEntry(),
-    "area": 1.0,
-    "volume": 1.0,
-    "pressure": 1.0,
 }
-_NEUTRAL_PAIRS = {key: [1.0, 1.0] for key in ("area", "volume")}
-"""The same of cylinders."""
 
 _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "float_type": lambda ctx: ("type", "a number"),
@@ -143,8 +132,7 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
     if issubclass(model, Element):
         return Checked(model.model_construct(**sound), frozenset(spoiled))
     required = {k for k, field in model.model_fields.items() if field.is_required()}
-    known = _NEUTRAL | (_NEUTRAL_PAIRS if model is SECTIONS["cylinders"] else {})
-    neutral = {k: known[k] for k in spoiled & required}
+    neutral = {k: _NEUTRAL[k] for k in spoiled & required}
     return Checked(model.model_validate({**sound, **neutral}), frozenset(spoiled))
 
 

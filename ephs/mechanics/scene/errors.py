@@ -270,12 +270,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "motor joint": ("a joint with one degree of freedom and no prescribed motion", "name another joint"),
     "gear freedoms": ("a joint with one degree of freedom", "choose other joints"),
-    "gear joints": ("different joints", "name each joint once"),
-    "gear ratio": (
-        "{count} numbers: one for each joint; of a gear, one for each joint after the first",
-        "correct the number of entries",
-    ),
-    "gear rates": ("a rate of {first} of {rate:.6g}", "correct the initial rates; they must satisfy the gear"),
     "unknown joint": ("a joint of the scene", "{hint}"),
     "motion and drive": (
         "either motion or drive",
@@ -317,7 +311,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     "tendon points": ("{count} points, one for each body", "correct the number of points"),
     "tendon bodies": ("a segment between two different bodies", "route it from one body to another"),
     "slack damping": ("0 for a tendon with slack", "remove one of the two; joints may have friction"),
-    "actuator target": ("either joints or a tendon", "give one of the two"),
     "unknown tendon": ("a tendon of this file", "{hint}"),
     "same ends": ("two different points or nodes", "correct one of the two"),
     # assembly

@@ -6,14 +6,16 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import ATTACHED
+from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import (
+    ATTACHED,
     ELEMENTS,
     GROUND,
     IDENTITY_POSE,
+    KINDS,
     Joint,
     Scene,
     World,
@@ -93,17 +95,22 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
     """A number or an array that is an attribute."""
 
     def get(scene: Scene, name: str) -> Array:
-        return np.asarray(getattr(_thing(scene, kind, name), key), dtype=float)
+        value = getattr(_thing(scene, kind, name), key)
+        return np.zeros(0) if value is None else np.asarray(value, dtype=float)
 
     def put(scene: Scene, name: str, values: Array) -> Scene:
-        value = frozen(values) if values.ndim else float(values)
-        return _edited(scene, kind, name, lambda thing: replace(thing, **{key: value}))
+        def edited(thing: Any) -> Any:
+            if isinstance(thing, Element):
+                return thing.changed(**{key: values.tolist()})
+            return replace(thing, **{key: frozen(values) if values.ndim else float(values)})
 
-    return Field(get, put, ELEMENTS[kind].numbers[key].least, **more)
+        return _edited(scene, kind, name, edited)
+
+    return Field(get, put, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
 
 
 def _attributes(kind: str) -> dict[str, Field]:
-    return {key: _attribute(kind, key) for key in ELEMENTS[kind].numbers}
+    return _registered(KINDS[kind]) if kind in KINDS else {key: _attribute(kind, key) for key in ELEMENTS[kind].numbers}
 
 
 def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
@@ -300,30 +307,20 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     return []
 
 
-def _registered(section: str) -> dict[str, Field]:
-    """The numbers of elements of a registered section, with the checks of their tables."""
-
-    def field(key: str) -> Field:
-        def get(scene: Scene, name: str) -> Array:
-            value = getattr(_thing(scene, section, name), key)
-            return np.zeros(0) if value is None else np.asarray(value, dtype=float)
-
-        def put(scene: Scene, name: str, values: Array) -> Scene:
-            return _edited(scene, section, name, lambda of: of.changed(**{key: values.tolist()}))
-
-        return Field(get, put, faults=faults)
+def _registered(kind: type[Element]) -> dict[str, Field]:
+    """The numbers of elements that build themselves, with the checks of their tables."""
 
     def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         from ephs.mechanics.scene.resolve_elements import number_faults
 
-        return list(number_faults(_thing(scene, section, name), f"{section}.{name}"))
+        return list(number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}"))
 
-    return {key: field(key) for key in REGISTERED[section].numbers}
+    return {key: _attribute(kind.section, key, faults=faults) for key in kind.numbers}
 
 
 def fields_of(kind: str) -> Mapping[str, Field]:
     """Key of the scene file -> its numbers, of a kind of element; none where there is no such kind."""
-    return _registered(kind) if kind in REGISTERED else FIELDS.get(kind, {})
+    return _registered(REGISTERED[kind]) if kind in REGISTERED else FIELDS.get(kind, {})
 
 
 FIELDS: Mapping[str, Mapping[str, Field]] = {

@@ -13,17 +13,15 @@ import numpy as np
 
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
-from ephs.mechanics.scene.attached import ATTACHED
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told, warn_caller
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Scene, World
+from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved, spring_length
-from ephs.mechanics.scene.resolve_attached import resolve_attached
 from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements
 from ephs.mechanics.scene.state import Asked, adjusted
-from ephs.mechanics.scene.tendons import resolve_tendons, with_pulls
+from ephs.mechanics.scene.tendons import pulls, resolve_tendons
 from ephs.mechanics.scene.text import file_text, lost
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
@@ -139,7 +137,6 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
-    conduction = resolve.resolve_plain("conduction", document, names, faults)
     thermal = resolve.resolve_plain("thermal", document, names, faults)
     markers = resolve.resolve_plain("markers", document, names, faults)
     surfaces = resolve_surfaces(document, names, path.parent, faults)
@@ -153,6 +150,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     poses |= {f"{part}.{name}": body.pose for part, inner in parts.items() for name, body in inner.all_bodies()}
     tendons = resolve_tendons(document, poses, names, faults)
     r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
+    elements["conduction"] |= {name: x for rod in rods.values() for name, x in rod.conduction.items()}
     scene = Scene(
         document.name,
         world,
@@ -160,19 +158,16 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         coupled,
         springs,
         thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
-        conduction | {name: x for rod in rods.values() for name, x in rod.conduction.items()},
-        parts,
-        str(path),
+        parts=parts,
+        source=str(path),
         markers=markers,
         surfaces=surfaces,
         beams={name: rod.beam for name, rod in rods.items()},
         loads=loads,
         tendons=tendons,
-        elements=elements,
     )
-    attached = resolve_attached(document, scene, names, faults)
-    scene = replace(scene, **attached)
-    scene = replace(scene, actuators=with_pulls(scene.actuators, document, tendons, faults))
+    elements["actuators"] |= pulls(document, elements["actuators"], tendons, faults)
+    scene = with_sections(scene, elements)
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
         return None

@@ -10,18 +10,23 @@ from typing import TYPE_CHECKING, Any, TypeVar, final
 
 from numpy.typing import ArrayLike
 
-from ephs.mechanics.scene import attached
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, Marker, Spring, World, free_joint
+from ephs.mechanics.scene.conduction import Conduction
+from ephs.mechanics.scene.custom import Element
+from ephs.mechanics.scene.cylinders import Cylinder
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, SceneElement, frozen
 from ephs.mechanics.scene.flexible import Beam, Load, Tendon
+from ephs.mechanics.scene.gas_springs import GasSpring
+from ephs.mechanics.scene.gears import Gear
+from ephs.mechanics.scene.motors import Motor
 from ephs.mechanics.scene.surfaces import Contact, Surface
-from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundle import Array
 from ephs.semantics.kept import Kept
 
 if TYPE_CHECKING:
-    from ephs.mechanics.scene.custom import Element
     from ephs.semantics import System
 
 __all__ = [
@@ -76,12 +81,12 @@ class Scene:
     beams: Mapping[str, Beam] = field(default_factory=dict)
     loads: Mapping[str, Load] = field(default_factory=dict)
     tendons: Mapping[str, Tendon] = field(default_factory=dict)
-    motors: Mapping[str, attached.Motor] = field(default_factory=dict)
-    gears: Mapping[str, attached.Gear] = field(default_factory=dict)
-    cylinders: Mapping[str, attached.Cylinder] = field(default_factory=dict)
-    gas_springs: Mapping[str, attached.GasSpring] = field(default_factory=dict)
-    actuators: Mapping[str, attached.Actuator] = field(default_factory=dict)
-    elements: Mapping[str, Mapping[str, "Element"]] = field(default_factory=dict)
+    motors: Mapping[str, Motor] = field(default_factory=dict)
+    gears: Mapping[str, Gear] = field(default_factory=dict)
+    cylinders: Mapping[str, Cylinder] = field(default_factory=dict)
+    gas_springs: Mapping[str, GasSpring] = field(default_factory=dict)
+    actuators: Mapping[str, Actuator] = field(default_factory=dict)
+    elements: Mapping[str, Mapping[str, Element]] = field(default_factory=dict)
     origin: Array = field(default_factory=lambda: IDENTITY_POSE)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
@@ -145,7 +150,7 @@ class Scene:
         """The elements of a section of this level, registered ones included."""
         return getattr(self, name) if name in ELEMENTS else self.elements.get(name, {})
 
-    def all_elements(self) -> "Iterator[tuple[str, str, Element]]":
+    def all_elements(self) -> Iterator[tuple[str, str, Element]]:
         """Section, dotted name and value of every element of registered sections; what it names is dotted, too."""
         for path, scene in self.levels():
             for section, own in scene.elements.items():
@@ -194,14 +199,13 @@ class Scene:
         """Every tendon with its dotted name; its bodies and heat sink are dotted too."""
         return self.every("tendons")
 
-    def attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
+    def attachments(self) -> Iterator[tuple[str, str, Element]]:
         """Section, name and value of every attachment of this level: motors, gears, cylinders, actuators, …"""
-        for section in attached.ATTACHED:
-            own: Mapping[str, attached.Attachment] = getattr(self, section)
-            for name, each in own.items():
+        for section in ATTACHED:
+            for name, each in self.section(section).items():
                 yield section, name, each
 
-    def all_attachments(self) -> Iterator[tuple[str, str, attached.Attachment]]:
+    def all_attachments(self) -> Iterator[tuple[str, str, Element]]:
         """Section, dotted name and value of every attachment; its joints and heat sink are dotted too."""
         for path, scene in self.levels():
             for section, name, each in scene.attachments():
@@ -248,21 +252,31 @@ class Scene:
             yield from part.levels(f"{path}{name}.")
 
 
-ELEMENTS: Mapping[str, type[SceneElement]] = {
+ATTACHED: Mapping[str, type[Element]] = {of.section: of for of in (Motor, Gear, Cylinder, GasSpring, Actuator)}
+"""Attachments of joints, by their sections."""
+ELEMENTS: Mapping[str, type[SceneElement] | type[Element]] = {
     "bodies": Body,
     "joints": Joint,
     "springs": Spring,
-    "thermal": ThermalNode,
-    "conduction": Conduction,
-    "markers": Marker,
     "surfaces": Surface,
     "contacts": Contact,
     "beams": Beam,
-    "loads": Load,
     "tendons": Tendon,
-    **attached.ATTACHED,
+    "loads": Load,
+    **ATTACHED,
+    "thermal": ThermalNode,
+    "conduction": Conduction,
+    "markers": Marker,
 }
-"""Sections of a scene -> what stands in them."""
+"""Sections of a scene -> what stands in them, in the order of the page of keys."""
+KINDS: Mapping[str, type[Element]] = {key: kind for key, kind in ELEMENTS.items() if issubclass(kind, Element)}
+"""Those whose elements build themselves, as registered ones do."""
+
+
+def elements_of(scene: Scene) -> Iterator[Element]:
+    """The elements of a level that build themselves."""
+    for own in (*(scene.section(key) for key in KINDS), *scene.elements.values()):
+        yield from own.values()
 
 
 def mapped(
@@ -276,7 +290,7 @@ def mapped(
     made = {
         section: {name: change(path, each) for name, each in own.items()}
         for section, change in changes.items()
-        if (own := scene.section(section)) or section in ELEMENTS
+        if (own := scene.section(section))
     }
     parts = {name: mapped(part, changes, world, f"{path}{name}.") for name, part in scene.parts.items()}
     return with_sections(scene, made, parts=parts, world=world or scene.world)

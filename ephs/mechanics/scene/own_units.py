@@ -11,7 +11,6 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.attaching import supplies
 from ephs.mechanics.scene.build import drive_ports, element_inputs, scene_system, tension_port, wrench_port
 from ephs.mechanics.scene.element import Number
 from ephs.mechanics.scene.geometry import coupling_of
@@ -82,9 +81,7 @@ def in_own_units(problem: Problem) -> Problem:
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
     bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name, _ in scene.all_bodies()}
     force = units.mass * units.length / units.time**2
-    sizes = units.length, units.mass, units.time, (1.0,)
-    flows = {supply.outer: np.array([supply.flow.unit(*sizes) / force]) for supply in supplies(scene)}
-    flows |= {
+    flows = {
         port: _unit(scene_system(scene).interface[port].quantity, units) / units.time / force
         for ports in element_inputs(scene).values()
         for port in ports

@@ -2,20 +2,16 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Attachment
-from ephs.mechanics.scene.element import SceneElement
+from ephs.mechanics.scene.custom import Element
+from ephs.mechanics.scene.element import JOINTS, SceneElement
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.semantics.bundle import Array
-
-if TYPE_CHECKING:
-    from ephs.mechanics.scene.custom import Element
 
 
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:
@@ -25,12 +21,13 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
     """
     units = length, mass, time
 
-    def other(path: str, x: SceneElement) -> SceneElement:
+    def other(path: str, x: SceneElement | Element) -> SceneElement | Element:
         match x:
             case Joint():
                 return _joint(x, *units)
-            case Attachment():
-                return x.rescaled(*units, _firsts((scene.joint(path + tied) for tied in x.tied), length))
+            case Element():
+                tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
+                return x.rescaled(*units, _firsts(tied, length))
             case Tendon():
                 return replace(x.rescaled(*units), points=frozen(x.points * length))
             case Surface():
@@ -41,12 +38,8 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case _:
                 return x.rescaled(*units)
 
-    def own(path: str, x: "Element") -> "Element":
-        tied = [scene.joint(path + name) for kind in ("axis", "joint") for name in x.named(kind)]
-        return x.rescaled(*units, _firsts(tied, length))
-
     registered = {section for _, level in scene.levels() for section in level.elements}
-    changes: dict[str, Any] = dict.fromkeys(ELEMENTS, other) | dict.fromkeys(registered, own)
+    changes = dict.fromkeys((*ELEMENTS, *registered), other)
     return _moved_apart(mapped(scene, changes, scene.world.rescaled(*units)), length)
 
 

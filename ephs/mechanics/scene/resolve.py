@@ -217,12 +217,12 @@ def resolve_spring(name: str, table: Checked[Any], names: Names, faults: list[Fa
     return Spring(name=name, body1=entry.bodies[0], body2=entry.bodies[1], **attributes(Spring, entry))
 
 
-def attributes(kind: type[Measured], entry: Any, joints: int = 0) -> dict[str, Any]:
-    """The attributes of an element that are keys of its table, as it has them; ``joints``: to how many it is tied."""
+def attributes(kind: type[Measured], entry: Any) -> dict[str, Any]:
+    """The attributes of an element that are keys of its table, as it has them."""
     given: dict[str, Any] = {}
     for key in {each.name for each in fields(kind)} & set(type(entry).model_fields):  # pyright: ignore[reportArgumentType]
         value, number = getattr(entry, key), kind.numbers.get(key)
-        if number is not None and number.shape(joints) and value is not None:
+        if number is not None and number.shape(0) and value is not None:
             value = frozen(np.atleast_1d(np.asarray(value, dtype=float)))
         given[key] = tuple(value) if isinstance(value, list) else value
     return given
@@ -238,8 +238,6 @@ def resolve_plain(section: str, document: Document, names: Names, faults: list[F
         found[name] = kind(name=name, **attributes(kind, table.entry))
         if section == "loads" and table.sound("body") and table.entry.body == GROUND:
             faults.append(fault("load ground", f"{key}.body", shown(GROUND)))
-        if section == "conduction" and table.sound("between") and len(set(table.entry.between)) == 1:
-            faults.append(fault("same ends", f"{key}.between", f'"{table.entry.between[0]}" twice'))
     return found
 
 

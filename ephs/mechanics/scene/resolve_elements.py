@@ -1,20 +1,23 @@
 """Elements of registered sections: checks of their tables, of what they name, and of their rules."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import AXIS, Element, KeyRule, number_of
+from ephs.mechanics.scene.custom import Element, number_of
+from ephs.mechanics.scene.element import AXIS, JOINTS, SINGLE
 from ephs.mechanics.scene.entries import Checked, Document, shown, validate
 from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
-from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.model import KINDS, Scene, elements_of
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
-from ephs.mechanics.scene.site import trial
+from ephs.mechanics.scene.site import Level, Site, built
 from ephs.operad import PatternError
 from ephs.semantics.errors import SemanticsError
+
+_ERRORS = (SemanticsError, PatternError, ValueError, ArithmeticError)
 
 
 def resolve_elements(
@@ -26,10 +29,12 @@ def resolve_elements(
         for kind, section in (("joint", "joints"), ("tendon", "tendons"), ("surface", "surfaces"))
     }
     found: dict[str, dict[str, Element]] = {}
-    for section in REGISTERED:
+    for section in (*KINDS, *REGISTERED):
+        found[section] = {}
         for name, table in document.sections[section].items():
             faults += check_table(table, f"{section}.{name}", names, known)
-            found.setdefault(section, {})[name] = table.entry.called(name)
+            if not table.spoiled:
+                found[section][name] = table.entry.normalised().called(name)
     return found
 
 
@@ -49,61 +54,54 @@ def check_table(
             yield fault("large", f"{key}.{name}", shown(getattr(entry, name)), most=LARGEST)
     sound = Checked(entry, frozenset(spoiled))
     named: list[Fault] = []
-    names.check_all(_Names(type(entry).names), sound, key, named)  # pyright: ignore[reportArgumentType]
-    for place, kind, name in _sound_references(sound):
-        of = "joint" if kind == AXIS else kind
-        if of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
+    for place, kind, name in entry.references():
+        of = "joint" if kind in JOINTS else kind
+        if not sound.sound(place.partition("[")[0]):
+            continue
+        if of in ("body", "end", "node"):
+            names.check(name, f"{key}.{place}", "thermal" if of == "node" else "body", named)
+        elif of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
             named.append(unknown(of, f"{key}.{place}", name, known[of]))
     yield from named
-    for each in type(entry).rules:
-        if not each.placed and sound.sound(*each.keys) and not each.holds(entry):
-            yield broken(each, entry, key)
+    yield from broken(sound, key)
 
 
-class _Names:
-    """What `Names.check_all` asks of a kind of element: the ends of beams are bodies here."""
-
-    def __init__(self, names: Mapping[str, str]) -> None:
-        self.names = {key: "body" if kind == "end" else kind for key, kind in names.items()}
-
-
-def _sound_references(table: Checked[Element]) -> Iterable[tuple[str, str, str]]:
-    return (each for each in table.entry.references() if table.sound(each[0].partition("[")[0]))
+def broken(table: Checked[Element], key: str, *site: Site) -> Iterator[Fault]:
+    """The faults of rules that do not hold: of those that are asked at a site, or of the others."""
+    for each in type(table.entry).rules:
+        if each.placed == bool(site) and table.sound(*each.keys) and (texts := each.texts(table.entry, *site)):
+            found = texts[0] or shown(getattr(table.entry, each.at) if each.at else {})
+            yield Fault(*map(legible, (f"{key}.{each.at}".rstrip("."), found, *texts[1:])))
 
 
-def broken(of: KeyRule, element: Element, key: str) -> Fault:
-    """The fault of a rule that does not hold."""
-    expected, advice = of.texts(element)
-    there = of.found_in(element) if of.found else shown(getattr(element, of.at))
-    return Fault(legible(f"{key}.{of.at}"), legible(there), legible(expected), legible(advice))
-
-
-def placed_faults(scene: Scene) -> Iterator[Fault]:
+def placed_faults(scene: Scene) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
-    for section, own in scene.elements.items():
-        for name, element in own.items():
-            yield from element_faults(scene, element, f"{section}.{name}")
+    own = list(elements_of(scene))
+    faults = [each for element in own for each in _placed(scene, element)]
+    if not faults and any(scene.elements.values()):  # those that users wrote may not be built
+        try:
+            built(scene)
+        except _ERRORS:
+            faults = [each for element in own for each in _unbuilt(scene, element)]
+    return faults
 
 
-def element_faults(scene: Scene, element: Element, key: str) -> Iterator[Fault]:
-    """The same of one element of a level."""
+def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
+    key = f"{element.section}.{element.name}"
+    odd: list[Fault] = []
     for place, kind, name in element.references():
-        if kind == AXIS:
-            joint = scene.joint(name)
-            if joint.dim != 1 or joint.motion is not None:
-                yield fault("motor joint", f"{key}.{place}", f"{joint.name}, {joint.kind}")
-                return
-    site, _ = trial(scene, element)
-    faults = [
-        broken(each, element, key) for each in type(element).rules if each.placed and not each.holds(element, site)
-    ]
-    if faults:
-        yield from faults
-        return
+        if kind in (AXIS, SINGLE):
+            joint, what = scene.joint(name), "motor joint" if kind == AXIS else "gear freedoms"
+            if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
+                odd.append(fault(what, f"{key}.{place}", f"{name}, {joint.kind}"))
+    yield from odd or broken(Checked(element), key, Site(scene, element, Level()))
+
+
+def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
     try:
-        element.build(site)
-    except (SemanticsError, PatternError, ValueError, ArithmeticError) as error:
-        yield fault("not built", key, str(error))
+        element.build(Site(scene, element, Level()))
+    except _ERRORS as error:
+        yield fault("not built", f"{element.section}.{element.name}", str(error))
 
 
 def number_faults(element: Element, key: str) -> Iterator[Fault]:

@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.attached import Actuator, Cylinder, GasSpring, Gear, Motor
 from ephs.mechanics.scene.bodies import Marker, Spring, World
 from ephs.mechanics.scene.flexible import Load, Tendon
+from ephs.mechanics.scene.model import ELEMENTS, KINDS
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_elements import table_of
@@ -28,7 +28,6 @@ from ephs.mechanics.scene.schema_numbers import (
     Numbers,
     Pair,
     Positive,
-    Range,
     Series,
     Sizes,
     Text,
@@ -36,7 +35,7 @@ from ephs.mechanics.scene.schema_numbers import (
     key,
 )
 from ephs.mechanics.scene.schema_touching import ContactEntry, SurfaceEntry
-from ephs.mechanics.scene.thermal import Conduction, ThermalNode
+from ephs.mechanics.scene.thermal import ThermalNode
 
 
 class AssemblyEntry(Entry):
@@ -155,8 +154,7 @@ class PartEntry(Entry):
 WorldEntry: Any = table_of(World, "world")
 _LENGTH = key("without force, m; default: as at the start", None)
 _POINTS = key("one in each, in its centre-of-mass frame (ground: world), m")
-_LIMITS = key("least and largest control", None)
-_SECTIONS: dict[str, tuple[type[Entry], str]] = {
+_TABLES: dict[str, tuple[type[Entry], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
     "springs": (
@@ -176,19 +174,11 @@ _SECTIONS: dict[str, tuple[type[Entry], str]] = {
         "tendons through points of bodies",
     ),
     "loads": (table_of(Load, "loads.NAME"), "forces and moments on bodies"),
-    "motors": (table_of(Motor, "motors.NAME"), "motors with circuit and gear on joints"),
-    "gears": (table_of(Gear, "gears.NAME"), "linear relations between the rates of joints"),
-    "cylinders": (table_of(Cylinder, "cylinders.NAME"), "hydraulic cylinders on joints"),
-    "gas_springs": (table_of(GasSpring, "gas_springs.NAME"), "gas springs on joints"),
-    "actuators": (
-        table_of(Actuator, "actuators.NAME", limits=(Range | None, _LIMITS)),
-        "actuators: forces on joints by a control",
-    ),
     "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
-    "conduction": (table_of(Conduction, "conduction.NAME"), "heat conduction between thermal nodes"),
     "markers": (table_of(Marker, "markers.NAME"), "points on bodies"),
-    "parts": (PartEntry, "other scene files as subsystems"),
 }
+_SECTIONS = {name: (KINDS[name], KINDS[name].said) if name in KINDS else _TABLES[name] for name in ELEMENTS}
+_SECTIONS["parts"] = PartEntry, "other scene files as subsystems"
 SECTIONS: dict[str, type[Entry]] = {key: table for key, (table, _) in _SECTIONS.items()}
 _Name: TypeAlias = Text | None
 _FILE: dict[str, Any] = {

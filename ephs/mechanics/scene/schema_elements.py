@@ -7,19 +7,16 @@ from typing import Annotated, Any, Final, get_args
 from pydantic import Field, create_model
 
 from ephs.mechanics.scene import schema_numbers as forms
-from ephs.mechanics.scene.element import ABOVE_ONE, NON_NEGATIVE, POSITIVE, Measured, Number, part_of
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Measured, Number, part_of
 
 _RANGES: Final[Mapping[Any, Any]] = {
     None: forms.Number,
     POSITIVE: forms.Positive,
     NON_NEGATIVE: forms.NonNegative,
-    ABOVE_ONE: forms.AboveOne,
 }
 _FORMS: Final[Mapping[Any, Any]] = {
     bool: forms.Flag,
     str: forms.Text,
-    str | None: forms.Text | None,
-    tuple[str, str]: forms.Pair,
     tuple[str, ...]: forms.Names,
 }
 
@@ -36,17 +33,12 @@ def table_of(kind: type[Measured], title: str, **others: Any) -> Any:
 
 
 def _key(of: Any, number: Number | None, said: str) -> tuple[Any, Any]:
-    """Form and field of an attribute; a row with a number for each joint may be one number for all."""
+    """Form and field of an attribute."""
     default = of.default if of.default_factory is MISSING else of.default_factory().tolist()
     if number is None:
         form = _FORMS[get_args(of.type)[0]]
-    elif number.each >= 0:
-        form = forms.Numbers
-        default = default[0]
     elif number.count:
         form = Annotated[list[_RANGES[number.least]], Field(min_length=number.count, max_length=number.count)]
     else:
         form = _RANGES[number.least]
-    if default == ():  # where no name is needed, one suffices, too
-        form, default = list[forms.Text], []
     return form, forms.key(said, ... if default is MISSING else default)

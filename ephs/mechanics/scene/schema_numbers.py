@@ -34,11 +34,6 @@ Positive = Annotated[
     Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST),
     WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 0.0}),
 ]
-AboveOne = Annotated[
-    float,
-    Field(strict=True, allow_inf_nan=False, gt=1.0, le=LARGEST),
-    WithJsonSchema(_NUMBER_SCHEMA | {"exclusiveMinimum": 1.0}),
-]
 Series = Annotated[list[Number], Field(min_length=1)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
@@ -48,6 +43,7 @@ Names = Annotated[list[Text], Field(min_length=2)]
 Pair = Annotated[list[Text], Field(min_length=2, max_length=2)]
 Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Sizes = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+Couple = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
 def _is_number(value: Any) -> bool:

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.elements.components import joint_momentum
-from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
+from ephs.mechanics.scene.bodies import IDENTITY_POSE
+from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, SINGLE
 from ephs.mechanics.scene.geometry import coupling_of
-from ephs.mechanics.scene.model import IDENTITY_POSE, Scene
 from ephs.operad import Path, Quantity, junction, quantity
+from ephs.semantics import library
 from ephs.semantics.bundle import Array
 from ephs.semantics.errors import AssemblyError
+from ephs.semantics.kept import once
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ephs.mechanics.scene.custom import Element
+    from ephs.mechanics.scene.model import Scene
 
 INPUTS = "inputs"
 """First name of the outer ports of elements."""
@@ -36,7 +39,8 @@ class Level:
     junctions: dict[Path, Any] = field(default_factory=dict)
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
-    inputs: dict[Path, Signal] = field(default_factory=dict)
+    inputs: dict[Path, tuple[str, Signal]] = field(default_factory=dict)
+    """Outer ports -> the names of their inputs, and their values without these."""
 
 
 @final
@@ -52,10 +56,9 @@ class Site:
         It, in the units in which it is built.
     """
 
-    scene: Scene
+    scene: "Scene"
     element: "Element"
     _level: Level
-    _exposed: tuple[frozenset[str], frozenset[str]] = (frozenset(), frozenset())
 
     # ---- what it may read ----------------------------------------------------------------------------------------
 
@@ -103,7 +106,7 @@ class Site:
         if body != GROUND:
             self._known("body", "end", name=body)
         path = Path(["momenta", *body.split(".")])
-        self._level.junctions[path] = junction(quantity.body_momentum, exposed=body in self._exposed[0])
+        self._level.junctions[path] = junction(quantity.body_momentum)
         return str(path)
 
     def entropy(self, node: str = ENVIRONMENT) -> str:
@@ -111,13 +114,19 @@ class Site:
         if node != ENVIRONMENT:
             self._known("node", name=node)
         path = Path(["entropies", *node.split(".")])
-        self._level.junctions[path] = junction(quantity.entropy, exposed=node in self._exposed[1])
+        self._level.junctions[path] = junction(quantity.entropy)
         return str(path)
+
+    def heated(self, node: str) -> dict[str, str]:
+        """The port s of a box at the junction of a thermal node; none at the environment, which such a box contains."""
+        return {} if node == ENVIRONMENT else {"s": self.entropy(node)}
 
     def drive(self, joint: str) -> str:
         """The junction of the momentum of a joint that a key of kind ``axis`` names."""
-        self._known("axis", name=joint)
-        return str(Path(["drives", *joint.split(".")]))
+        self._known(AXIS, SINGLE, name=joint)
+        path = Path(["drives", *joint.split(".")])
+        self._level.junctions[path] = junction(self.quantity(joint))
+        return str(path)
 
     def quantity(self, joint: str) -> Quantity:
         """The quantity at `drive`."""
@@ -129,18 +138,23 @@ class Site:
         self._level.junctions[path] = junction(of)
         return str(path)
 
-    def input(self, of: Quantity, value: "ArrayLike" = 0.0, port: str = "", *, effort: bool = True) -> str:
+    def input(
+        self, of: Quantity, value: "ArrayLike" = 0.0, port: str = "", *, at: str = INPUTS, effort: bool = True
+    ) -> str:
         """A junction that an input of runs drives, ``"SECTION.NAME"`` or with ``.PORT``.
 
         Parameters
         ----------
         value
             The effort or flow where no input is given: a number, or one for each dimension.
+        at
+            Another first name of the outer port than ``inputs``; then ``"SECTION.NAME"`` drives all of them in a row.
         """
-        path = Path([INPUTS, *self._own(port)])
+        section, *own = self._own(port)
+        path = Path([at, section, *own] if at == INPUTS else [at, *own])
         self._level.junctions[path] = junction(of, exposed=True)
         given = np.broadcast_to(np.asarray(value, dtype=float), (of.space.dim,)).copy()
-        self._level.inputs[path] = Signal(given, effort=effort)
+        self._level.inputs[path] = str(self._own(port if at == INPUTS else "")), Signal(given, effort=effort)
         return str(path)
 
     # ---- boxes ---------------------------------------------------------------------------------------------------
@@ -180,7 +194,18 @@ class Site:
             raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
 
 
-def trial(scene: Scene, element: "Element") -> tuple[Site, Level]:
-    """A site whose boxes go nowhere."""
-    level = Level()
-    return Site(scene, element, level), level
+def built(scene: "Scene") -> Level:
+    """What the elements of a level that build themselves add to its system; made once and kept with the scene."""
+    from ephs.mechanics.scene.model import elements_of
+
+    def made() -> Level:
+        level = Level()
+        for of in elements_of(scene):
+            of.build(Site(scene, of, level))
+        path = Path(["entropies", ENVIRONMENT])
+        if path in level.junctions:
+            at = Path(["environment"])
+            level.boxes[at], level.fillings[at] = {"s": str(path)}, library.environment()
+        return level
+
+    return once(scene, "elements", made)

@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ephs.mechanics.scene.attached import Attachment
-from ephs.mechanics.scene.element import OUTSIDE, SceneElement
+from ephs.mechanics.scene.custom import Element
+from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
@@ -45,16 +45,14 @@ def check_scene(scene: Scene) -> None:
         "node": {name for name, _ in scene.all_thermal()},
         "tendon": {name for name, _ in scene.all_tendons()},
     }
-    there["end"] = there["body"]
+    there |= {"end": there["body"]} | dict.fromkeys(JOINTS, there["joint"])
     named = [(kind, name) for _, each in _all(scene) for kind in set(each.names.values()) for name in each.named(kind)]
-    own = [each.references() for _, _, each in scene.all_elements()]
-    named += [("joint" if kind == "axis" else kind, name) for each in own for _, kind, name in each]
     beams = [beam for _, beam in scene.all_beams()]
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
     for kind, name in named:
         if name not in OUTSIDE[kind] and name not in there[kind]:
-            what = {"end": "body", "node": "thermal node"}.get(kind, kind)
+            what = ({"end": "body", "node": "thermal node"} | dict.fromkeys(JOINTS, "joint")).get(kind, kind)
             raise ValueError(f"there is no {what} {legible(str(name))}")
 
 
@@ -81,10 +79,11 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
     return found if lost else scene
 
 
-def _all(scene: Scene) -> Iterator[tuple[str, SceneElement]]:
+def _all(scene: Scene) -> Iterator[tuple[str, SceneElement | Element]]:
     """Every element of a scene with its dotted name."""
     for section in ELEMENTS:
         yield from scene.every(section)
+    yield from ((name, each) for _, name, each in scene.all_elements())
 
 
 def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
@@ -99,12 +98,12 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
                 yield name, each.values() | _surface(name, each)
             case Contact():
                 yield name, {key: (number, ()) for key, number in each.law.numbers}
-            case Attachment():
-                yield name, each.values(len(each.tied) or 1)
             case Tendon():
                 yield name, each.values() | {"points": (each.points, (len(each.bodies), 3))}
-            case _:
+            case SceneElement():
                 yield name, each.values()
+            case Element():
+                pass  # its model has checked them
 
 
 def _surface(name: str, surface: Surface) -> Sizes:
@@ -139,13 +138,10 @@ def _strain(j: Joint) -> Sizes:
 
 
 def _check_names(scene: Scene) -> None:
-    for section in ELEMENTS:
-        for name, thing in getattr(scene, section).items():
+    for section in (*ELEMENTS, *scene.elements):
+        for name, thing in scene.section(section).items():
             if Name([name]) != (thing.name,):
                 raise ValueError(f"{legible(name)} is called {legible(str(thing.name))}")
-    for own in scene.elements.values():
-        for name in own:
-            Name([name])
     for name, part in scene.parts.items():
         Name([name])
         _check_names(part)

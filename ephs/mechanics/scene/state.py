@@ -10,15 +10,16 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.assembly import gyration, measure
-from ephs.mechanics.scene.attached import ATTACHED, Attachment, Gear
-from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.continuing import inner_states, lost_states
+from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
-from ephs.mechanics.scene.following import attachment_at, stretched, tied
+from ephs.mechanics.scene.following import stretched, tied
+from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
-from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen, mapped
+from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.semantics.bundle import Array
 from ephs.semantics.initial import saved_at
@@ -247,17 +248,13 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     heat = {name: float(solution.thermal(name).temperature[k]) for name, _ in scene.all_thermal()}
     states = solution.state_at(k)
 
-    def attached(section: str) -> Callable[[str, Attachment], Attachment]:
-        return lambda path, of: attachment_at(of, component_path(section, path + of.name), states)
-
     def continued(section: str) -> Callable[[str, Any], Any]:
         return lambda path, of: of.continued(inner_states(section, path + of.name, states))
 
-    own = {section for section, _, _ in scene.all_elements()}
+    own = {section for section, kind in {**KINDS, **REGISTERED}.items() if kind.continued is not Element.continued}
     found = mapped(
         there,
         {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])}
-        | {section: attached(section) for section in ATTACHED}
         | {section: continued(section) for section in own},
     )
     if faults := list(lost_states(found, states)):

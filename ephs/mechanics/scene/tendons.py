@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.elements.tendon import tendon
-from ephs.mechanics.scene.attached import Actuator
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.flexible import Tendon
@@ -64,17 +64,15 @@ def _place(body: str, at: Array, poses: Mapping[str, Array]) -> Array:
     return at if body == GROUND else SE3.compose(poses[body], translation(at))[4:]
 
 
-def with_pulls(
-    actuators: Mapping[str, Actuator], document: Document, tendons: Mapping[str, Tendon], faults: list[Fault]
+def pulls(
+    document: Document, actuators: Mapping[str, Any], tendons: Mapping[str, Tendon], faults: list[Fault]
 ) -> dict[str, Actuator]:
-    """The actuators, and for each tendon one of its name whose control is the tension."""
-    pulls = dict(actuators)
-    for name in tendons:
-        if name not in document.sections["actuators"]:
-            pulls[name] = Actuator(name, tendon=name, ratio=frozen([-1.0]))
-        elif name in actuators and actuators[name].tendon != name:
+    """For each tendon an actuator of its name whose control is the tension."""
+    for name, of in actuators.items():
+        if name in tendons and of.tendon != name:
             faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
-    return pulls
+    own = [name for name in tendons if name not in document.sections["actuators"]]
+    return {name: Actuator(tendon=name, ratio=[-1.0]).called(name) for name in own}
 
 
 # ---- systems -----------------------------------------------------------------------------------------------------

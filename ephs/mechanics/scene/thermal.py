@@ -1,4 +1,4 @@
-"""Stores of heat of a scene, and conduction between them."""
+"""Stores of heat of a scene."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Annotated, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Named, Number, SceneElement
+from ephs.mechanics.scene.element import POSITIVE, Number, SceneElement
 
 
 @final
@@ -28,13 +28,3 @@ class ThermalNode(SceneElement):
         """θ = θ₁ exp((s − κ e)/C) in K, of its states by name: numbers or arrays."""
         s = states("s") - self.pull * states("e") if self.pull else states("s")
         return self.temperature * np.exp(s / self.capacity)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Conduction(SceneElement):
-    """Heat conduction between two thermal nodes, or one and the environment."""
-
-    name: str
-    between: Annotated[tuple[str, str], Named("node"), 'two thermal nodes, or one and "environment"']
-    conductance: Annotated[float, Number(energy=1, time=-1, least=NON_NEGATIVE), "thermal conductance, W/K"]

@@ -3,11 +3,12 @@
 import re
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import zip_longest
 from typing import Final
 
 from ephs.mechanics.scene.element import Number
 
-_SYMBOLS: Final[Mapping[str, tuple[int, int, int, int]]] = {
+_SYMBOLS: Final[Mapping[str, tuple[int, ...]]] = {
     "1": (0, 0, 0, 0),
     "rad": (0, 0, 0, 0),
     "K": (0, 0, 0, 0),
@@ -27,8 +28,9 @@ _SYMBOLS: Final[Mapping[str, tuple[int, int, int, int]]] = {
     "H": (2, 1, 0, 0),
     "F": (-2, -1, 2, 0),
     "q": (0, 0, 0, 1),
+    "qᵢ": (0, 0, 0, 0, 1),
 }
-"""Symbol -> exponents of length, mass, time, and of the coordinate of the joint that a table names first.
+"""Symbol -> exponents of length, mass, time, of the coordinate of the joint that a table names first, of each joint's.
 
 Temperatures, charges and angles are the same in all units.
 """
@@ -50,16 +52,23 @@ def dimension(unit: str) -> Number:
         below = below[1:-1]
     elif len(below.split()) > 1:
         raise ValueError(f'"{unit}": write several symbols after the solidus in parentheses')
-    total = [0, 0, 0, 0]
+    total = [0] * 5
     for sign, part in ((1, above), (-1, below)):
         for factor in part.split():
             found = _FACTOR.match(factor)
             if found is None or found[1] not in _SYMBOLS:
                 raise ValueError(f'"{factor}" in "{unit}": the known symbols are {", ".join(_SYMBOLS)}')
             power = sign * int((found[2] or "1").translate(_RAISED))
-            total = [x + power * y for x, y in zip(total, _SYMBOLS[found[1]], strict=True)]
-    length, mass, time, first = total
-    return Number(energy=mass, length=length - 2 * mass, time=time + 2 * mass, first=first)
+            total = [x + power * y for x, y in zip_longest(total, _SYMBOLS[found[1]], fillvalue=0)]
+    length, mass, time, first, others = total
+    return Number(
+        energy=mass,
+        length=length - 2 * mass,
+        time=time + 2 * mass,
+        first=first,
+        others=others,
+        each=0 if others else -1,
+    )
 
 
 def written(unit: str) -> str:

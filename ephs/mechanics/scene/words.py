@@ -44,7 +44,7 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
         *(("tendon", name, f"{' – '.join(t.bodies)}, {t.stiffness:g} N/m") for name, t in scene.all_tendons()),
         *(("load", name, f"on {load.body}") for name, load in scene.all_loads()),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),
-        *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_elements()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
-        *(("conduction", n, f"{' – '.join(c.between)}, {c.conductance:g} W/K") for n, c in scene.all_conduction()),
+        *(("conduction", name, str(each)) for name, each in scene.all_conduction()),
+        *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_elements()),
     ]

@@ -317,7 +317,7 @@ class ExplicitTangent:
             r, heats, totals = np.split(states * point.y[number], [eq.n, eq.n + eq.ns])
             q = self._normalised(state.q + states * point.q[number])
             found.append(replace(state, q=q, r=state.r + r, heats=state.heats + heats, totals=state.totals + totals))
-        return problem, eq.rows_of(found)
+        return problem, eq.booking.record_of(found, *np.zeros((2, len(found)))).rows
 
     def _normalised(self, q: Array) -> Array:
         """Elements, their quaternions of length one."""

@@ -116,7 +116,7 @@ class Family:
                 self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
         self._neighbours: dict[tuple[str, float], Problem] = {}
         self.problem = self._made({})
-        if (path := strikes(self.problem.descriptor.components)) is not None:
+        if (path := strikes(self.problem.descriptor)) is not None:
             raise OptionError("model", str(path), "a contact with a stiffness: impulses have no derivative")
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
         idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in RESISTING}

@@ -29,20 +29,16 @@ class Production:
     """
 
     def __init__(self, problem: Problem, sign: float = 1.0) -> None:
-        slots = list(enumerate(problem.descriptor.components))
-        watched = [
-            (i, slot.path)
-            for i, slot in slots
-            if isinstance(slot.primitive, Irreversible) and slot.primitive.verdict != "proved"
-        ]
+        d, n = problem.descriptor, problem.descriptor.numbering
+        makes = [isinstance(one, Irreversible) for one in n.primitives]
+        searched = [isinstance(one, Irreversible) and one.verdict != "proved" for one in n.primitives]
         self._sign = sign
-        self._paths = [path for _, path in watched]
-        self._watched = np.array([i for i, _ in watched], dtype=int)
-        self._makers = np.array([i for i, slot in slots if isinstance(slot.primitive, Irreversible)], dtype=int)
-        hot = [slot.point.start for slot in problem.descriptor.states if slot.quantity.kind == "entropy"]
+        self._makers, self._watched = (np.flatnonzero(np.array(each)[n.primitive]) for each in (makes, searched))
+        self._paths = [d.components[i].path for i in self._watched.tolist()]
+        hot = [slot.point.start for slot in d.states if slot.quantity.kind == "entropy"]
         self._entropies = np.array(hot, dtype=int)
-        self.active = bool(watched)
-        self._still = ROUNDING * _capacity(problem) if watched else 0.0
+        self.active = bool(self._paths)
+        self._still = ROUNDING * _capacity(problem) if self.active else 0.0
 
     def start(self, x: Array, energies: Array) -> None:
         """The states and the produced entropies, (point_size,) and (components,), at the start of the next step."""

@@ -38,7 +38,7 @@ from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record, Rows
 from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Stepper
+from ephs.solve.stepping import Instants, Stepper
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -260,7 +260,7 @@ class Samples(Generic[S]):
         self.states: list[tuple[float, S]] = []
         self._rows, self._stride = 0, 1
 
-    def add(self, rows: Sequence[tuple[float, S, float]]) -> None:
+    def add(self, rows: Instants[S]) -> None:
         """Times and states in order, with what a step made at least."""
         at, end = self._rows, self._rows + len(rows)
         while self._wanted and (at := at + -at % self._stride) < end:

@@ -7,8 +7,14 @@ import numpy as np
 
 from ephs.operad import Quantity
 from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.kept import once
+from ephs.semantics.numbering import Index
 from ephs.semantics.primitives import Storage
 from ephs.semantics.spaces.pairs import Pair
+from ephs.solve.methods.stored import guessed_efforts
+from ephs.solve.model import compile_model
+from ephs.solve.result.states import RecordedStates
 
 if TYPE_CHECKING:
     from ephs.solve.problem import Problem
@@ -61,28 +67,39 @@ def trembling(solution: "Solution") -> float:
     if problem is None or not len(solution):
         return 0.0
     h = abs(float(stats.get("longest_step", stats.get("step", 0.0)) or 0.0))
-    places = [values[:, 4:] for values in solution.states.values() if values.ndim == 2 and values.shape[1] == 7]
+    d, states = problem.descriptor, solution.states
+    places = [states[slot.path][:, 4:] for slot in d.states if slot.quantity.kind == "pose"]
     far = max((float(np.abs(place).max(initial=0.0)) for place in places), default=0.0)
     mass = 0.0 if problem.scene is None else sum(float(body.mass) for _, body in problem.scene.all_bodies())
     away = _part(solution) * max(far, problem.length)
-    turned, pushed = _pushes(problem, problem.descriptor.pack(solution.state_at(len(solution) - 1)))
+    x = states.x[-1] if isinstance(states, RecordedStates) else d.pack(solution.state_at(len(solution) - 1))
+    turned, pushed = _pushes(problem, float(solution.t[0]), x)
     return 0.5 * mass * (away / h) ** 2 + pushed * away + turned * _part(solution) if h else 0.0
 
 
-def _pushes(problem: "Problem", x: Array) -> tuple[float, float]:
+def _pushes(problem: "Problem", t: float, x: Array) -> tuple[float, float]:
     """Sums of the sizes of torques in N m and forces in N of storages at the states x."""
-    turned, pushed = 0.0, 0.0
-    for slot in problem.descriptor.components:
+    d = problem.descriptor
+    turning, moving = once(d, "places of storages", lambda: _places(d))
+    if not (turning.size or moving.size):
+        return 0.0, 0.0
+    model = compile_model(d, problem.reference, problem.inputs(t, problem.initial))
+    sizes = np.abs(guessed_efforts(model, x)[d.rate_size :])
+    return float(sizes[turning].sum()), float(sizes[moving].sum())
+
+
+def _places(d: Descriptor) -> tuple[Index, Index]:
+    """Numbers of the efforts of storages that are torques on places, and of those that are forces."""
+    turning: list[int] = []
+    moving: list[int] = []
+    for slot in d.components:
         of = slot.primitive
-        if isinstance(of, Storage) and any(_twists(port.quantity) is not None for port in of.interface.values()):
-            effort = np.abs(of.effort(problem.descriptor.point(slot, x), problem.reference))
-            for _, where, quantity in of.bundle.items():
-                twists = _twists(quantity)
-                if twists is not None:
-                    turns = np.abs(twists[:3]).max(axis=0) > 0.0
-                    turned += float(effort[where][turns].sum())
-                    pushed += float(effort[where][~turns].sum())
-    return turned, pushed
+        for _, where, quantity in of.bundle.items() if isinstance(of, Storage) else ():
+            twists = _twists(quantity)
+            if twists is not None:
+                for turns, effort in zip(np.any(twists[:3], axis=0).tolist(), slot.efforts[where], strict=True):
+                    (turning if turns else moving).append(effort)
+    return np.array(turning, dtype=np.int64), np.array(moving, dtype=np.int64)
 
 
 def _twists(quantity: Quantity) -> Array | None:

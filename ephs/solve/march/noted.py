@@ -2,6 +2,9 @@
 
 from typing import Any, final
 
+import numpy as np
+
+from ephs.semantics.bundle import Array
 from ephs.solve.snapshot import Snapshot
 
 
@@ -12,11 +15,15 @@ class Noted:
     def __init__(self) -> None:
         self._largest = self._at = self._total = 0.0
 
-    def note(self, t: float, put: float, total: float) -> None:
-        """Remember what corrections put in up to a state that is kept."""
-        self._total = total
-        if abs(put) > self._largest:
-            self._largest, self._at = abs(put), t
+    def note(self, times: Array, put: Array) -> None:
+        """Remember what corrections put in up to states that are kept: (n,) in s, (n, 2) the sum and that of sizes."""
+        if not times.size:
+            return
+        sizes = np.abs(put[:, 0])
+        worst = int(np.argmax(sizes))
+        self._total = float(put[-1, 1])
+        if sizes[worst] > self._largest:
+            self._largest, self._at = float(sizes[worst]), float(times[worst])
 
     def snapshot(self) -> Snapshot:
         """Notes of the run, for a journal."""

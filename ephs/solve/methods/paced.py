@@ -1,8 +1,8 @@
 """The natural methods as steppers: constant or variable steps, error estimates, events and variable inputs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, final, overload
+from typing import Any, final
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.starting import check_start
-from ephs.solve.stepping import Attempt, Counts, Row, Span
+from ephs.solve.stepping import Attempt, Counts, Instant, Instants, Row, Span, Taken
 
 FIRST = 16
 """Steps in the first compiled call, by which the time of a step becomes known."""
@@ -130,10 +130,10 @@ class Paced:
         """The same state as one to start from: unknowns are guessed afresh."""
         return replace(state, inner=started(self.method, state.kept.x, self._sums(state.kept)))
 
-    def record(self, taken: Sequence[tuple[float, PacedState, float]]) -> Record:
+    def record(self, taken: Instants[PacedState]) -> Record:
         """Records of many instants."""
-        if isinstance(taken, _Taken):
-            return Record(taken.times, taken.chunk.x, taken.chunk.energies, taken.chunk.ledgers)
+        if isinstance(taken, Taken):
+            return Record(taken.times, *taken.data)
         return record_of(taken, [state.kept for _, state, _ in taken])
 
     def row(self, state: PacedState) -> Row:
@@ -203,26 +203,14 @@ def _end(chunk: Chunk, inner: NaturalState, t: float) -> PacedState:
     return PacedState(t, inner, Row(chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1, :4]))
 
 
-@final
-class _Taken(Sequence[tuple[float, PacedState, float]]):
+def _taken(times: Array, chunk: Chunk, last: NaturalState) -> Taken[PacedState]:
     """Instants at the ends of a chunk's steps, from whose states steps may start anew."""
 
-    def __init__(self, times: Array, chunk: Chunk, last: NaturalState) -> None:
-        self.times, self.chunk, self._last = times, chunk, last
+    def state(k: int) -> PacedState:
+        row = Row(chunk.x[k], chunk.energies[k], chunk.ledgers[k, :4])
+        return PacedState(float(times[k]), replace(last, x=row.x), row)
 
-    def __len__(self) -> int:
-        return self.times.size
-
-    @overload
-    def __getitem__(self, k: int) -> tuple[float, PacedState, float]: ...
-    @overload
-    def __getitem__(self, k: slice) -> list[tuple[float, PacedState, float]]: ...
-    def __getitem__(self, k: int | slice) -> Any:
-        if isinstance(k, slice):
-            return [self[i] for i in range(*k.indices(len(self)))]
-        t, x, ledgers = float(self.times[k]), self.chunk.x[k], self.chunk.ledgers[k]
-        state = PacedState(t, replace(self._last, x=x), Row(x, self.chunk.energies[k], ledgers[:4]))
-        return t, state, float(ledgers[4])
+    return Taken(times, chunk.ledgers[:, 4], (chunk.x, chunk.energies, chunk.ledgers), state)
 
 
 @final
@@ -236,7 +224,7 @@ class _Leg:
         self._method, self._span = method, span
         self._grid, self._sign = Grid(0.0, abs(span.until - span.t0), step), 1.0 if span.until > span.t0 else -1.0
         self._saved, self._most = span.saved, FIRST
-        self._rows: Sequence[tuple[float, PacedState, float]] = []
+        self._rows: Instants[PacedState] = []
 
     def advance(self, steps: int) -> bool:
         """Up to so many steps; whether the end is reached.
@@ -255,10 +243,10 @@ class _Leg:
         ended = done + count == grid.count
         if ended and chunk.steps == count:
             times[-1] = span.until
-        taken = _Taken(times, chunk, inner)
+        taken = _taken(times, chunk, inner)
         if chunk.steps:
             self._rows = taken if span.save_at is None else self._between(taken, span.save_at)
-            self.state = replace(taken[-1][1], inner=inner)
+            self.state = replace(taken.state(chunk.steps - 1), inner=inner)
             shortest, longest = min(self.counts.shortest, h), max(self.counts.longest, h)
             least = min(self.counts.least, float(chunk.ledgers[:, 4].min()))
             self.counts = Counts(done + chunk.steps, 0, shortest, longest, least, grid.h)
@@ -267,22 +255,22 @@ class _Leg:
         self._most = steps
         return ended
 
-    def _between(self, taken: _Taken, save_at: Array) -> list[tuple[float, PacedState, float]]:
+    def _between(self, taken: Taken[PacedState], save_at: Array) -> list[Instant[PacedState]]:
         """The instants to keep among those of some steps from the present state."""
         first, self._saved = (
             self._saved,
             int(np.searchsorted(self._sign * save_at, self._sign * taken.times[-1], side="right")),
         )
-        found: list[tuple[float, PacedState, float]] = []
+        found: list[Instant[PacedState]] = []
         for when in save_at[first : self._saved].tolist():
             k = int(np.searchsorted(self._sign * taken.times, self._sign * when))
             t, after, least = taken[k]
             if t != when:
-                after = self._method.shorter(taken[k - 1][1] if k else self.state, when)
+                after = self._method.shorter(taken.state(k - 1) if k else self.state, when)
             found.append((when, after, least))
         return found
 
-    def rows(self) -> Sequence[tuple[float, PacedState, float]]:
+    def rows(self) -> Instants[PacedState]:
         """Instants to keep since the last call."""
         rows, self._rows = self._rows, []
         return rows

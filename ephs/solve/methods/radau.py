@@ -5,7 +5,6 @@ equations g(x, ẋ, e, λ) = 0: the unknowns of a stage are its rates, efforts a
 nor a choice of causality is needed, and what is algebraic in them is met at the end of the step, which is a stage.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -25,7 +24,7 @@ from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.result.record import Record, record_of
 from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Attempt, Row, Span
+from ephs.solve.stepping import Attempt, Instants, Row, Span
 
 PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""
@@ -188,11 +187,11 @@ class Radau:
         """The same state as one to start from, whose rates may be others than before."""
         return replace(state, h=0.0)
 
-    def record(self, taken: Sequence[tuple[float, RadauState, float]]) -> Record:
+    def record(self, taken: Instants[RadauState]) -> Record:
         """Records of many instants."""
-        for _, state, _ in taken:
-            if state.account.size:
-                self._settling.noted.note(state.t, *state.account[PUT : TOTAL + 1].tolist())
+        noted = [(state.t, *state.account[PUT : TOTAL + 1]) for _, state, _ in taken if state.account.size]
+        times, *put = np.array(noted).reshape(-1, 3).T
+        self._settling.noted.note(times, np.stack(put, axis=1))
         return record_of(taken, [self.row(state) for _, state, _ in taken])
 
     def row(self, state: RadauState) -> Row:

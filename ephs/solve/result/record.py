@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.semantics.bundle import Array
 from ephs.semantics.descriptor import Descriptor
-from ephs.solve.stepping import Row
+from ephs.solve.stepping import Instants, Row
 
 
 @final
@@ -34,8 +34,15 @@ class Record:
     energies: Array
     ledgers: Array
 
+    @property
+    def rows(self) -> list[Row]:
+        """Its instants one by one."""
+        return [
+            Row(x, energies, sums[:4]) for x, energies, sums in zip(self.x, self.energies, self.ledgers, strict=True)
+        ]
 
-def record_of(taken: Sequence[tuple[float, Any, float]], rows: Sequence[Row]) -> Record:
+
+def record_of(taken: Instants[Any], rows: Sequence[Row]) -> Record:
     """Rows of states that were taken: times, states, and the least production in the step before each."""
     return Record(
         np.array([t for t, _, _ in taken]),

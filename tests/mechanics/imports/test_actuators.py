@@ -156,7 +156,7 @@ def test_a_transmission_is_an_actuator(write):
         )
     assert "transmissions" not in str(said[0].message)
     drive = scene.actuators["drive"]
-    assert (drive.joints, drive.ratio.tolist(), drive.limits.tolist()) == (("shoulder",), [50.0], [-0.02, 0.02])
+    assert (drive.joints, drive.ratio, drive.limits) == (["shoulder"], [50.0], [-0.02, 0.02])
     inputs = {"actuators.drive": 0.01}
     sol, same = (ephs.simulate(scene, 0.1, inputs=given, method="rk87") for given in (inputs, {"joints.shoulder": 0.5}))
     assert np.array_equal(sol.joint("shoulder").rate, same.joint("shoulder").rate)

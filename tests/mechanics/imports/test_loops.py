@@ -182,7 +182,7 @@ RATIO = """<mujoco><worldbody>
 def test_joints_in_a_ratio_are_geared_and_armatures_are_kept(write):
     with pytest.warns(ephs.ModelWarning, match="softness"):
         scene = ephs.load(write(RATIO, "xml"))
-    assert (scene.actuators["servo"].joints, scene.actuators["servo"].ratio.tolist()) == (("two",), [50.0])
+    assert (scene.actuators["servo"].joints, scene.actuators["servo"].ratio) == (["two"], [50.0])
     assert [scene.joints[name].armature for name in ("one", "two")] == [0.3, 0.1]
     sol = ephs.simulate(scene, 0.3, method="rk87")
     one, two = sol.joint("one"), sol.joint("two")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods import auto
+from benchmarks.touching import bouncing
+from ephs.mechanics.methods import auto, stages
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
 from ephs.mechanics.methods.stages import Kept
@@ -154,6 +155,26 @@ def test_radau_is_tried_where_explicit_steps_hide_their_stiffness(slip, rtol):
     bounces = 4
     assert found.stats["steps"] < 3 * bounces * auto.TRIAL
     assert np.abs(found.energy_error).max() <= 1e-12 and np.all(np.diff(found.heat) >= 0.0)
+
+
+def test_auto_costs_little_more_than_explicit_steps_where_factors_are_dear(monkeypatch):
+    """The matrix of many bodies takes as long as hundreds of evaluations; counted, not timed."""
+    count, options = 24, {"rtol": 1e-5, "audit": "off"}
+    scene = scene_of_text(bouncing(count).scene)
+    factors, solutions = stages.costs(6 * count)
+
+    def run(method):
+        solution = ephs.simulate(scene, 0.2, method=method, **options)
+        said = solution.stats
+        cost = factors * said.get("factorisations", 0) + solutions * said.get("iterations", 0) + said["evaluations"]
+        return solution, cost
+
+    (_, plain), (found, cost) = run("rk54"), run("auto")
+    assert [switch["to"] for switch in found.stats["switches"]][:3] == ["radau", "rk54", "radau"]
+    assert cost < 1.25 * plain
+    assert np.abs(found.energy_error).max() <= 1e-12 and found.stats["least_production"] >= 0.0
+    monkeypatch.setattr(stages, "FACTORED", 10**9)  # as if factors cost two evaluations whatever their size
+    assert run("auto")[1] > 1.5 * plain
 
 
 def test_the_fastest_mode_of_a_matrix_is_its_spectral_radius(scene, monkeypatch):

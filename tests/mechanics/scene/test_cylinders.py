@@ -1,5 +1,6 @@
 """Hydraulic cylinders, gas springs, actuators and linear drives of scene files, against equations by hand."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -147,7 +148,7 @@ def test_work_and_heat_of_a_cylinder_are_in_the_ledger(tmp_path):
 
 
 def test_an_adiabatic_gas_keeps_its_entropy(tmp_path):
-    strut = replace(loaded(tmp_path, STRUT).gas_springs["strut"], conductance=0.0)
+    strut = loaded(tmp_path, STRUT).gas_springs["strut"].changed(conductance=0.0)
     scene = replace(loaded(tmp_path, STRUT), gas_springs={"strut": strut})
     run = ephs.simulate(scene, UNTIL, method="natural4", step=1e-3)
     assert not np.any(run["gas_springs.strut.gas.s"])
@@ -162,7 +163,7 @@ def test_an_adiabatic_gas_keeps_its_entropy(tmp_path):
 def test_units_and_text_of_cylinders(tmp_path, kind):
     scene = loaded(tmp_path, CASES[kind][0])
     if kind == "oil":
-        lift = replace(scene.cylinders["lift"], pressure=np.array(PRESSURE))
+        lift = scene.cylinders["lift"].changed(pressure=list(PRESSURE))
         scene = replace(scene, cylinders={"lift": lift})
     exact = ephs.simulate(scene, UNTIL, method="rk87", rtol=1e-10)
     same = ephs.simulate(scene_from_text(scene_to_text(scene)), UNTIL, method="rk87", rtol=1e-10)
@@ -170,6 +171,17 @@ def test_units_and_text_of_cylinders(tmp_path, kind):
     units = 2.0**12, 2.0**-11, 2.0**10  # far enough from metres, kilograms and seconds to run in units of its own
     far = ephs.simulate(rescaled(scene, *units), UNTIL * units[2], method="rk87", rtol=1e-10)
     assert np.isclose(far.joint("rail").rate[-1, 0] / units[0] * units[2], exact.joint("rail").rate[-1, 0], rtol=1e-8)
+
+
+def test_files_with_rows_of_numbers_as_arrays_are_read(tmp_path):
+    scene = loaded(tmp_path, CYLINDER + ACTUATOR)
+    data = json.loads(scene_to_text(scene))
+    for table in (data["cylinders"]["lift"], data["actuators"]["push"]):
+        rows = {key: value for key, value in table.items() if isinstance(value, list) and key != "joints"}
+        table |= {key: {"shape": [len(value)], "values": value} for key, value in rows.items()}
+    data["actuators"]["push"]["heat"] = "environment"
+    again = scene_from_text(json.dumps(data))
+    assert (again.cylinders, again.actuators) == (scene.cylinders, scene.actuators)
 
 
 def test_pressures_are_numbers_of_the_scene_and_inputs(tmp_path):

@@ -23,7 +23,7 @@ def ended(scene, until=0.2, **options):
 def test_a_motor_of_a_scene_is_the_one_put_together_by_hand():
     scene = ephs.load(SCENE)
     joints = {name: replace(j, armature=0.0) for name, j in scene.joints.items()}
-    motor = replace(scene.motors["drive"], gear=1.0 / machines.GEAR)
+    motor = scene.motors["drive"].changed(gear=1.0 / machines.GEAR)
     scene = replace(scene, joints=joints, motors={"drive": motor})
     found, run = ended(scene, 0.3, method="rk87", rtol=1e-12, atol=1e-13)
     _, rate, current, warmth = machines.motor_by_hand(0.3)
@@ -37,6 +37,7 @@ def test_a_motor_of_a_scene_is_the_one_put_together_by_hand():
 
 def test_all_forms_and_units_give_one_motion():
     scene = ephs.load(SCENE)
+    scene = replace(scene, motors={"drive": scene.motors["drive"].changed(current=3.0)})
     exact = ended(scene, method="rk87", rtol=1e-11, atol=1e-12)[0]
     coarse, fine = (ended(scene, method="natural", step=h, audit="off")[0] - exact for h in (2e-3, 1e-3))
     assert np.allclose(coarse, 4.0 * fine, rtol=0.05, atol=1e-9)

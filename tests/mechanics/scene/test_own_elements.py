@@ -332,6 +332,44 @@ def test_an_element_on_a_joint_oscillates_for_all_methods_and_goes_on(tmp_path):
     assert found["pushes.s.stretch"].found == "the stretch 12"
 
 
+class Pump(Element, section="pumps", said="two pressures that are one input"):
+    """Oil between two supplies, shared among joints by ratios that one number may stand for."""
+
+    joints: list[str] = key("joints", names="single", min_length=1)
+    ratio: float | list[float] = key("a ratio for each", 1.0, unit="m³/qᵢ")
+    pressure: list[float] = key("of the supplies", [0.0, 0.0], unit="Pa", min_length=2, max_length=2)
+
+    def normalised(self):
+        return self.changed(ratio=np.resize(self.ratio, len(self.joints)).tolist())
+
+    @rule("joints", at="", expected="at most {most} joints")
+    def few(self):
+        return len(self.joints) < 3 or {"most": 2}
+
+    def build(self, site):
+        ends = {f"v{k}": site.input(Q.liquid, p, f"v{k}", at="oil") for k, p in enumerate(self.pressure, 1)}
+        site.add(ephs.library.laminar_leak(c=1e-3), ends | {"s": site.entropy()}, "line")
+        for joint, ratio in zip(self.joints, self.ratio, strict=True):
+            skew = [[0.0, 0.0, ratio], [0.0, 0.0, -ratio], [-ratio, ratio, 0.0]]
+            flow = ephs.gyrator({"v1": Q.liquid, "v2": Q.liquid, "p": site.quantity(joint)}, skew)
+            site.add(flow, ends | {"p": site.drive(joint)}, f"piston.{joint}")
+
+
+def test_one_input_drives_two_ports_and_ratios_are_of_each_joint(tmp_path):
+    register_element(Pump)
+    pump = table("pumps", "p", {"joints": ["rail"], "ratio": 0.5, "pressure": [3.0, 1.0]})
+    scene = loaded(tmp_path, SLIDER + pump, "part.toml")
+    assert scene.elements["pumps"]["p"].ratio == [0.5]
+    assert rescaled(scene, 2.0).elements["pumps"]["p"].ratio == [2.0]
+    nested = loaded(tmp_path, 'format = 1\n[parts.left]\nuse = "part.toml"\n')
+    for inputs, pressures in (({}, (3.0, 1.0)), ({"pumps.left.p": [6.0, 5.0]}, (6.0, 5.0))):
+        sol = ephs.simulate(nested, 1.0, method="rk87", inputs=inputs)
+        assert abs(sol.joint("left.rail").rate[-1, 0]) == pytest.approx(0.5 * (pressures[0] - pressures[1]) / 2.0)
+        assert sol.heat[-1] == pytest.approx(1e-3 * (pressures[0] - pressures[1]) ** 2)
+    found = faults(tmp_path, SLIDER + table("pumps", "p", {"joints": ["rail"] * 3}))["pumps.p"]
+    assert (found.found, found.expected) == ("a table", "at most 2 joints")
+
+
 class Fan(Element, section="fans", said="a voltage on a resistor on a coil"):
     """A coil that an input drives."""
 

@@ -118,7 +118,7 @@ def test_the_whole_joint_table(scene):
     assert j.frame1[4:].tolist() == [0.0, 0.1, 0.12]
     # The motion moves the body, which gives no velocity of its own.
     np.testing.assert_allclose(loaded.body("a").twist, [1.0, 0, 0, 0, 0.12, -0.1], atol=1e-15)
-    assert loaded.conduction["c"].between == ("housing", "environment")
+    assert loaded.conduction["c"].between == ["housing", "environment"]
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_parts_are_moved_and_turned(scene):
     assert (hip.body1, hip.body2, hip.heat) == ("ground", "left.foot", "left.oil")
     np.testing.assert_allclose(quaternion_to_matrix(hip.frame1[:4])[:, 2], [0, -1, 0], atol=1e-15)
     np.testing.assert_allclose(dict(loaded.all_springs())["left.s"].at1, [0, -1, 5], atol=1e-15)
-    assert dict(loaded.all_conduction())["left.c"].between == ("left.oil", "environment")
+    assert dict(loaded.all_conduction())["left.c"].between == ["left.oil", "environment"]
     assert dict(loaded.all_thermal())["right.oil"].temperature == 300.0
     assert loaded.parts["left"].joints["hip"].body2 == "foot"
     # The load was placed by the joint that ties it to the part.

@@ -139,11 +139,6 @@ class Accounts:
         r, heats = np.split(y[eq.nv : eq.nv + eq.n + eq.ns], [eq.n])
         return replace(end, q=q, r=r, heats=heats), error
 
-    def note(self, state: "ReducedState") -> None:
-        """Remember what corrections put in up to a state that is kept."""
-        if state.account.size:
-            self.noted.note(state.t, float(state.account[2]), float(state.account[3]))
-
     def snapshot(self) -> Snapshot:
         """Notes of the run, for a journal."""
         return {"kept": self.kept, **self.noted.snapshot()}

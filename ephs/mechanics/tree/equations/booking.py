@@ -1,4 +1,4 @@
-"""Totals of a step on the reduced form: what its components passed on and made, and the work that it took."""
+"""Totals of a step on the reduced form, which components passed on and made, and its work; and records of states."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,6 +15,7 @@ from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.model import STORING
+from ephs.solve.result.record import Record
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class Booking:
         places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
         self.storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
         self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
+        number = {slot.path: i for i, slot in enumerate(equations.problem.descriptor.components)}
+        self._makers = np.array([number[path] for path in equations.reduced.made], dtype=int)
 
     def step(
         self,
@@ -96,12 +99,44 @@ class Booking:
         """All arrays of the tables that states are made from."""
         return self.paper.arrays()
 
-    def energies(self, states: Sequence["ReducedState"]) -> tuple[Array, Array]:
-        """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold."""
+    def record_of(self, states: Sequence["ReducedState"], times: Array, least: Array) -> Record:
+        """`record` of states one by one."""
         eq = self._equations
-        q, r, heats = zip(*((state.q, state.r, state.heats) for state in states), strict=True)
-        x = self.paper.rows(np.array(q), np.array(r), eq.heats.entropies(np.array(heats)))
-        energies, fault = np.zeros((len(states), len(eq.problem.descriptor.components))), np.zeros(1, dtype=np.int64)
+        q = np.array([state.q for state in states]).reshape(len(states), eq.reduced.coordinates)
+        rest = [np.concatenate([state.r, state.heats, state.totals]) for state in states]
+        put = np.array([state.account[2:4] for state in states if state.account.size]).reshape(-1, 2)
+        return self.record(times, q, np.array(rest).reshape(len(states), eq.size - eq.nv), put, least)
+
+    def record(self, times: Array, q: Array, rest: Array, put: Array, least: Array) -> Record:
+        """Records of many states.
+
+        Parameters
+        ----------
+        times, q, rest
+            (rows,) in s, (rows, ·) elements, (rows, ·) rates, heats and totals.
+        put
+            (rows, 2) what corrections put in and the sum of its sizes, in J; of the last states, those with an account.
+        least
+            (rows,) least entropy production in the step before, in J/K.
+        """
+        eq = self._equations
+        r, heats, totals = np.split(rest, [eq.n, eq.n + eq.ns], axis=1)
+        x, energies = self.energies(q, r, heats)
+        heat, work = totals[:, 0], eq.led.work(times, energies, totals)
+        eq.accounts.noted.note(times[times.size - len(put) :], put)
+        energies[:, self._makers] = 0.0
+        np.add.at(energies.T, self._makers, totals[:, 2:].T)
+        ledgers = np.stack([heat, work, work, totals[:, 2:].sum(axis=1), least], axis=1)
+        return Record(times, x, energies, ledgers)
+
+    def energies(self, q: Array, r: Array, heats: Array) -> tuple[Array, Array]:
+        """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold.
+
+        Of rows of elements, rates and heats.
+        """
+        eq = self._equations
+        x = self.paper.rows(q, np.ascontiguousarray(r), eq.heats.entropies(heats))
+        energies, fault = np.zeros((len(x), len(eq.problem.descriptor.components))), np.zeros(1, dtype=np.int64)
         eq.refuse(self.weighed(x, energies, fault)(), int(fault[0]))
         return x, energies
 

@@ -4,7 +4,7 @@ What every method on the reduced form shares. A step moves q = q⁰·exp(v): the
 spaces, v̇ = dexp⁻¹(v) r.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, final
 
@@ -76,14 +76,12 @@ class Equations:
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
-        number = {slot.path: i for i, slot in enumerate(problem.descriptor.components)}
         self.heats = heats_of(reduced, model.reference.temperature)
         self.led = Led(
             problem,
             frozenset(reduced.entropies[: self.ns - len(reduced.attaching.network.states)]),
             moved=self.prescribed.freedoms.size > 0,
         )
-        self._makers = np.array([number[path] for path in reduced.made], dtype=int)
         self.scal = model.scal(0.0)
         self.given = Given(problem, reduced, self.nv, self.prescribed)
         self.drive, self.wrench = self.given.drive, self.given.wrench
@@ -320,21 +318,7 @@ class Equations:
 
     def row(self, state: ReducedState) -> Row:
         """Record of a state."""
-        return self.rows_of([state])[0]
-
-    def rows_of(self, states: Sequence[ReducedState]) -> list[Row]:
-        """Records of many states."""
-        if not states:
-            return []
-        x, energies = self.booking.energies(states)
-        out: list[Row] = []
-        for state, point, energy in zip(states, x, energies, strict=True):
-            heat, work = state.totals[0], self.led.work(state.t, energy, state.totals)
-            self.accounts.note(state)
-            energy[self._makers] = 0.0
-            np.add.at(energy, self._makers, state.totals[2:])
-            out.append(Row(point, energy, np.array([heat, work, work, state.totals[2:].sum()])))
-        return out
+        return self.booking.record_of([state], np.array([state.t]), np.zeros(1)).rows[0]
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""

@@ -56,16 +56,22 @@ class Led:
 
     def start(self, energies: Array) -> None:
         """Count from here, where no degree of freedom is left; energies (components,) in J."""
-        self._from = float(energies @ self.mechanical) if self.holds else None
+        self._from = float(self._mechanical(energies)) if self.holds else None
 
-    def work(self, t: float, energies: Array, totals: Array) -> float:
-        """The work in J since the start by energies (components,) and the heat, the first of the totals; the second,
-        the sum of power, where the mechanism is not led."""
+    def work(self, times: Array, energies: Array, totals: Array) -> Array:
+        """(rows,) the work in J since the start by energies (rows, components) and the heat, the first of the totals;
+        the second, the sum of power, where the mechanism is not led."""
         if self._from is None:
-            return float(totals[1])
-        found = float(energies @ self.mechanical) - self._from + float(totals[0])
-        self.apart = max(self.apart, (abs(found - float(totals[1])), t))
+            return totals[:, 1]
+        found = self._mechanical(energies) - self._from + totals[:, 0]
+        apart = np.abs(found - totals[:, 1])
+        worst = int(np.argmax(apart))
+        self.apart = max(self.apart, (float(apart[worst]), float(times[worst])))
         return found
+
+    def _mechanical(self, energies: Array) -> Array:
+        """(rows,) energy in J that is not booked as heat; a row's digits do not depend on the others."""
+        return (energies * self.mechanical).sum(axis=-1)
 
     def stats(self) -> dict[str, Any]:
         """Statistics of a mechanism moved by prescribed motions."""

@@ -1,13 +1,12 @@
 """The part that a primitive can play in a mechanism, read from its structure."""
 
-from collections.abc import Iterable
 from enum import Enum, auto
 from typing import final
 
 import numpy as np
 
 from ephs.operad import Path, quantity
-from ephs.semantics.descriptor import ComponentSlot
+from ephs.semantics.descriptor import Descriptor
 from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.pullback import pulled_ports
 from ephs.solve.heats import exponential_law
@@ -46,12 +45,12 @@ class Role(Enum):
     """Components that may be attached."""
 
 
-def strikes(components: Iterable[ComponentSlot]) -> Path | None:
+def strikes(descriptor: Descriptor) -> Path | None:
     """The first component that has impulses; None where none has."""
-    for slot in components:
-        if isinstance(slot.primitive, Irreversible) and slot.primitive.impulse is not None:
-            return slot.path
-    return None
+    n = descriptor.numbering
+    struck = [isinstance(one, Irreversible) and one.impulse is not None for one in n.primitives]
+    found = np.flatnonzero(np.array(struck, dtype=bool)[n.primitive])
+    return descriptor.components[int(found[0])].path if found.size else None
 
 
 @final

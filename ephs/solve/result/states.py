@@ -1,0 +1,40 @@
+"""States of a record by path, as users read them, each made when it is asked for."""
+
+from collections.abc import Iterator, Mapping
+from typing import final
+
+from ephs.operad import Path, Quantity
+from ephs.semantics.bundle import Array
+from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.spaces.codes import VECTOR
+from ephs.semantics.spaces.pairs import Pair
+
+
+@final
+class RecordedStates(Mapping[Path, Array]):
+    """Columns of states x (n, point_size) by path, in `coordinates`."""
+
+    def __init__(self, descriptor: Descriptor, x: Array) -> None:
+        self._slots, self.x = {slot.path: slot for slot in descriptor.states}, x
+        self._read: dict[Path, Array] = {}
+
+    def __getitem__(self, path: Path) -> Array:
+        found = self._read.get(path)
+        if found is None:
+            slot = self._slots[path]
+            found = self._read[path] = coordinates(slot.quantity, self.x[:, slot.point])
+        return found
+
+    def __iter__(self) -> Iterator[Path]:
+        return iter(self._slots)
+
+    def __len__(self) -> int:
+        return len(self._slots)
+
+
+def coordinates(quantity: Quantity, x: Array) -> Array:
+    """States (n, size) as users read them: scalars (n,), relative poses as the pair's coordinates (n, d)."""
+    if quantity.kind == "relative_pose":
+        pair = Pair.from_space(quantity.space)
+        return x if pair.manifold.code == VECTOR else pair.coordinates(x)
+    return x[:, 0] if x.shape[1] == 1 else x

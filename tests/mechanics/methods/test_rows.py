@@ -1,0 +1,57 @@
+"""Rows of compiled steps stay arrays: they are the records of the states that are made of them, bit for bit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.semantics.primitives import Storage
+from ephs.solve.auditing import rounding
+from ephs.solve.stepping import Taken
+
+SCENES = sorted((Path(__file__).resolve().parents[3] / "scenes").glob("*.toml"))
+
+
+@pytest.mark.parametrize("save_at", [None, np.linspace(0.0, 0.3, 8)])
+@pytest.mark.parametrize("method", ["rk54", "radau", "semi"])
+@pytest.mark.parametrize("name", ["heavy-top", "hot-brake", "motor-four-bar"])
+def test_records_of_arrays_are_those_of_states(name, method, save_at, monkeypatch):
+    record, rows = ReducedMethod.record, []
+
+    def both(self, taken):
+        noted = self.equations.accounts.noted
+        before = noted.snapshot()
+        found, after = record(self, taken), noted.snapshot()
+        if isinstance(taken, Taken) and len(taken):
+            rows.append(len(taken))
+            noted.restore(before)
+            states = record(self, list(taken))
+            assert noted.snapshot() == after
+            for field in ("t", "x", "energies", "ledgers"):
+                assert getattr(found, field).tobytes() == getattr(states, field).tobytes(), field
+        return found
+
+    monkeypatch.setattr(ReducedMethod, "record", both)
+    scene = ephs.load(next(file for file in SCENES if file.stem == name))
+    solution = ephs.simulate(scene, 0.3, method=method, rtol=1e-6, save_at=save_at, audit="off")
+    assert sum(rows) >= min(len(solution), 8) - 1 or name != "heavy-top", "rows of trees are taken in compiled calls"
+
+
+@pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
+def test_forces_on_places_are_those_of_storages_one_by_one(file):
+    problem = problem_of_scene(ephs.load(file))
+    d = problem.descriptor
+    x = d.pack(problem.initial)
+    sizes = np.zeros(2)
+    for slot in d.components:
+        if isinstance(slot.primitive, Storage):
+            effort = np.abs(slot.primitive.effort(d.point(slot, x), problem.reference))
+            for _, where, quantity in slot.primitive.bundle.items():
+                twists = rounding._twists(quantity)
+                if twists is not None:
+                    turns = np.any(twists[:3], axis=0)
+                    sizes += effort[where][turns].sum(), effort[where][~turns].sum()
+    np.testing.assert_allclose(rounding._pushes(problem, 0.0, x), sizes, rtol=1e-12)
