@@ -18,7 +18,7 @@ import numpy as np
 import ephs
 from benchmarks.report import Report, table_of
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.show.charts.peer_mujoco import mujoco_model, silent
 from ephs.show.charts.peer_scene import peer_scene
 

@@ -18,7 +18,7 @@ from benchmarks import families
 from benchmarks.report import Report, table_of
 from ephs.exporting.environment import Environment, Environments, Task
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.show.charts.peer_mujoco import mujoco_model
 from ephs.show.charts.peer_scene import peer_scene
 

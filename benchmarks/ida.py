@@ -16,7 +16,7 @@ import numpy as np
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.stepping import Attempt

@@ -17,8 +17,8 @@ from ephs import Pattern, Reference, System, junction
 from ephs import library as lib
 from ephs.mechanics import joint, rigid_body
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Input, assemble
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Input, assemble
 from ephs.solve.methods.condensed import solved_by_parts
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model, compile_model

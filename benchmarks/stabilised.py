@@ -20,7 +20,7 @@ from ephs.mechanics.rewrite.frames import CONSTRAINED, joint_at
 from ephs.mechanics.rewrite.rewrite import Draft
 from ephs.mechanics.rewrite.stabilised import stabilised
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 __all__ = ["report"]
 

@@ -7,7 +7,7 @@ import numpy as np
 import ephs
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.semantics.kernel_table import address_of
+from ephs.semantics.descriptor.kernel_table import address_of
 from examples import oscillator
 
 __all__ = ["table"]

@@ -48,11 +48,11 @@ if TYPE_CHECKING:
     from ephs.semantics import StructureError as StructureError
     from ephs.semantics import System as System
     from ephs.semantics import library as library
-    from ephs.semantics.constructors import constraint as constraint
-    from ephs.semantics.constructors import gyrator as gyrator
-    from ephs.semantics.constructors import irreversible as irreversible
-    from ephs.semantics.constructors import storage as storage
-    from ephs.semantics.constructors import transformer as transformer
+    from ephs.semantics.primitives.constructors import constraint as constraint
+    from ephs.semantics.primitives.constructors import gyrator as gyrator
+    from ephs.semantics.primitives.constructors import irreversible as irreversible
+    from ephs.semantics.primitives.constructors import storage as storage
+    from ephs.semantics.primitives.constructors import transformer as transformer
     from ephs.solve.auditing.findings import AuditError as AuditError
     from ephs.solve.auditing.findings import AuditWarning as AuditWarning
     from ephs.solve.auditing.findings import CostWarning as CostWarning
@@ -90,7 +90,7 @@ _HOMES = {
         "System",
         "library",
     ),
-    "ephs.semantics.constructors": ("constraint", "gyrator", "irreversible", "storage", "transformer"),
+    "ephs.semantics.primitives.constructors": ("constraint", "gyrator", "irreversible", "storage", "transformer"),
     "ephs.mechanics.scene": ("ModelWarning", "Scene", "SceneError", "SceneWarning"),
     "ephs.mechanics.scene.load": ("load",),
     "ephs.mechanics.runs.check": ("check_model",),

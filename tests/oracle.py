@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Reference
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 
 __all__ = ["Oracle", "Unsolved"]
 

@@ -19,7 +19,7 @@ from ephs.cli.input import LoadOptions, Stepping
 from ephs.cli.linear import linearize
 from ephs.cli.run import run
 from ephs.cli.sweep import sweep
-from ephs.semantics.report import CheckItem
+from ephs.semantics.systems.report import CheckItem
 from ephs.solve.auditing.findings import Audit, Finding
 from examples.failures import CASES, Case
 

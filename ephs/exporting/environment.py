@@ -14,7 +14,7 @@ from ephs.exporting.image import image_of
 from ephs.exporting.module import Exported, exported
 from ephs.exporting.running import Instances
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import RTOL
 
 CHUNK: Final = 8

@@ -17,7 +17,7 @@ from ephs.exporting.linking import tool
 from ephs.exporting.module import Exported, exported
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.objects import emitted
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
 

@@ -18,10 +18,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.tables import SPRING
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.control import ATOL, RTOL, Proportional, first_step
 from ephs.solve.march import Control as Steering
 from ephs.solve.problem import Problem

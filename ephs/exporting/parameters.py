@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from ephs.exporting.errors import ExportError
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 NEAR = 0.25
 """Relative displacement of a parameter, of 1 where it is 0: above rounding and within ranges."""

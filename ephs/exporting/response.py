@@ -11,8 +11,8 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
-from ephs.semantics.bundle import Array
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.system import System
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

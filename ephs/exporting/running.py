@@ -6,7 +6,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.exporting.module import Exported
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.objects import compiled
 
 _POINTER: Final = ctypes.c_void_p

@@ -12,7 +12,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.ctext import c_text
 from ephs.semantics.stage.llvm import compile_text
 from ephs.semantics.stage.objects import TARGETS, emitted
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
 

@@ -15,11 +15,11 @@ from ephs.modelica.structure import PortStructure, power_of, stored_energy, stru
 from ephs.modelica.thermal import heated, require_heat, warm_of
 from ephs.operad import Directory, Path, Pattern, PortType, Quantity, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import irreversible
-from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Primitive, Reversible, power_ports
-from ephs.semantics.structures import constant_structure, quadratic
-from ephs.semantics.system import System
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.primitives.constructors import irreversible
+from ephs.semantics.primitives.primitives import Primitive, Reversible, power_ports
+from ephs.semantics.primitives.structures import constant_structure, quadratic
+from ephs.semantics.systems.system import System
 
 
 @final
@@ -169,7 +169,7 @@ def _dirac(ports: Mapping[str, Quantity], skew: np.ndarray, constraint: np.ndarr
     odd_rows = (constraint != 0.0) & ~np.equal.outer(first, parity)
     if not (odd_skew.any() or odd_rows.any()):
         return constant_structure("dirac", power_ports(**ports), skew, constraint), False
-    from ephs.semantics.forms import coupled
+    from ephs.semantics.primitives.forms import coupled
 
     interface = Directory(
         {name: PortType(of, True) for name, of in ports.items()} | {"field": PortType(quantity.flux_linkage, False)}

@@ -11,9 +11,9 @@ from ephs.modelica.flat import Connector, Flat, ZeroResidual
 from ephs.modelica.relation import PortRelation
 from ephs.operad import quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import irreversible
-from ephs.semantics.primitives import Primitive, power_ports
-from ephs.semantics.structures import constant_structure
+from ephs.semantics.primitives.constructors import irreversible
+from ephs.semantics.primitives.primitives import Primitive, power_ports
+from ephs.semantics.primitives.structures import constant_structure
 
 
 def warm_of(flat: Flat) -> dict[Symbol, Expr]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.markup import table
+from ephs.semantics.systems.markup import table
 from ephs.show.palette import BLUE, GREY, INK, RED
 from ephs.show.still import still_svg
 from ephs.solve.result.tables import solution_table

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.labels import Labels
 from ephs.solve.result.temperatures import heated
 

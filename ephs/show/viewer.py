@@ -19,7 +19,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Joint, Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.show.page import Page
 from ephs.show.player import player
 from ephs.show.stage import Stage, stage_of

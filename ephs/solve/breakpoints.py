@@ -11,7 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.probe import Asked, Change, Probe
 from ephs.solve.problem import Problem, Signal, State

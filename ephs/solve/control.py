@@ -7,8 +7,8 @@ from typing import Protocol, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
 from ephs.solve.snapshot import Snapshot
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.passing import TURNED
 from ephs.solve.auditing.resolution import Trials

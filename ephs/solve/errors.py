@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.semantics.errors import nearest_of as nearest_of
+from ephs.semantics.bundles.errors import nearest_of as nearest_of
 
 if TYPE_CHECKING:
     from ephs.solve.model import Model

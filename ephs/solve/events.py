@@ -7,7 +7,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.problem import States
 from ephs.solve.snapshot import Snapshot

@@ -19,9 +19,9 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import Index
-from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import Index
+from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.solve.errors import Outcome, SolveError
 
 EXPONENTIAL = 1e-12

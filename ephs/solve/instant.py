@@ -11,11 +11,11 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.descriptor import ComponentSlot, Descriptor, Input
-from ephs.semantics.extents import room
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.extents import room
+from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.linear.sums import uncancelled
-from ephs.semantics.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 

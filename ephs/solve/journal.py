@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.result.durable import settle
 from ephs.solve.result.record import Record, joined

@@ -11,10 +11,10 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.kernel_table import Callback, address_of, prototype
-from ephs.semantics.numbering import Index, spans, starts
-from ephs.semantics.primitives import Primitive, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.descriptor.kernel_table import Callback, address_of, prototype
+from ephs.semantics.descriptor.numbering import Index, spans, starts
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKING, Tables
 

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.auditing.audit import Bounds, Tests
 from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production

@@ -14,10 +14,10 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.operad.disjoint import DisjointSets
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.linear.sums import uncancelled
-from ephs.semantics.primitives import Reversible
+from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.instant import Mobility, is_velocity, rate_balances

@@ -7,15 +7,15 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path, quantity
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.derive.relations import compiled
-from ephs.semantics.descriptor import Descriptor, Input
-from ephs.semantics.kept import once
-from ephs.semantics.kernel_table import Callback
+from ephs.semantics.descriptor.descriptor import Descriptor, Input
+from ephs.semantics.descriptor.kernel_table import Callback
+from ephs.semantics.descriptor.numbering import spans, starts, sums
 from ephs.semantics.linear.sums import uncancelled
-from ephs.semantics.numbering import spans, starts, sums
-from ephs.semantics.primitives import Primitive, Reversible, Storage
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.systems.kept import once
 from ephs.solve.layout import entry_of, laid_out
 from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, TablesOf, parts_of

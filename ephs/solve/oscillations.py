@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.primitives import Reversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.primitives.primitives import Reversible, Storage
 from ephs.semantics.spaces.decompositions import pseudoinverse, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, TINY, rank_of
 from ephs.solve.errors import SolveError

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.descriptor import Descriptor, Input
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.descriptor.descriptor import Descriptor, Input
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.motion_law import MotionLaw
 

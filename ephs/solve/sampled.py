@@ -11,7 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import SLIVER
 from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
 from ephs.solve.problem import Problem, State

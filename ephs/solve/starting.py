@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import Outcome, SolveError

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, fi
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control, Policy
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot

@@ -5,7 +5,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.problem import Problem
 from ephs.solve.result.ledger import ledgers

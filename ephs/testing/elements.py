@@ -23,7 +23,7 @@ from ephs.semantics.algebra import (
     systems,
     units,
 )
-from ephs.semantics.system import Filling
+from ephs.semantics.systems.system import Filling
 from ephs.testing.primitives import irreversibles, reversibles, storages
 
 Elements: TypeAlias = Callable[[Interface], st.SearchStrategy[Any]]

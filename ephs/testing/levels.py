@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from ephs.operad import ROOT, Directory, Interface, Junction, Pattern, PortType, Quantity
 from ephs.semantics import System
-from ephs.semantics.system import Filling
+from ephs.semantics.systems.system import Filling
 from ephs.testing.patterns import CHAIN
 from ephs.testing.primitives import irreversibles, reversibles, storages
 

@@ -11,7 +11,7 @@ from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.geometry import coupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Body, Joint, Scene, Spring, World, frozen
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.testing.primitives import generators
 

@@ -9,9 +9,10 @@ from ephs.mechanics.elements import components
 from ephs.operad import Interface, Path
 from ephs.operad import quantity as quantities
 from ephs.operad.charges import ENTROPY
-from ephs.semantics import Irreversible, Reference, Reversible, Storage, forms, library, structures
-from ephs.semantics.bundle import Array, Bundle
-from ephs.semantics.primitives import Formula, Point
+from ephs.semantics import Irreversible, Reference, Reversible, Storage, library
+from ephs.semantics.bundles.bundle import Array, Bundle
+from ephs.semantics.primitives import forms, structures
+from ephs.semantics.primitives.primitives import Formula, Point
 from ephs.semantics.spaces import Pair
 from ephs.semantics.spaces.decompositions import pseudoinverse
 

@@ -6,10 +6,10 @@ from hypothesis import currently_in_test_context, given, reject, settings
 from hypothesis import strategies as st
 
 from ephs.semantics import Irreversible, Reference, System
-from ephs.semantics.errors import StructureError
-from ephs.semantics.laws import random_probe, system_law
-from ephs.semantics.primitives import Primitive, Storage
-from ephs.semantics.probe import Probe
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.primitives.primitives import Primitive, Storage
+from ephs.semantics.systems.laws import random_probe, system_law
+from ephs.semantics.systems.probe import Probe
 from ephs.semantics.verdicts.search import UNDEFINED, failure, search, shrunk
 from ephs.semantics.verdicts.trials import chosen, special_numbers, trial_of
 from ephs.semantics.verdicts.verdict import StructureVerdict

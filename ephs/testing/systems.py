@@ -7,9 +7,9 @@ from hypothesis.errors import InvalidArgument
 
 from ephs.operad import Interface, Nesting, Path, Quantity, Space, quantity
 from ephs.semantics import Irreversible, Reference, Reversible, Storage, System
-from ephs.semantics.laws import Probe, random_probe, system_law
 from ephs.semantics.spaces import codes, manifold
-from ephs.semantics.system import Filling
+from ephs.semantics.systems.laws import Probe, random_probe, system_law
+from ephs.semantics.systems.system import Filling
 from ephs.testing.levels import levels
 from ephs.testing.primitives import irreversibles, reversibles, storages
 

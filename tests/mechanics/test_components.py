@@ -16,8 +16,8 @@ from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Path, Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, Storage, StructureError, library
-from ephs.semantics.behaviour import Natural
-from ephs.semantics.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
+from ephs.semantics.descriptor.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
+from ephs.semantics.primitives.behaviour import Natural
 from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.search import search

@@ -20,7 +20,7 @@ from ephs.operad import Path
 from ephs.semantics import Reference, StructureError, System
 from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.system import as_system
+from ephs.semantics.systems.system import as_system
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 from tests.semantics.subspace import Subspace, subspace_of
 

@@ -17,10 +17,10 @@ from ephs.mechanics.scene.build import initial_state, scene_system
 from ephs.mechanics.scene.model import frozen
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference
-from ephs.semantics.laws import Probe, system_law
 from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.systems.laws import Probe, system_law
 from ephs.testing import mechanisms
 from tests.written import scene_of_text
 

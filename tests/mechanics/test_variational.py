@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ephs.mechanics import rigid_body
 from ephs.operad import Path
 from ephs.semantics import Reference
-from ephs.semantics.descriptor import Input
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.spaces import SE3, SO3xR3
 from ephs.semantics.spaces.rotations import rotation_log
 from ephs.solve.instant import instant

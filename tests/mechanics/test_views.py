@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 import ephs
 from ephs.mechanics.motion.views import Names
-from ephs.semantics.errors import AssemblyError
+from ephs.semantics.bundles.errors import AssemblyError
 from tests.mechanics.dynamics.drawn import moving
 from tests.written import scene_of_text
 

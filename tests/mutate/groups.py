@@ -87,21 +87,21 @@ GROUPS = {
     ),
     "primitives": Group(
         (
-            "ephs/semantics/primitives.py",
-            "ephs/semantics/differences.py",
-            "ephs/semantics/structures.py",
+            "ephs/semantics/primitives/primitives.py",
+            "ephs/semantics/primitives/differences.py",
+            "ephs/semantics/primitives/structures.py",
             "ephs/semantics/library/__init__.py",
-            "ephs/semantics/forms.py",
+            "ephs/semantics/primitives/forms.py",
             "ephs/semantics/derive/*.py",
-            "ephs/semantics/behaviour.py",
-            "ephs/semantics/constructors.py",
+            "ephs/semantics/primitives/behaviour.py",
+            "ephs/semantics/primitives/constructors.py",
         ),
         ("tests/semantics", *PARTS),
     ),
     "relations": Group(
         (
             "ephs/semantics/meaning/*.py",
-            "ephs/semantics/laws.py",
+            "ephs/semantics/systems/laws.py",
         ),
         (
             *tuple(

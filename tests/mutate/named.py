@@ -61,7 +61,7 @@ BREAKS = {
         "side, mid, inner = scale(-0.5 * h, two)",
         "side, mid, inner = scale(0.5 * h, two)",
     ),
-    "mf": Break("ephs/semantics/structures.py", "[-pull]", "[pull]"),
+    "mf": Break("ephs/semantics/primitives/structures.py", "[-pull]", "[pull]"),
     "substitution": Break(
         "ephs/operad/substitution.py",
         "        target[path] = kept = box / path\n",

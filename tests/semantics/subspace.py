@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.meaning import Instant
 from ephs.semantics.spaces.rank import ELIMINATION, TINY, rank_of
 

@@ -10,10 +10,10 @@ from ephs import quantity as Q
 from ephs.mechanics.elements.components import gravity
 from ephs.operad import ROOT, Path, PatternError
 from ephs.semantics import AssemblyError, Reference, Relation, SemanticsError, System
-from ephs.semantics.behaviour import Natural
-from ephs.semantics.laws import random_probe, system_law
 from ephs.semantics.meaning.step import solved as solve
+from ephs.semantics.primitives.behaviour import Natural
 from ephs.semantics.spaces import SE3
+from ephs.semantics.systems.laws import random_probe, system_law
 
 ROTATION = np.array([[0.0, -1.0], [1.0, 0.0]])
 READER = ephs.gyrator(

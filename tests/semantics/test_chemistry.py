@@ -14,7 +14,7 @@ from ephs.operad import Path
 from ephs.operad import quantity as Q
 from ephs.semantics.library import chemistry
 from ephs.semantics.library.chemistry import Species
-from ephs.semantics.report import check_system
+from ephs.semantics.systems.report import check_system
 
 R = 8.31446261815324
 EPS = float(np.finfo(float).eps)

@@ -10,10 +10,12 @@ from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.operad import Directory, Path, PortType
-from ephs.semantics import Reference, Reversible, System, balances, laws, structures
-from ephs.semantics.laws import SYSTEM_LAWS, Verdict, random_probe, system_law
+from ephs.semantics import Reference, Reversible, System
 from ephs.semantics.meaning import LinearRelation, relation_of, relation_of_pattern
-from ephs.semantics.system import as_system
+from ephs.semantics.primitives import structures
+from ephs.semantics.systems import balances, laws
+from ephs.semantics.systems.laws import SYSTEM_LAWS, Verdict, random_probe, system_law
+from ephs.semantics.systems.system import as_system
 
 INNER = Pattern.from_text(
     "q: displacement; p: momentum, exposed; s: entropy, exposed; spring(q); mass(p); turn(q, p); rub(p, s)"

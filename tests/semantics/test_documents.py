@@ -19,10 +19,10 @@ from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
 from ephs.operad.reading import Reader
 from ephs.semantics import Storage
-from ephs.semantics.catalogue import find_part, part_of
 from ephs.semantics.derive.recording import record as recording
-from ephs.semantics.documents import SCHEMA_FILE
-from ephs.semantics.primitive_documents import AGREEMENT, _said
+from ephs.semantics.documents.catalogue import find_part, part_of
+from ephs.semantics.documents.primitives import AGREEMENT, _said
+from ephs.semantics.documents.systems import SCHEMA_FILE
 from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, Written, record, recorded, term_from
 from ephs.testing import systems
 from tests.semantics.test_primitives import ARGUMENTS

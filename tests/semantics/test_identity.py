@@ -8,9 +8,10 @@ import pytest
 import ephs
 from ephs.operad import Path
 from ephs.operad import quantity as Q
-from ephs.semantics import Storage, library, structures
+from ephs.semantics import Storage, library
 from ephs.semantics.derive.linear import Linear
-from ephs.semantics.primitives import Kernel
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.primitives import Kernel
 
 A = 0.02
 STRUCTURES = {

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs import Pattern, junction, library, quantity
-from ephs.semantics.kept import MOST, Kept
+from ephs.semantics.systems.kept import MOST, Kept
 
 PATTERN, MASS = Pattern({"p": junction(quantity.momentum)}, {"mass": {"p": "p"}}), library.point_mass(m=2.0)
 

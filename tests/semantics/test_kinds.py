@@ -11,10 +11,10 @@ import ephs
 from ephs import AssemblyError, Pattern, System, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.semantics import kinds
-from ephs.semantics.descriptor import Descriptor, assemble, descriptor_of
-from ephs.semantics.kinds import number_by_kinds, repeats
-from ephs.semantics.numbering import Numbering, number_flat
+from ephs.semantics.descriptor import kinds
+from ephs.semantics.descriptor.descriptor import Descriptor, assemble, descriptor_of
+from ephs.semantics.descriptor.kinds import number_by_kinds, repeats
+from ephs.semantics.descriptor.numbering import Numbering, number_flat
 from ephs.testing import fillings, nestings, systems
 
 ARRAYS = ("wires", "reads", "outer")

@@ -5,12 +5,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ephs.operad import Path, Pattern, junction, quantity
-from ephs.semantics import Reference, System, library, structures
-from ephs.semantics.laws import SYSTEM_LAWS, random_probe
+from ephs.semantics import Reference, System, library
 from ephs.semantics.meaning import relation_of_pattern
 from ephs.semantics.meaning.fields import Rational
 from ephs.semantics.meaning.functor import is_dirac
 from ephs.semantics.meaning.step import step
+from ephs.semantics.primitives import structures
+from ephs.semantics.systems.laws import SYSTEM_LAWS, random_probe
 from ephs.testing import (
     check_entropy_production,
     check_functoriality,

@@ -17,10 +17,10 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.operad import Directory, Path
 from ephs.semantics import Reference, System
-from ephs.semantics.behaviour import GRADIENTS, Natural
-from ephs.semantics.laws import random_probe
 from ephs.semantics.meaning.step import solved as solve
+from ephs.semantics.primitives.behaviour import GRADIENTS, Natural
 from ephs.semantics.spaces import SE3, manifold
+from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
 
 REFERENCE = Reference()

@@ -9,7 +9,7 @@ import ephs
 from ephs.operad import Path
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, StructureError, library
-from ephs.semantics.bundle import Bundle
+from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
 from tests.semantics.subspace import dirac
@@ -212,7 +212,7 @@ def test_what_one_makes_oneself_is_what_the_library_makes():
     }
     for name, primitive in mine.items():
         state = {str(port): 0.4 for port in primitive.reads}
-        from ephs.semantics.system import as_system
+        from ephs.semantics.systems.system import as_system
 
         ours = as_system(made(name)).relation().at(state)
         theirs = as_system(primitive).relation().at(state)

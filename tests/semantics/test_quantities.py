@@ -11,9 +11,9 @@ from ephs import AssemblyError, Pattern, StructureError, irreversible, junction,
 from ephs.operad import Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, library
-from ephs.semantics.bundle import Bundle
-from ephs.semantics.extents import expected, inside
-from ephs.semantics.primitives import power_ports
+from ephs.semantics.bundles.bundle import Bundle
+from ephs.semantics.bundles.extents import expected, inside
+from ephs.semantics.primitives.primitives import power_ports
 from ephs.semantics.verdicts.checks import random_point
 
 ONE = Space("real", 1, 1)

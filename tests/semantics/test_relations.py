@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from ephs.operad import ROOT, Path, Pattern, PatternError, junction, quantity
-from ephs.semantics import AssemblyError, Reference, SemanticsError, System, library, structures
+from ephs.semantics import AssemblyError, Reference, SemanticsError, System, library
 from ephs.semantics.meaning import relation_of_pattern
 from ephs.semantics.meaning.fields import Rational
 from ephs.semantics.meaning.functor import glued
 from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.primitives import structures
 from tests.semantics.subspace import subspace_of
 
 Q = quantity

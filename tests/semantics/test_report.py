@@ -5,7 +5,7 @@ import pytest
 
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import Irreversible, Reference, library
-from ephs.semantics.laws import SYSTEM_LAWS
+from ephs.semantics.systems.laws import SYSTEM_LAWS
 
 oscillator = Pattern(
     junctions={"q": junction(quantity.displacement), "p": junction(quantity.momentum, exposed=True)},

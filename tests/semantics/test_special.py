@@ -9,7 +9,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ephs.semantics.special import SHORT, log_mean, sinhc
+from ephs.semantics.primitives.special import SHORT, log_mean, sinhc
 from ephs.semantics.symbols.functions import Sinhc, SinhcSlope
 from ephs.semantics.symbols.tracing import trace
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from ephs.operad import Directory, PortType
 from ephs.semantics import Irreversible, Reference
-from ephs.semantics.bundle import Bundle
+from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.verdicts.checks import random_point
 from ephs.testing import fillings, nestings, systems

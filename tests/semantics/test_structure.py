@@ -235,7 +235,7 @@ def test_check_primitive_finds_what_is_trusted_wrongly(name, monkeypatch):
     make, kind = ZOO[name]
     expected = refused(make).witness
     with monkeypatch.context() as context:
-        context.setattr("ephs.semantics.primitives.examine", lambda _: StructureVerdict([]))
+        context.setattr("ephs.semantics.primitives.primitives.examine", lambda _: StructureVerdict([]))
         primitive = make()
     with pytest.raises(AssertionError, match=f"^{kind}: ") as caught:
         check_primitive(primitive)

@@ -6,8 +6,9 @@ import numpy as np
 
 import ephs
 from ephs import quantity as Q
-from ephs.semantics import Irreversible, Reversible, Storage, structures
+from ephs.semantics import Irreversible, Reversible, Storage
 from ephs.semantics.library import power_ports
+from ephs.semantics.primitives import structures
 
 QP = {"q": Q.displacement, "p": Q.momentum}
 PS = {"p": Q.momentum, "s": Q.entropy}

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from benchmarks.parts import FAMILIES
 from ephs import Reference
-from ephs.semantics.descriptor import Descriptor, Input, assemble
-from ephs.semantics.kinds import number_by_kinds
-from ephs.semantics.laws import random_probe
+from ephs.semantics.descriptor.descriptor import Descriptor, Input, assemble
+from ephs.semantics.descriptor.kinds import number_by_kinds
+from ephs.semantics.systems.laws import random_probe
 from ephs.solve.errors import SolveError
 from ephs.solve.methods import condensed
 from ephs.solve.methods.condensed import solved_by_parts

@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.cells import grid, ladder
 from ephs import Reference
-from ephs.semantics.descriptor import Input, assemble
-from ephs.semantics.numbering import spans
+from ephs.semantics.descriptor.descriptor import Input, assemble
+from ephs.semantics.descriptor.numbering import spans
 from ephs.solve.control import Proportional
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.integral import Integral

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, svd
 
 ALIGNED = 1e-6

@@ -14,7 +14,7 @@ from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.kinematics import Link, elements
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY, rank_of

@@ -20,7 +20,7 @@ from ephs.mechanics.constraints.plausible import undetermined_bodies
 from ephs.mechanics.scene.adjust import close_loops
 from ephs.mechanics.scene.kinematics import Scale
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, NEIGHBOUR, SPANNED, rank_of
 

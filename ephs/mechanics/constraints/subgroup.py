@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import ASSEMBLY

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.dynamics.model import Dynamics
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Reference
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.sampled import Sampled
 

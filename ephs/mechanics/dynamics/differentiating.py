@@ -4,7 +4,7 @@ from ephs.mechanics.dynamics.links import Links
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, VelocityDerivatives
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import CUT
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 Slopes = tuple[Array, Array, Array]
 """(n,) accelerations, their derivatives as `Linearised.columns` has them, and those by forces (n, n)."""

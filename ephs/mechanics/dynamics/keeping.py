@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.solve.sparse import Index
 

@@ -7,8 +7,8 @@ import numpy as np
 from ephs.mechanics.motion.views import BodyState
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import listed
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import OptionError
 from ephs.solve.problem import State as States

@@ -9,7 +9,7 @@ from ephs.mechanics.dynamics.links import Links
 from ephs.mechanics.dynamics.results import Derivatives
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
 
 

@@ -24,7 +24,7 @@ from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, failing_at
 from ephs.solve.problem import Problem
 from ephs.solve.problem import State as States

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.layout import Layout
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import OptionError
 from ephs.solve.sparse import Index

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.model import Model
 
 

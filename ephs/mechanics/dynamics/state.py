@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.tree.finding.layout import Layout
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

@@ -16,7 +16,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.errors import OptionError, number_of
 from ephs.solve.methods.own import Method

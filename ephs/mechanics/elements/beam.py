@@ -20,13 +20,14 @@ from ephs.mechanics.elements import components, notation
 from ephs.mechanics.elements.joints import between_frames
 from ephs.mechanics.elements.strain import ORDERS, strain_energy, strain_resistance, stretching
 from ephs.operad import Directory, Path, PortType, quantity
-from ephs.semantics import formulas, structures
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import coupled, stored
-from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.library import formulas
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.forms import coupled, stored
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage, power_ports
 from ephs.semantics.spaces import SE3, pair
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from ephs.mechanics.elements import components
 from ephs.operad import Pattern, junction
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError, nearest_of
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError, nearest_of
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import INERTIA
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

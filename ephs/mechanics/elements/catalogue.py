@@ -14,8 +14,8 @@ from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics import library
-from ephs.semantics.catalogue import Part
-from ephs.semantics.primitives import Primitive
+from ephs.semantics.documents.catalogue import Part
+from ephs.semantics.primitives.primitives import Primitive
 from ephs.semantics.spaces import Pair, pair
 
 Numbers = Mapping[str, Any]

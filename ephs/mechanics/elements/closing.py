@@ -12,9 +12,9 @@ import numpy as np
 from ephs.mechanics.elements import notation
 from ephs.mechanics.elements.components import columns_of, gap_over, joint_matrix, relative
 from ephs.operad import Directory, Path, PortType, quantity
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.closing import Closing
-from ephs.semantics.primitives import Kernel, Point, Reversible
+from ephs.semantics.primitives.primitives import Kernel, Point, Reversible
 from ephs.semantics.spaces import SE3, Pair
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved

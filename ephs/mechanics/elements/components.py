@@ -14,17 +14,18 @@ import numpy as np
 from ephs.mechanics.elements import notation
 from ephs.mechanics.shapes.dry import Dry
 from ephs.operad import Directory, Path, PortType, Quantity, quantity
-from ephs.semantics import formulas, structures
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.linear import Linear
-from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import coupled, stored
-from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.library import formulas
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.forms import coupled, stored
+from ephs.semantics.primitives.primitives import Formula, Irreversible, Kernel, Point, Reversible, Storage, power_ports
+from ephs.semantics.primitives.special import squared_turn, turn_ratio
 from ephs.semantics.spaces import SE3, Pair, codes, manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
-from ephs.semantics.special import squared_turn, turn_ratio
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved
 

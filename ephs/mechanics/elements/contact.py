@@ -21,10 +21,11 @@ from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.mechanics.shapes.selecting import Vector
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
-from ephs.semantics import library, structures
-from ephs.semantics.forms import stored
-from ephs.semantics.primitives import Irreversible, Storage, power_ports
-from ephs.semantics.system import System
+from ephs.semantics import library
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.forms import stored
+from ephs.semantics.primitives.primitives import Irreversible, Storage, power_ports
+from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved
 

@@ -6,10 +6,10 @@ from typing import Any
 from ephs.mechanics.elements.gear import turns
 from ephs.operad import Junction, Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import gyrator
-from ephs.semantics.forms import stored
-from ephs.semantics.primitives import Storage, power_ports
-from ephs.semantics.system import Filling, System
+from ephs.semantics.primitives.constructors import gyrator
+from ephs.semantics.primitives.forms import stored
+from ephs.semantics.primitives.primitives import Storage, power_ports
+from ephs.semantics.systems.system import Filling, System
 
 
 def _compressed(v_a: Any, v_b: Any, q: Any, area_a: Any, area_b: Any, volume_a: Any, volume_b: Any, bulk: Any) -> Any:

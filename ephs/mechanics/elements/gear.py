@@ -6,11 +6,11 @@ import numpy as np
 
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import constraint, gyrator, transformer
-from ephs.semantics.primitives import Storage, power_ports
+from ephs.semantics.primitives.constructors import constraint, gyrator, transformer
+from ephs.semantics.primitives.primitives import Storage, power_ports
+from ephs.semantics.primitives.structures import quadratic
 from ephs.semantics.spaces import pair
-from ephs.semantics.structures import quadratic
-from ephs.semantics.system import Filling, System
+from ephs.semantics.systems.system import Filling, System
 
 
 def gear(

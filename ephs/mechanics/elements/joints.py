@@ -14,11 +14,11 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError, listed
-from ephs.semantics.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError, listed
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair, translation
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

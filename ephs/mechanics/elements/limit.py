@@ -12,11 +12,11 @@ from ephs.mechanics.shapes.gap import ramp
 from ephs.mechanics.shapes.impact import Halt, Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.operad import Directory, PortType, quantity
-from ephs.semantics import structures
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import stored
-from ephs.semantics.primitives import Irreversible, Storage, power_ports
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.forms import stored
+from ephs.semantics.primitives.primitives import Irreversible, Storage, power_ports
 from ephs.semantics.spaces import Pair
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved

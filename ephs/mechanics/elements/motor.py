@@ -4,10 +4,10 @@ import numpy as np
 
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import transformer
-from ephs.semantics.primitives import Storage, power_ports
-from ephs.semantics.structures import quadratic
-from ephs.semantics.system import System
+from ephs.semantics.primitives.constructors import transformer
+from ephs.semantics.primitives.primitives import Storage, power_ports
+from ephs.semantics.primitives.structures import quadratic
+from ephs.semantics.systems.system import System
 
 
 def armature(of: Quantity, inertia: float) -> Storage:

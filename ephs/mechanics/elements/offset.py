@@ -7,9 +7,9 @@ import numpy as np
 
 from ephs.mechanics.elements import notation
 from ephs.operad import Interface, quantity
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.linear import Linear
-from ephs.semantics.primitives import Formula, Kernel, Point, Reversible, power_ports
+from ephs.semantics.primitives.primitives import Formula, Kernel, Point, Reversible, power_ports
 from ephs.semantics.spaces import SE3
 
 if TYPE_CHECKING:

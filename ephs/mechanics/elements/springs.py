@@ -8,11 +8,11 @@ import numpy as np
 
 from ephs.mechanics.elements import notation
 from ephs.operad import Directory, Path, PortType, quantity
-from ephs.semantics import structures
-from ephs.semantics.forms import coupled, stored
-from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.forms import coupled, stored
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage, power_ports
+from ephs.semantics.primitives.special import choose
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.special import choose
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved
 

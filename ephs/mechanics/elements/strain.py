@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.special import squared_turn, turn_curve, turn_curve_slope, turn_ratio
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.special import squared_turn, turn_curve, turn_curve_slope, turn_ratio
 
 ORDERS = (2, 4)
 """Orders in the length of the elements that rest converges by."""

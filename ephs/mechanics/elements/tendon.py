@@ -15,11 +15,11 @@ from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.shapes.gap import ramp
 from ephs.operad import Path, Pattern, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.constructors import gyrator
-from ephs.semantics.forms import stored
-from ephs.semantics.primitives import Storage, power_ports
+from ephs.semantics.primitives.constructors import gyrator
+from ephs.semantics.primitives.forms import stored
+from ephs.semantics.primitives.primitives import Storage, power_ports
 from ephs.semantics.spaces import pair, translation
-from ephs.semantics.system import Filling, System
+from ephs.semantics.systems.system import Filling, System
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved
 

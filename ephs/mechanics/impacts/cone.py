@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 

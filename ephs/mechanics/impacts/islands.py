@@ -14,7 +14,7 @@ import numpy as np
 
 from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.shapes.impact import Impact
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.sparse import Index
 
 TIED = 1e-12

@@ -3,7 +3,7 @@
 from scipy.linalg import cho_factor, cho_solve
 
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 

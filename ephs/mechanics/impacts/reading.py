@@ -15,7 +15,7 @@ from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
 from ephs.solve.sparse import Index

@@ -21,7 +21,7 @@ from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.errors import Outcome, SolveError

@@ -13,8 +13,8 @@ from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.finding.frames import GROUND
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible
 from ephs.semantics.spaces import SE3, se3
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix

@@ -19,7 +19,7 @@ from ephs.mechanics.scene.polytope import (
     largest_hull,
     triangles_of,
 )
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 LOSS, SLIP, FRICTION, SINKING = 1.0, 1e-2, 1.0, 0.02
 """Loss in s/m, slip velocity in m/s, coefficient of friction, and time constant τ in s."""

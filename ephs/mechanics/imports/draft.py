@@ -11,7 +11,7 @@ from ephs.mechanics.scene.errors import Fault, legible
 from ephs.mechanics.scene.geometry import frame_rotation
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.text import MESHES
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix

@@ -7,7 +7,7 @@ from typing import Any
 from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 def named(root: FileElement, tag: str, faults: list[Fault]) -> dict[str, FileElement]:

@@ -22,7 +22,7 @@ from ephs.mechanics.imports.mjcf_shapes import shapes
 from ephs.mechanics.imports.mjcf_source import Source
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 

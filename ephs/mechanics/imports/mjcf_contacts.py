@@ -20,7 +20,7 @@ from ephs.mechanics.imports.mjcf_keys import Compiled, disabled
 from ephs.mechanics.imports.mjcf_names import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 FINE = f"contacts but those with planes, of meshes with more than {MOST_FACETS} faces and edges"
 

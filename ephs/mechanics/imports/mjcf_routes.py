@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_names import Names
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 MEETING = 1e-9
 """Length of a segment between two bodies, relative to the whole, below which it has no direction."""

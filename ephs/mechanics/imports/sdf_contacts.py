@@ -13,7 +13,7 @@ from ephs.mechanics.imports.sdf_frames import Scope, is_true, read_pose
 from ephs.mechanics.imports.sdf_keys import COLLISION
 from ephs.mechanics.imports.xml import numbers
 from ephs.mechanics.scene.errors import fault
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 
 RIGID = 1e12

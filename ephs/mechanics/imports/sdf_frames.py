@@ -13,7 +13,7 @@ from ephs.mechanics.imports.elements import named
 from ephs.mechanics.imports.file_element import FileElement
 from ephs.mechanics.imports.xml import MOST_LEVELS, numbers
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 
 MODEL, GROUND, INSIDE = "__model__", "world", "::"

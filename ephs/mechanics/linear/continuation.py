@@ -13,7 +13,7 @@ import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.scene import freedoms_of
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import eigenvalues, svd
 
 SAME = 1e-12

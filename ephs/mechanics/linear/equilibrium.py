@@ -12,13 +12,13 @@ from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.errors import AssemblyError
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.decompositions import metric_eigen
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, Outcome, SimulationError, SolveError
 from ephs.solve.threads import in_one_thread
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.dynamics import Dynamics, State
     from ephs.mechanics.runs.assembling import FlatJoints
-    from ephs.semantics.descriptor import Descriptor
+    from ephs.semantics.descriptor.descriptor import Descriptor
 
 SAMPLES = 257
 """Number of instants of the first second at which a prescribed motion is asked for its rate."""

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Reference
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.threads import in_one_thread
 

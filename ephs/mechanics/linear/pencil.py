@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.runs.simulate import problem_of_system
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.stored import guessed_efforts

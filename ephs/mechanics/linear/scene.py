@@ -20,7 +20,7 @@ from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import GROUND, Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat

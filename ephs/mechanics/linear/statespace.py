@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.mechanics.linear.modes import Complex, Mode, modes_of
 from ephs.mechanics.linear.structure import Law, PortHamiltonian, Sizes, laws_of
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 
 ROUNDING = 1e-12

@@ -15,12 +15,12 @@ from ephs.mechanics.linear.pencil import Parts, Pencil, system_problem
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares, pseudoinverse, svd, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, failing_at
 from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Model

@@ -19,7 +19,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.loop import FINAL

@@ -14,7 +14,7 @@ from ephs.mechanics.methods import tableaux as t
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.march import STEPS

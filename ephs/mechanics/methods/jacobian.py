@@ -11,11 +11,11 @@ from ephs.mechanics.tree.engine.tangents import evaluated
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import SPRING
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.relations import entry_of
-from ephs.semantics.kept import once
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.stage import Program
+from ephs.semantics.systems.kept import once
 from ephs.solve.snapshot import Snapshot, like, parts
 
 RELATIVE = 2e-8

@@ -10,7 +10,7 @@ from ephs.mechanics.methods.stages import Kept
 from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import within
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.control import Proportional
 from ephs.solve.errors import LARGEST, Outcome, SolveError

@@ -15,7 +15,7 @@ from ephs.mechanics.methods.marching import March, Rival
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import Kept, Stages
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.methods.collocation import radau
 from ephs.solve.snapshot import Snapshot

@@ -17,7 +17,7 @@ from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.stages import evaluated
 from ephs.mechanics.tree.finding.roles import strikes
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.irreversible import Irreversible
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound

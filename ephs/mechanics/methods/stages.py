@@ -13,7 +13,7 @@ from scipy.linalg import lu_solve
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton

@@ -18,7 +18,7 @@ from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.mechanics.tree.finding.tables import CUT
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ephs.mechanics.scene.geometry import Coupling
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.elements.strain import displacement, logarithm, mean_stress
 from ephs.mechanics.scene.flexible import Beam
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

@@ -18,7 +18,7 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import SPANNED
 
 

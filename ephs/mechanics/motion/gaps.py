@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.motion.batch import compose, gap, product
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import Joint
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import translation
 
 

@@ -11,8 +11,8 @@ from ephs.mechanics.motion.batch import adjoint_inverse, compose, included
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, Link, LinkJoint
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Input
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import pseudoinverse, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT

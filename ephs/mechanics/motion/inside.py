@@ -9,7 +9,7 @@ from ephs.mechanics.motion.motion import BodyMotion, JointMotion, MarkerMotion, 
 from ephs.mechanics.motion.moving import Part
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.labels import Labels
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.scene.build import contact_points
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.shapes.gap import PENETRATED, Gap
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.control import SLIVER
 

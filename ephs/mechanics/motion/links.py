@@ -16,7 +16,7 @@ from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, 
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.errors import nearest_of

@@ -23,10 +23,10 @@ from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import listed
-from ephs.semantics.markup import table
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import listed
 from ephs.semantics.spaces import SE3
+from ephs.semantics.systems.markup import table
 from ephs.solve.result.dataset import Variable
 from ephs.solve.result.labels import Labels
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol, final
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 class Moving(Protocol):

@@ -10,7 +10,7 @@ from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import SI, Units, in_own_units, units_of_states
 from ephs.mechanics.scene.rescaled import freedom_units
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.solution import Solution
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Joint, Scene
 from ephs.mechanics.scene.own_units import mobility_of
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.dataset import Variable
 from ephs.solve.result.labels import POSE, TWIST, WRENCH, Labels, freedoms
 from ephs.solve.result.solution import Solution

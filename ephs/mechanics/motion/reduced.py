@@ -22,7 +22,7 @@ from ephs.mechanics.tree.equations.impulses import TWIST, Impulses
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.march import Status

@@ -18,7 +18,7 @@ import numpy as np
 from ephs.mechanics.constraints.holding import annihilator
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix

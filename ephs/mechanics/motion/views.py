@@ -18,11 +18,11 @@ from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.tree.equations.reading import JointStates
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.kept import once
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from ephs.semantics.systems.kept import once
 from ephs.solve.errors import nearest_of
 from ephs.solve.problem import State
 

@@ -17,7 +17,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.finding.mechanism import Reduced, reduce_system
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE
 from ephs.operad.disjoint import DisjointSets
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, rank_of
 from ephs.solve.errors import OptionError

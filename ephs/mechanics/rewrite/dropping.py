@@ -11,8 +11,8 @@ from ephs.mechanics.rewrite.frames import Joint, anchor, bodies, inertia_at, joi
 from ephs.mechanics.rewrite.merging import MERGE
 from ephs.mechanics.rewrite.rewrite import Draft, Rule, Site, State, StateMap, Strength
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of

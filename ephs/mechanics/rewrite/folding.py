@@ -12,9 +12,9 @@ import numpy as np
 
 from ephs.mechanics.rewrite.rewrite import Draft, Rule, Site, StateMap, Strength
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
-from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.primitives.pullback import Map, pull_back
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import IMPLICIT
 

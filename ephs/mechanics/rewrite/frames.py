@@ -12,9 +12,9 @@ import numpy as np
 from ephs.mechanics.rewrite.folding import transformations
 from ephs.mechanics.rewrite.rewrite import Draft
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Primitive, Reversible, Storage
-from ephs.semantics.pullback import pulled_ports
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
+from ephs.semantics.primitives.pullback import pulled_ports
 from ephs.semantics.spaces import SE3, Pair
 from ephs.semantics.spaces.rotations import matrix_to_quaternion
 

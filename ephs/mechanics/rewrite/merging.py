@@ -14,10 +14,10 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.rewrite.frames import Body, bodies, inertia_at, joint_at
 from ephs.mechanics.rewrite.rewrite import Draft, Rule, Site, State, StateMap, Strength
 from ephs.operad import Path, quantity
-from ephs.semantics import structures
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.primitives import Irreversible, Point, Reversible, Storage, power_ports
-from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.primitives import Irreversible, Point, Reversible, Storage, power_ports
+from ephs.semantics.primitives.pullback import Map, pull_back
 from ephs.semantics.spaces import SE3
 from ephs.semantics.verdicts.verdict import Condition
 

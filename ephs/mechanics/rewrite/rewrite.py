@@ -11,10 +11,10 @@ from typing import final
 
 from ephs.operad import Directory, Path, Pattern, PortType
 from ephs.operad.parts import Junction, Port
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.primitives import Primitive, Storage
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.primitives.primitives import Primitive, Storage
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 
 State = Mapping[Path, Array]

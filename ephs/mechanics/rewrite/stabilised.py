@@ -5,9 +5,9 @@ from ephs.mechanics.elements.components import holonomic
 from ephs.mechanics.rewrite.frames import CONSTRAINED, bodies, inertia_at, joint_at
 from ephs.mechanics.rewrite.rewrite import Draft
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.systems.system import System
 
 NAME = "stabilised"
 

@@ -19,13 +19,13 @@ from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
 from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.primitives import Reversible
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.result.solution import Solution
 
 TENSION_SPRINGS = ("tension_spring", "slack_spring")

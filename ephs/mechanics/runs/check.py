@@ -14,12 +14,12 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units, mobility_of
 from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import ROOT, Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.laws import Probe, system_law
-from ephs.semantics.report import DOUBTS, CheckItem, CheckReport, check_assembly, check_structure, check_types
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.spaces.rank import ASSEMBLY
-from ephs.semantics.system import System
+from ephs.semantics.systems.laws import Probe, system_law
+from ephs.semantics.systems.report import DOUBTS, CheckItem, CheckReport, check_assembly, check_structure, check_types
+from ephs.semantics.systems.system import System
 from ephs.solve.auditing.audit import LAWFUL
 from ephs.solve.errors import SolveError
 from ephs.solve.problem import Problem

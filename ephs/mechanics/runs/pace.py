@@ -15,7 +15,7 @@ from ephs.solve.problem import NO_STATE
 if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
     from ephs.operad import Quantity
-    from ephs.semantics.bundle import Array
+    from ephs.semantics.bundles.bundle import Array
     from ephs.solve.problem import Problem, Signal
 
 TURN = 0.1

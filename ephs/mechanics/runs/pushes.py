@@ -12,8 +12,8 @@ from ephs.mechanics.scene.build import component_path, element_inputs, tension_p
 from ephs.mechanics.scene.flexible import Load
 from ephs.mechanics.scene.model import Marker, Scene
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError, listed
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.problem import Signal, State
 

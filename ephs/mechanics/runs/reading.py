@@ -16,8 +16,8 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units
 from ephs.mechanics.scene.soundness import check_scene, meshes_within
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.system import System
 from ephs.solve.ending import solution_of
 from ephs.solve.errors import OptionError
 from ephs.solve.journal import MAGIC, read_journal

@@ -8,8 +8,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, Setting, chosen
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.growth import Again
 from ephs.solve.breakpoints import Breakpoints

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.probe import Asked

@@ -36,12 +36,12 @@ from ephs.mechanics.scene.own_units import in_own_units, seen_from
 from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path, Pattern
 from ephs.operad.collector import paused_collector
-from ephs.semantics import extents
-from ephs.semantics.bundle import Reference
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.kept import once
-from ephs.semantics.primitives import Irreversible
-from ephs.semantics.system import System
+from ephs.semantics.bundles import extents
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.primitives.primitives import Irreversible
+from ephs.semantics.systems.kept import once
+from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import random_efforts
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.findings import POLICIES, judged

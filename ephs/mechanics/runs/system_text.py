@@ -6,10 +6,10 @@ from dataclasses import asdict
 from typing import Any
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Reference
-from ephs.semantics.documents import to_dict_in_order
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.documents.systems import to_dict_in_order
+from ephs.semantics.systems.system import System
 from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
 from ephs.solve.problem import Signal
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, LIGHT

@@ -19,7 +19,7 @@ from ephs.mechanics.scene.kinematics import Link, Scale, at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 

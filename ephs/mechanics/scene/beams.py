@@ -29,7 +29,7 @@ from ephs.mechanics.scene.schema_touching import ContactLawEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import TINY

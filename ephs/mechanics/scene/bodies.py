@@ -23,7 +23,7 @@ from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.motion_law import MotionLaw
 
 IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])

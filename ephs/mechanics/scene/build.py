@@ -25,11 +25,11 @@ from ephs.mechanics.scene.tendons import tendon_ports, tendon_starts, tendon_sys
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.kept import once
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import SE3, translation
-from ephs.semantics.system import Filling, System
+from ephs.semantics.systems.kept import once
+from ephs.semantics.systems.system import Filling, System
 from ephs.solve.problem import Signal
 
 

@@ -8,8 +8,8 @@ from ephs.mechanics.scene.build import component_path, initial_state, scene_syst
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 
 NEAR = 1e-6
 """Largest difference of an element's start from a state that it goes on from, relative to one plus its size."""

@@ -18,7 +18,7 @@ from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.schema_numbers import Entry
 from ephs.mechanics.scene.units import dimension, written
 from ephs.operad import Path, PatternError
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.site import Site

@@ -9,7 +9,7 @@ from ephs.mechanics.scene.element import AXIS, ENVIRONMENT
 from ephs.mechanics.scene.schema_numbers import Couple, NonNegative, Number, Positive, Sizes, Text
 from ephs.mechanics.scene.site import Site
 from ephs.operad import quantity
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Final, Self, TypeVar, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 T = TypeVar("T")
 GROUND = "ground"

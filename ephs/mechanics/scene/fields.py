@@ -26,7 +26,7 @@ from ephs.mechanics.scene.model import (
 from ephs.mechanics.scene.motions import changed, number_of_law
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.surfaces import Contact
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues

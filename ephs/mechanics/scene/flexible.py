@@ -7,7 +7,7 @@ from typing import Annotated, final
 import numpy as np
 
 from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Measured, Named, Number, SceneElement, frozen
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

@@ -10,7 +10,7 @@ import numpy as np
 
 from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
 
 

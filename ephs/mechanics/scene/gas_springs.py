@@ -10,7 +10,7 @@ from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import AXIS, ENVIRONMENT
 from ephs.mechanics.scene.schema_numbers import NonNegative, Number, Positive, Text
 from ephs.mechanics.scene.site import Site
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

@@ -10,7 +10,7 @@ from ephs.mechanics.scene.custom import Element, key, rule
 from ephs.mechanics.scene.element import ENVIRONMENT
 from ephs.mechanics.scene.schema_numbers import Names, NonNegative, Number, Numbers, Text
 from ephs.mechanics.scene.site import Site
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 ROUNDED = 1e-12
 """Difference of initial rates that gears may leave, relative to what is added: theirs are written in decimals."""

@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Joint
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.codes import SE3 as SE3_CODE

@@ -13,7 +13,7 @@ from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 if TYPE_CHECKING:
-    from ephs.semantics.bundle import Array
+    from ephs.semantics.bundles.bundle import Array
 
 
 def mass_and_moments(table: Checked[BodyEntry], key: str, faults: list[Fault]) -> tuple[float, list[float]] | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.values import TOLERANCE
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen, symmetric_eigenvalues
 
 TINY = 1e-11

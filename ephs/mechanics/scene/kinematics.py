@@ -14,7 +14,7 @@ import numpy as np
 
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.model import IDENTITY_POSE
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 

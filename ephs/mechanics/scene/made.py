@@ -14,8 +14,8 @@ from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ENVIRONMENT, Body, Joint, Spring
-from ephs.semantics.bundle import Array
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.system import System
 
 NOT_OF_SYSTEM = frozenset(
     {"name", "body1", "body2", "heat", "drive", "motion", "coordinate", "rate", "armature"}

@@ -19,7 +19,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap
 from ephs.mechanics.scene.model import Scene, frozen, mapped
 from ephs.mechanics.scene.state import Snapshot, rebuilt
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of

@@ -23,8 +23,8 @@ from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.motors import Motor
 from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.semantics.bundle import Array
-from ephs.semantics.kept import Kept
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.kept import Kept
 
 if TYPE_CHECKING:
     from ephs.semantics import System

@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.mechanics.scene.flexible import Load, Tendon
 from ephs.mechanics.scene.model import GROUND, Scene, Spring, World, frozen, mapped
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces import rotations as so3
 

@@ -18,10 +18,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
 from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.kept import once
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.spaces import Pair, pair
+from ephs.semantics.systems.kept import once
 from ephs.solve.events import Event
 from ephs.solve.instant import Mobility
 from ephs.solve.mobility import mobility

@@ -21,10 +21,10 @@ from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, 
 from ephs.mechanics.scene.fields import FIELDS, Field, fields_of, placed
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.registry import REGISTERED
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.primitives import Irreversible, Reversible, Storage
-from ephs.semantics.system import Filling, System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.systems.system import Filling, System
 
 Model = TypeVar("Model", Scene, System)
 _INDEX = re.compile(r"((?:\[\d+\])*)$")

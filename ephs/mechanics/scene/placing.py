@@ -10,7 +10,7 @@ from ephs.mechanics.scene.entries import Checked, shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import ROUND, UNIVERSAL, frame_rotation, unit
 from ephs.mechanics.scene.schema import FrameEntry, JointEntry
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ALIGNED
 

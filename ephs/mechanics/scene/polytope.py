@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ephs.mechanics.shapes.hull import hull_of
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 MOST_BYTES = 20_000_000
 MOST_VERTICES = 256

@@ -11,7 +11,7 @@ from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float = 1.0) -> Scene:

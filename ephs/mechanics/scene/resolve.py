@@ -24,7 +24,7 @@ from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry
 from ephs.mechanics.scene.text import MESHES
 from ephs.mechanics.shapes.dry import Dry
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.motion_law import MotionLaw
 
 

@@ -15,7 +15,7 @@ from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.scene.site import Level, Site, built
 from ephs.operad import PatternError
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 
 _ERRORS = (SemanticsError, PatternError, ValueError, ArithmeticError)
 

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.schema_flexible import SectionEntry
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
 NEEDED = {"reissner": NUMBERS, "kirchhoff": ("GJ", "EI", "rhoA", "rhoI"), "string": ("rhoA",)}

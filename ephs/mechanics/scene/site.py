@@ -12,13 +12,13 @@ from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, SINGLE
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.operad import Path, Quantity, junction, quantity
 from ephs.semantics import library
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.kept import once
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.system import Filling, System
+from ephs.semantics.systems.kept import once
+from ephs.semantics.systems.system import Filling, System
 from ephs.solve.problem import Signal
 
 if TYPE_CHECKING:

@@ -21,11 +21,11 @@ from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.tree import spanning_hops
-from ephs.semantics.bundle import Array
-from ephs.semantics.initial import saved_at
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
+from ephs.semantics.systems.initial import saved_at
 
 MOVED = 1e-12
 """Least reported change of a body's state in m, rad, m/s, rad/s: rounding of poses of size one."""

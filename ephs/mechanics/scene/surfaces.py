@@ -7,7 +7,7 @@ from typing import Annotated, Any, final
 from ephs.mechanics.scene.element import POSE, Named, SceneElement
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

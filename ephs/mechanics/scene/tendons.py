@@ -13,10 +13,10 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, frozen
 from ephs.mechanics.scene.resolve import Names
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rank import ASSEMBLY
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 
 
 def resolve_tendons(

@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.mechanics.scene.entries import shown
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 
 TOLERANCE = 1e-9

@@ -15,9 +15,9 @@ from ephs.mechanics.sensitivity.family import Family, relation_of
 from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL
 from ephs.mechanics.tree.engine.adjoints import StepAdjoint
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.methods.own import Method
 from ephs.solve.sparse import Index

@@ -21,7 +21,7 @@ from ephs.mechanics.tree.sweeps.charts import TIE
 from ephs.mechanics.tree.sweeps.cuts import Cut
 from ephs.mechanics.tree.sweeps.records import Link
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.stage import Table
 from ephs.solve.errors import OptionError, SolveError

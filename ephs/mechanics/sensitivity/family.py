@@ -17,12 +17,12 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.tree.finding.roles import strikes
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.relations import entry_of
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.errors import StructureError
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.stage import Program
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.problem import Problem
 

@@ -10,10 +10,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.mechanics.sensitivity.sensitivity import Sensitivity, sensitivity
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.result.solution import Solution
 from ephs.solve.threads import in_one_thread

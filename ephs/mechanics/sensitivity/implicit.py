@@ -14,8 +14,8 @@ import numpy as np
 
 from ephs.mechanics.sensitivity.family import Family, difference, relation_of, same_shape
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY

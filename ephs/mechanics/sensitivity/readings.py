@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sweep.outputs import outputs_of
-from ephs.semantics.bundle import Array
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
 from ephs.solve.result.solution import Solution
 

@@ -11,8 +11,8 @@ from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import CENTRAL, Family, Parameter, difference
 from ephs.mechanics.sensitivity.readings import reading_of
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, failing_at, nearest_of
 from ephs.solve.methods.own import Method
 from ephs.solve.result.replay import replay

@@ -5,7 +5,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.errors import StructureError
 
 
 @final

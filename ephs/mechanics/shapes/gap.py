@@ -13,10 +13,10 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.mechanics.shapes.selecting import Vector, chosen, most, moved
+from ephs.semantics.bundles.support import Support
 from ephs.semantics.derive.functions import TINY
+from ephs.semantics.primitives.special import choose
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.special import choose
-from ephs.semantics.support import Support
 
 UPRIGHT: Final = 1e-3
 """Inclination in rad below which a circle counts as flat: its gap is larger by this part of the radius at the most."""

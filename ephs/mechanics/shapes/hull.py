@@ -7,7 +7,7 @@ from typing import Final, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 
 FLAT: Final = 1e-5

@@ -6,7 +6,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.shapes.gap import Gap
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.errors import StructureError
 
 STUCK = 1e-9
 """Slip velocity in m/s of contacts that stick, to rounding."""

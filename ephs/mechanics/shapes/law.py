@@ -7,8 +7,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.shapes.gap import ramp
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.functions import TINY
-from ephs.semantics.errors import StructureError
 
 
 @final

@@ -27,8 +27,8 @@ from ephs.mechanics.shapes.gap import (
 from ephs.mechanics.shapes.hull import Hull, hull_of, inside_of
 from ephs.mechanics.shapes.selecting import Vector
 from ephs.mechanics.shapes.solids import Body, cylinder, faces, meeting, point, polyhedron, rim, segment, side
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.spaces import SE3
 
 Touch = tuple[Array, Array, Gap]

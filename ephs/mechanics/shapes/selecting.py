@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ephs.semantics.special import choose
+from ephs.semantics.primitives.special import choose
 
 Vector = tuple[Any, Any, Any]
 """Components of a vector."""

@@ -25,8 +25,8 @@ from ephs.mechanics.shapes.gap import (
 from ephs.mechanics.shapes.hull import Hull, around
 from ephs.mechanics.shapes.selecting import Vector, chosen, least, most, moved
 from ephs.semantics.derive.functions import TINY
+from ephs.semantics.primitives.special import choose, root
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.special import choose, root
 
 LEANING: Final = 1e-7
 """Inclination in rad below which the direction in which an axis leans is smooth."""

@@ -24,7 +24,7 @@ from ephs.mechanics.sweep.outputs import Output
 from ephs.mechanics.sweep.suspicion import INSTANTS, LONGER, resolved, suspicious
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import TREE
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.control import ATOL, RTOL, Control, first_step

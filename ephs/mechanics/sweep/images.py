@@ -23,8 +23,8 @@ from ephs.mechanics.scene.own_units import SI, Units
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.errors import SolveError
 from ephs.solve.sparse import Index
 

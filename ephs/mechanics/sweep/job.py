@@ -17,13 +17,13 @@ from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble
 from ephs.mechanics.sweep.images import FAULTS
 from ephs.mechanics.sweep.outputs import Output
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError, SemanticsError
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError, SemanticsError
 from ephs.solve.errors import Interrupted, SimulationError
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
-    from ephs.semantics.system import System
+    from ephs.semantics.systems.system import System
 
 DONE = "done"
 """The status of a member that ran to the end."""

@@ -12,7 +12,7 @@ import numpy as np
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.sweep.images import Truths
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.repeating import Repeated
 from ephs.solve.march import Account, Control, Ending
 from ephs.solve.sparse import Index

@@ -7,7 +7,7 @@ instants, the entropy made in its steps, and at constant steps the distance from
 import numpy as np
 
 from ephs.mechanics.sweep.images import Truths
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.auditing.audit import MOTION, Bounds
 from ephs.solve.auditing.growth import apart
 from ephs.solve.problem import Problem

@@ -15,7 +15,7 @@ from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.job import DONE, Batch, Job
 from ephs.mechanics.sweep.outputs import outputs_of
-from ephs.semantics.errors import listed
+from ephs.semantics.bundles.errors import listed
 from ephs.solve.errors import OptionError, number_of
 from ephs.solve.sparse import Index
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from ephs.semantics.system import System
+    from ephs.semantics.systems.system import System
 
 NOT_RUN = "not run"
 """Status of members not run because of an interruption."""

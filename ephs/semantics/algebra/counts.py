@@ -6,8 +6,8 @@ from typing import final
 
 from ephs.operad import Algebra, AlgebraMap, Interface, Path, Pattern
 from ephs.semantics.algebra.free import meaning
-from ephs.semantics.primitives import Primitive, Storage
-from ephs.semantics.system import Filling
+from ephs.semantics.primitives.primitives import Primitive, Storage
+from ephs.semantics.systems.system import Filling
 
 
 @final

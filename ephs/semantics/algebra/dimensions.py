@@ -11,7 +11,7 @@ from typing import TypeAlias, final
 from ephs.operad import ROOT, Algebra, Interface, Path, Pattern, Quantity
 from ephs.operad.names import PathLike
 from ephs.operad.units import dimension
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning import LinearRelation, glued
 from ephs.semantics.meaning.fields import Rational
 from ephs.semantics.meaning.functor import Theory

@@ -13,7 +13,7 @@ from typing import TypeAlias, final
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Lax, Path, Pattern
 from ephs.operad.names import PathLike
 from ephs.semantics.algebra.rational import Coordinate, ExactRelation, exact_relations
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 
 Node: TypeAlias = tuple[Path, int]
 """A port or junction, and the place in its vectors of flows and efforts."""

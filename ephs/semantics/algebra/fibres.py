@@ -9,11 +9,11 @@ import numpy as np
 from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern, PortType
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.algebra.free import systems
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
 from ephs.semantics.meaning import Relation, relation_of
 from ephs.semantics.meaning.relation import Renamed
-from ephs.semantics.primitives import Irreversible
-from ephs.semantics.system import Filling
+from ephs.semantics.primitives.primitives import Irreversible
+from ephs.semantics.systems.system import Filling
 from ephs.semantics.verdicts.checks import random_point
 
 Meaning: TypeAlias = Relation | Filling

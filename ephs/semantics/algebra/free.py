@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
-from ephs.semantics.primitives import Primitive
-from ephs.semantics.system import Filling, System, as_system
+from ephs.semantics.primitives.primitives import Primitive
+from ephs.semantics.systems.system import Filling, System, as_system
 
 T = TypeVar("T")
 

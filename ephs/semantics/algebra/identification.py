@@ -8,7 +8,7 @@ from ephs.operad import Algebra, AlgebraMap, Interface, Path, Pattern
 from ephs.operad.links import closure
 from ephs.operad.names import PathLike
 from ephs.semantics.algebra.fibres import Meaning, relation_for, relations
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning.partition import pushout
 
 

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, final
 
 from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
 from ephs.semantics.algebra.duals import Dual
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning.partition import pushout
 
 State: TypeAlias = frozenset[Path]

@@ -1,6 +1,6 @@
 """Relations whose numbers are matrices of any size, or a pose: programs compiled once for all of them.
 
-They have the arguments of `ephs.semantics.kernel_table`.
+They have the arguments of `ephs.semantics.descriptor.kernel_table`.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """The discrete relation of an element from its tape: a storage's efforts over a step, others' flows and conditions.
 
-They have the arguments of `ephs.semantics.kernel_table`. The Jacobian comes from the same function, run with numbers
-that know their partial derivatives.
+They have the arguments of `ephs.semantics.descriptor.kernel_table`. The Jacobian comes from the same function, run
+with numbers that know their partial derivatives.
 """
 
 from collections.abc import Callable
@@ -194,7 +194,7 @@ def sizes(relation: Relation) -> dict[str, int]:
 
 @cache
 def program(relation: Relation) -> Program:
-    """The program of a relation; its entry `value` has the signature of `ephs.semantics.kernel_table`."""
+    """The program of a relation; its entry `value` has the signature of `ephs.semantics.descriptor.kernel_table`."""
     return _program(relation, _with_derivatives, name="element")
 
 

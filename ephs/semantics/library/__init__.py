@@ -13,11 +13,10 @@ import numpy as np
 
 from ephs.operad import Directory, Interface, PortType, Quantity, quantity
 from ephs.operad.messages import nearest_of
-from ephs.semantics import formulas
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.linear import Linear
-from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import coupled, dissipated, stored
 from ephs.semantics.library import chemistry as chemistry
+from ephs.semantics.library import formulas
 from ephs.semantics.library.chemistry import ideal_mixture, reaction
 from ephs.semantics.library.hydraulics import conduit, inertance, laminar_leak, orifice, pipe_loss, tank
 from ephs.semantics.library.made import finite, non_negative, positive
@@ -30,8 +29,9 @@ from ephs.semantics.library.magnetics import (
     winding,
 )
 from ephs.semantics.library.units import fmu as fmu
-from ephs.semantics.primitives import Formula, Irreversible, Kernel, Reversible, Storage, power_ports
-from ephs.semantics.structures import constant_structure, dissipation, exponential, quadratic
+from ephs.semantics.primitives.forms import coupled, dissipated, stored
+from ephs.semantics.primitives.primitives import Formula, Irreversible, Kernel, Reversible, Storage, power_ports
+from ephs.semantics.primitives.structures import constant_structure, dissipation, exponential, quadratic
 
 __all__ = [
     "capacitor",

@@ -17,12 +17,12 @@ from typing import Any, Literal, final
 import numpy as np
 
 from ephs.operad import Directory, Interface, PortType, Quantity, quantity
-from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import dissipated, stored
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.library.made import finite, positive
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.primitives.forms import dissipated, stored
+from ephs.semantics.primitives.primitives import Irreversible, Storage
+from ephs.semantics.primitives.special import log_mean
 from ephs.semantics.spaces.decompositions import least_squares
-from ephs.semantics.special import log_mean
 
 __all__ = [
     "GAS_CONSTANT",

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import quantity
-from ephs.semantics.forms import dissipated, stored
 from ephs.semantics.library.made import non_negative, positive
-from ephs.semantics.primitives import Irreversible, Reversible, Storage, power_ports
-from ephs.semantics.structures import constant_structure
+from ephs.semantics.primitives.forms import dissipated, stored
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage, power_ports
+from ephs.semantics.primitives.structures import constant_structure
 
 __all__ = ["conduit", "inertance", "laminar_leak", "orifice", "pipe_loss", "tank"]
 

@@ -2,7 +2,7 @@
 
 import math
 
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.errors import StructureError
 
 __all__ = ["finite", "non_negative", "positive"]
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Quantity, quantity
-from ephs.semantics.forms import stored
 from ephs.semantics.library.made import positive
-from ephs.semantics.primitives import Reversible, Storage, power_ports
-from ephs.semantics.structures import constant_structure
+from ephs.semantics.primitives.forms import stored
+from ephs.semantics.primitives.primitives import Reversible, Storage, power_ports
+from ephs.semantics.primitives.structures import constant_structure
 
 __all__ = ["coil", "magnetic_series", "reluctance", "saturating_inductor", "saturating_reluctance", "winding"]
 

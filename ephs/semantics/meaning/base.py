@@ -12,13 +12,13 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Path, Pattern, Quantity
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.initial import read_state
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.meaning.fields import ROUNDED, Field, Rounded
 from ephs.semantics.meaning.partition import pushout
-from ephs.semantics.primitives import Point, Primitive, Storage
+from ephs.semantics.primitives.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.systems.initial import read_state
 
 Values = Mapping[str, object] | Mapping[Path, object] | Mapping[Path, Array]
 """Values of states by path."""

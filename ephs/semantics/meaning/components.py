@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import ROOT, Path, Quantity
-from ephs.semantics.bundle import Array, Bundle
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.given import defined
+from ephs.semantics.bundles.bundle import Array, Bundle
+from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.bundles.given import defined
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable, at_port, own
-from ephs.semantics.primitives import Primitive, Reversible, Storage
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 
 TURNING = {"se(3)": 3, "so(3)xr3": 3, "free": 3, "cylindrical": 1, "planar": 1}
 """Number of angular coordinates, which come first, by lower-case name of the space; the others are lengths."""

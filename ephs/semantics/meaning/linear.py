@@ -10,7 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.meaning.elimination import echelon, eliminated, reduced
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.variables import ONE, Variable

@@ -13,17 +13,17 @@ from typing import Any, Protocol, TypeAlias, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.tape import evaluate
-from ephs.semantics.differences import slope
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.components import efforts_of, rates_of
 from ephs.semantics.meaning.elimination import eliminated
 from ephs.semantics.meaning.fields import ROUNDED, Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable
-from ephs.semantics.primitives import Point, Primitive, Storage
+from ephs.semantics.primitives.differences import slope
+from ephs.semantics.primitives.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.rank import DIFFERENCE
 from ephs.semantics.stage.duals import Duals

@@ -16,8 +16,8 @@ from typing import Any, Literal, Protocol, TypeAlias, final
 import numpy as np
 
 from ephs.operad import ROOT, Algebra, Directory, Interface, Path, Pattern
-from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.errors import AssemblyError, SemanticsError, listed
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.errors import AssemblyError, SemanticsError, listed
 from ephs.semantics.meaning.base import BasePoint, StateClass, Values, component_classes, glued_classes, names_of, place
 from ephs.semantics.meaning.components import at_instant, at_ports, efforts_of
 from ephs.semantics.meaning.fields import ROUNDED, Field, Rational, Rounded
@@ -25,8 +25,8 @@ from ephs.semantics.meaning.functor import glued, relation_of_pattern
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
 from ephs.semantics.meaning.variables import ONE, Variable, into, own
-from ephs.semantics.primitives import Primitive, Storage
-from ephs.semantics.system import Filling, as_system, fold, require_fillings
+from ephs.semantics.primitives.primitives import Primitive, Storage
+from ephs.semantics.systems.system import Filling, as_system, fold, require_fillings
 
 Route: TypeAlias = Literal["flat", "nested"]
 Numbers: TypeAlias = Literal["float", "rational"]

@@ -12,11 +12,9 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
-from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.descriptor import Input
-from ephs.semantics.differences import slope
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.meaning.base import Values, names_of, place
 from ephs.semantics.meaning.components import at_ports, efforts_of
 from ephs.semantics.meaning.fields import Field, Rounded, Row
@@ -24,11 +22,13 @@ from ephs.semantics.meaning.functor import glued
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.relation import relation_of
 from ephs.semantics.meaning.variables import ONE, Variable, at_port, own
-from ephs.semantics.primitives import Primitive, Reversible, Storage
+from ephs.semantics.primitives.behaviour import Continuous, Natural, Relating, Storing
+from ephs.semantics.primitives.differences import slope
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.semantics.system import Filling, System, as_system, fold
+from ephs.semantics.systems.system import Filling, System, as_system, fold
 
 ITERATIONS, STUCK = 30, 4
 """Iterations at most, and in how many the least remainder must have halved: else there is no solution near by."""

@@ -13,13 +13,13 @@ from itertools import pairwise
 from typing import Literal, final
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.errors import SemanticsError
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.symbols.algebra import Expr, sp, text_of
 from ephs.semantics.symbols.elimination import coefficient_of, eliminate, settled, tidy
 from ephs.semantics.symbols.voices import say
 from ephs.semantics.symbols.words import curved, escaped, operator
 from ephs.semantics.symbols.writer import Junction, Parts, Writer, parts_of
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 
 Form = Literal["relation", "descriptor", "reduced"]
 

@@ -1,4 +1,4 @@
-"""SymPy's counterparts of `ephs.semantics.special`: derivatives, signs, and printing."""
+"""SymPy's counterparts of `ephs.semantics.primitives.special`: derivatives, signs, and printing."""
 
 from typing import Any
 

@@ -10,9 +10,9 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.forms import stacked
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.forms import stacked
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.calculus import TEMPERATURE, intensive
 from ephs.semantics.symbols.tracing import Untraceable, trace

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import NamedTuple, final
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.calculus import PRESSURE, TEMPERATURE
 from ephs.semantics.symbols.voices import Said, Voice, say
 from ephs.semantics.symbols.words import Words, plain
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 
 
 class Junction(NamedTuple):

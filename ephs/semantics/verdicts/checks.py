@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Bundle
-from ephs.semantics.errors import StructureError
-from ephs.semantics.extents import into
+from ephs.semantics.bundles.bundle import Array, Bundle
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.bundles.extents import into
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.verdicts.trials import ROTATING, Trial
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage
+    from ephs.semantics.primitives.primitives import Irreversible, Point, Primitive, Reversible, Storage
 
 SAME = 1e-9
 """Relative tolerance for equality of two structures, which are functions evaluated twice."""

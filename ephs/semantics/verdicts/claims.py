@@ -14,7 +14,7 @@ from ephs.semantics.symbols.terms import Term, recorded
 from ephs.semantics.verdicts.trials import extent
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Primitive
+    from ephs.semantics.primitives.primitives import Primitive
 
 
 @final
@@ -88,7 +88,7 @@ def claim_of(primitive: "Primitive", signs: Mapping[str, int]) -> Claim:
     Untraceable
         The formula needs numbers.
     """
-    from ephs.semantics.forms import stacked
+    from ephs.semantics.primitives.forms import stacked
 
     formula, bundle = primitive.formula, primitive.bundle
     assert formula is not None

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.meaning.components import constant_relation
 from ephs.semantics.meaning.fields import ROUNDED, Rational
 from ephs.semantics.spaces.rank import TINY
@@ -23,7 +23,7 @@ from ephs.semantics.verdicts.trials import Trial
 from ephs.semantics.verdicts.verdict import Condition, Evidence
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Reversible
+    from ephs.semantics.primitives.primitives import Reversible
 
 BESIDE = 8.0 * ROUNDED
 """Rounding that products of matrices leave, relative to the largest number of the same units."""

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import Storage as Recorded
 from ephs.semantics.spaces import manifold
 from ephs.semantics.verdicts.rounding import ROUNDED, rounding, slopes_of, steps_of
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Point, Storage
+    from ephs.semantics.primitives.primitives import Point, Storage
 
 SAME = 1e-9
 """Relative difference of two formulas of one number, whose constants may be written with so few digits."""

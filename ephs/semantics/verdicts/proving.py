@@ -17,7 +17,7 @@ from ephs.semantics.verdicts.sums import Unexpandable
 from ephs.semantics.verdicts.verdict import OPEN, Condition, Evidence, as_evidence, plain
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Primitive
+    from ephs.semantics.primitives.primitives import Primitive
     from ephs.semantics.symbols.signs import Signs
 
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.recording import Recording, Untraceable, record
-from ephs.semantics.errors import StructureError
-from ephs.semantics.forms import run_tape, stacked
+from ephs.semantics.primitives.forms import run_tape, stacked
 from ephs.semantics.spaces import manifold
 from ephs.semantics.verdicts.rounding import ROUNDED, rounding, steps_of
 from ephs.semantics.verdicts.trials import (
@@ -30,7 +30,7 @@ from ephs.semantics.verdicts.trials import (
 from ephs.semantics.verdicts.verdict import Condition
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Primitive
+    from ephs.semantics.primitives.primitives import Primitive
 
 POINTS = 32
 """Points of all sizes at which a function and its record are compared."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.charts import moved
 from ephs.semantics.derive.recording import Recording
 from ephs.semantics.derive.relating import Port

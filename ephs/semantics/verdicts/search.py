@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.semantics.bundle import Reference
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.verdicts.checks import NEARER, check_at
 from ephs.semantics.verdicts.trials import (
     REFERENCES,
@@ -27,7 +27,7 @@ from ephs.semantics.verdicts.trials import (
 )
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Primitive
+    from ephs.semantics.primitives.primitives import Primitive
 
 COUNT = 400
 """Numerical trials of a structure without a proof."""

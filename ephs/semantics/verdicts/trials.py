@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, cast, final
 import numpy as np
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.spaces import SO3, codes, manifold
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Point, Primitive
+    from ephs.semantics.primitives.primitives import Point, Primitive
 
 Choose = Callable[[int], int]
 """A choice among so many: 0 is the simplest."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, cast, final
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Primitive
+    from ephs.semantics.primitives.primitives import Primitive
 
 
 Evidence: TypeAlias = "tuple[Any, ...]"

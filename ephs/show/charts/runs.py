@@ -12,8 +12,8 @@ import numpy as np
 from ephs.mechanics.methods.registry import MethodEntry
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
-from ephs.semantics.bundle import Array
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import CostWarning
 from ephs.solve.errors import Interrupted, SimulationError
 from ephs.solve.errors import Outcome as Failure

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import CLOSED
 from ephs.solve.auditing.findings import Audit, Finding
 from ephs.solve.auditing.growth import Again, GlobalError, energy_error, global_error

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.rounding import rounded
 from ephs.solve.control import SLIVER

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.primitives import Storage
+from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing.resolution import STILL
 from ephs.solve.auditing.rounding import trembling
 from ephs.solve.instant import compliance_of

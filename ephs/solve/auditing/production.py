@@ -4,8 +4,8 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Point, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible, Point, Storage
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.problem import Problem
 

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.solve.auditing.growth import Again, apart
 from ephs.solve.auditing.retaken import Retaken
 from ephs.solve.breakpoints import Breakpoints

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.kept import once
-from ephs.semantics.numbering import Index
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.descriptor.numbering import Index
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import Pair
+from ephs.semantics.systems.kept import once
 from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import compile_model
 from ephs.solve.result.states import RecordedStates

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import nearest_of
 from ephs.solve.exchange.balance import Balance
 from ephs.solve.exchange.errors import ExchangeError

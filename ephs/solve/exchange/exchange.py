@@ -6,7 +6,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import number_of
 from ephs.solve.exchange.coupling import Bond, Coupling, coupling_of
 from ephs.solve.exchange.errors import ExchangeError

@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.unit import Unit
 

@@ -4,7 +4,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.scales import NOTHING
 from ephs.solve.model import Model, evaluate_at

@@ -12,7 +12,7 @@ from typing import final
 import numpy as np
 from numpy.polynomial import Legendre
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import eigen
 
 

@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 from scipy.sparse import csc_array
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING
 from ephs.solve.methods.stored import guessed_efforts

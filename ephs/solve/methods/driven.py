@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.natural import Chunk, NaturalState
 from ephs.solve.model import Model, evaluate_at

@@ -14,8 +14,8 @@ from typing import Any, final
 import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import spans
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.stage import (
     Entry,
     Evaluator,

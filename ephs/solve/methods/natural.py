@@ -9,8 +9,8 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.kernel_table import RAISED
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.kernel_table import RAISED
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.analysis import AS_BEFORE, AT_START, WITHIN, Analysis, Decided, analyse
 from ephs.solve.methods.blame import Blame

@@ -11,11 +11,11 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.linear.sparse import sparse_lu
-from ephs.semantics.primitives import Kernel
-from ephs.semantics.pullback import pulled_ports
+from ephs.semantics.primitives.primitives import Kernel
+from ephs.semantics.primitives.pullback import pulled_ports
 from ephs.semantics.spaces.codes import SE3
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.errors import Outcome, SolveError

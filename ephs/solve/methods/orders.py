@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 Tree = tuple["Tree", ...]
 """A rooted tree: the trees at its root, in order."""

@@ -13,7 +13,7 @@ from typing import Any, Never, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError
 from ephs.solve.methods.orders import order_of, power_of
 

@@ -6,8 +6,8 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Primitive, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.solve.heats import Heats, exponential_law
 from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.model import Model

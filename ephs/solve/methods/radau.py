@@ -10,7 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.collocation import moments, radau, values

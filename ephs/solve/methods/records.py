@@ -6,14 +6,14 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import Index
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, vector
 from ephs.semantics.stage.kinds import Kind, group
 from ephs.semantics.stage.memory import Held
 
 DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
-"""Outcome of a step: COMPONENT + the value that a component's kernel returned (see `ephs.semantics.kernel_table`)."""
+"""Outcome of a step: COMPONENT + what a component's kernel returned, see `ephs.semantics.descriptor.kernel_table`."""
 
 STORING, REVERSIBLE, IRREVERSIBLE, WORKING = 0, 1, 2, 3
 """Kinds of components; a working one is reversible at an instant and does work over a step."""

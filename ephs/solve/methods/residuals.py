@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from ephs.semantics.kernel_table import SIGNATURE
+from ephs.semantics.descriptor.kernel_table import SIGNATURE
 from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector, staged
 from ephs.semantics.stage.reaching import Reached
 from ephs.solve.methods.places import Part, add_to, copy, fill

@@ -5,8 +5,8 @@ from typing import Final, Generic, TypeAlias, TypeVar, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import Index
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.stage import Integers, Matrix, Record, Vector, integer, matrix, vector
 from ephs.semantics.stage.kinds import group
 from ephs.solve.methods.collocation import moments, values

@@ -10,10 +10,10 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.linear.sums import grown
-from ephs.semantics.numbering import Index
-from ephs.semantics.primitives import Storage
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Table, Vector, real, table, vector
 from ephs.solve.errors import SolveError

@@ -13,8 +13,8 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import Index
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import Index
 from ephs.solve.errors import Outcome, SolveError
 
 DENSE = 48

@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import spans
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import spans
 from ephs.solve.errors import SolveError
 from ephs.solve.model import Evaluation, Model
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.problem import Problem, State
 from ephs.solve.result.labels import Labels, power_labels
 from ephs.solve.result.ledger import Ledgers

@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.ledger import Ledgers
 
 

@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.problem import Problem
 from ephs.solve.result.dataset import FORMAT, TIME, Content, Variable, content
 from ephs.solve.result.durable import durable

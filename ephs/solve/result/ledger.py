@@ -8,8 +8,8 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.operad.charges import ENTROPY, VOLUME
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
 from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.problem import Problem
 from ephs.solve.result.dataset import Content, Variable
 from ephs.solve.result.ledger import Ledgers, ledgers

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import listed
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import listed
 from ephs.solve.instant import instant
 from ephs.solve.problem import Signal
 

@@ -6,8 +6,8 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.solve.stepping import Instants, Row
 
 

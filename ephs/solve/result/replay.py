@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.ending import solution_of
 from ephs.solve.problem import Problem
 from ephs.solve.result.record import Record

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, final, overload
 import numpy as np
 
 from ephs.operad import ROOT, Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.events import Crossing
 from ephs.solve.problem import Linked, Motion, Problem

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from typing import final
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.pairs import Pair
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from ephs.semantics.markup import table
+from ephs.semantics.systems.markup import table
 
 if TYPE_CHECKING:
     from ephs.solve.result.entries import Entry

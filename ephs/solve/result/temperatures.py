@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import ComponentSlot, Descriptor
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor
+from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.errors import nearest_of
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from ephs.mechanics.elements.strain import displacement, logarithm, mean_stress,
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.spaces import SE3
 from ephs.testing import check_primitive
 from tests.written import scene_of_text

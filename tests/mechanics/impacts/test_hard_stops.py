@@ -7,7 +7,7 @@ import ephs
 from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.shapes.impact import Impact
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.errors import StructureError
 from tests.written import scene_of_text
 
 HARD = [name for name, method in METHODS.items() if method.impacts]

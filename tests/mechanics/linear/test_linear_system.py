@@ -11,8 +11,8 @@ from ephs.mechanics.linear.modes import modes_of
 from ephs.mechanics.linear.pencil import Pencil, system_problem
 from ephs.mechanics.linear.structure import laws_of
 from ephs.operad import quantity
-from ephs.semantics.primitives import power_ports
-from ephs.semantics.structures import constant_structure, quadratic
+from ephs.semantics.primitives.primitives import power_ports
+from ephs.semantics.primitives.structures import constant_structure, quadratic
 from ephs.testing import systems
 from examples import physics
 

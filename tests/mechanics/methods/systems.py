@@ -7,8 +7,8 @@ import numpy as np
 from ephs import Pattern
 from ephs.mechanics.scene.build import initial_state, scene_inputs, scene_system
 from ephs.operad import Path, junction
-from ephs.semantics.bundle import Reference
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.systems.system import System
 from ephs.solve.problem import Problem, Signal
 from tests.oracle import Oracle
 

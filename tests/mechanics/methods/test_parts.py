@@ -18,8 +18,8 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.finding.frames import Unplaced, inertia_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path
-from ephs.semantics import structures
-from ephs.semantics.primitives import power_ports
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.primitives import power_ports
 from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import problem_of, renamed

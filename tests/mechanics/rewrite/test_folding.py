@@ -19,12 +19,12 @@ from ephs.mechanics.rewrite.rewrite import rewrite, sites_of
 from ephs.mechanics.scene.build import scene_system
 from ephs.operad import PortType
 from ephs.semantics import StructureError
-from ephs.semantics.behaviour import Natural
-from ephs.semantics.bundle import Reference
-from ephs.semantics.kernel_table import OK, address_of, prototype
-from ephs.semantics.laws import random_probe
-from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.descriptor.kernel_table import OK, address_of, prototype
+from ephs.semantics.primitives.behaviour import Natural
+from ephs.semantics.primitives.pullback import Map, pull_back
 from ephs.semantics.spaces import PAIRS, SE3, pair
+from ephs.semantics.systems.laws import random_probe
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms

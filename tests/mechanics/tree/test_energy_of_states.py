@@ -11,8 +11,8 @@ from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import initial_state, scene_system
 from ephs.operad import quantity
-from ephs.semantics.primitives import power_ports
-from ephs.semantics.structures import constant_structure, quadratic
+from ephs.semantics.primitives.primitives import power_ports
+from ephs.semantics.primitives.structures import constant_structure, quadratic
 from examples import physics
 from tests.semantics.test_chemistry import R, Species, vessel
 from tests.semantics.test_chemistry import start as filled

@@ -11,7 +11,7 @@ from ephs import quantity as Q
 from ephs.mechanics.scene.build import drive_ports, initial_state, scene_inputs, scene_system
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.operad import Path
-from ephs.semantics.system import System
+from ephs.semantics.systems.system import System
 from ephs.solve.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import nested, problem_of

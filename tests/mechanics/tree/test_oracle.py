@@ -11,7 +11,7 @@ import ephs
 from ephs import Pattern, junction, library, quantity
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.operad import Path
-from ephs.semantics.descriptor import Input
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.solve.instant import instant
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import oracle_of, problem_of

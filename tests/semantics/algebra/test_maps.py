@@ -29,7 +29,7 @@ from ephs.semantics.algebra import (
     systems,
     tangent,
 )
-from ephs.semantics.bundle import Bundle
+from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.meaning import LinearRelation, glued
 from ephs.semantics.meaning.components import at_ports
 from ephs.semantics.meaning.fields import Rounded

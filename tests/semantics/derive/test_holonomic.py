@@ -11,7 +11,7 @@ from ephs.mechanics.elements import components
 from ephs.operad import Path, PortType
 from ephs.semantics.derive.maps import Block, Maps
 from ephs.semantics.derive.relations import compiled, program, sizes
-from ephs.semantics.pullback import Map, pull_back, pulled_ports
+from ephs.semantics.primitives.pullback import Map, pull_back, pulled_ports
 from ephs.semantics.spaces import PAIRS, SE3, pair
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 

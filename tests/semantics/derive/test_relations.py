@@ -15,9 +15,9 @@ from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import compiled, program, sizes
 from ephs.semantics.derive.slopes import Slope, Slopes
 from ephs.semantics.derive.tape import OPERATIONS, evaluate
-from ephs.semantics.primitives import midpoint
+from ephs.semantics.primitives.primitives import midpoint
+from ephs.semantics.primitives.special import root
 from ephs.semantics.spaces import codes, manifold
-from ephs.semantics.special import root
 from ephs.semantics.stage import PLAIN
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 

@@ -14,7 +14,7 @@ from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer
 from ephs.semantics.meaning.relation import Instant
 from ephs.semantics.meaning.variables import ONE, Variable
-from ephs.semantics.probe import random_probe
+from ephs.semantics.systems.probe import random_probe
 from ephs.testing import fillings, nestings, systems
 from tests.semantics.scales import scaled
 

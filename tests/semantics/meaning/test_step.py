@@ -8,11 +8,11 @@ from ephs import Pattern, Reference
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.operad import Path
-from ephs.semantics.behaviour import Continuous
-from ephs.semantics.descriptor import Input
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.meaning.components import largest, process
 from ephs.semantics.meaning.fields import ROUNDED, Rounded
 from ephs.semantics.meaning.step import solved
+from ephs.semantics.primitives.behaviour import Continuous
 
 NOW = Continuous(Reference())
 

@@ -12,9 +12,9 @@ from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements.joints import mbs_pattern
 from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference
-from ephs.semantics.behaviour import Continuous
-from ephs.semantics.descriptor import Input
+from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.meaning.step import solved
+from ephs.semantics.primitives.behaviour import Continuous
 from ephs.semantics.symbols.algebra import text_of
 from ephs.semantics.symbols.words import Words, operator, pairing
 from examples import oscillator, physics

@@ -15,7 +15,7 @@ from ephs import quantity as Q
 from ephs.mechanics.elements import components
 from ephs.operad import Path
 from ephs.semantics import Reference
-from ephs.semantics.forms import storage_form
+from ephs.semantics.primitives.forms import storage_form
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text

@@ -11,7 +11,7 @@ import ephs
 from ephs import Path, Pattern
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
-from ephs.semantics.pullback import Map, pull_back
+from ephs.semantics.primitives.pullback import Map, pull_back
 from tests.semantics.test_documents import VALID, alone
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])

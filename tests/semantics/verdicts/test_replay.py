@@ -13,9 +13,9 @@ from ephs import Pattern, System, junction
 from ephs import quantity as Q
 from ephs.operad import PatternError, Space
 from ephs.semantics import Reference, library
-from ephs.semantics.primitives import Formula
+from ephs.semantics.primitives.primitives import Formula
+from ephs.semantics.primitives.special import sinhc
 from ephs.semantics.spaces import manifold
-from ephs.semantics.special import sinhc
 from ephs.semantics.symbols.bounds import signs
 from ephs.semantics.symbols.terms import OPERATIONS
 from ephs.semantics.verdicts.checks import STATEMENTS

@@ -6,7 +6,7 @@ from typing import Any, final
 
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.tangents import StepTangent, reaching, step_program
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.gradients import Gradients, Shares
 

@@ -9,7 +9,7 @@ from ephs.mechanics.tree.finding.tables import TREE, Mechanism
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
-    from ephs.semantics.bundle import Array
+    from ephs.semantics.bundles.bundle import Array
 
 Column = tuple[int, Index]
 """A column, and the rows in which it may have entries."""

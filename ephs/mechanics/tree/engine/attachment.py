@@ -8,8 +8,8 @@ import numpy as np
 
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS, Called, Net, Stores
-from ephs.semantics.bundle import Array
-from ephs.semantics.numbering import starts
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import starts
 from ephs.semantics.stage import Evaluator, Integer, Vector
 from ephs.solve.sparse import Index
 

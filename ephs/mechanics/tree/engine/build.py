@@ -21,11 +21,11 @@ from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.pack import STANDARD, Packed
 from ephs.mechanics.tree.sweeps.programs import sweeps
 from ephs.mechanics.tree.sweeps.rigid import SUMS
-from ephs.semantics.bundle import Array
-from ephs.semantics.kept import once
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program, Table
+from ephs.semantics.systems.kept import once
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.tree.engine.closing import Closing
 from ephs.mechanics.tree.engine.drags import resisting
 from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, stiff_program
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Program, Record, Table
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.march import TOTALS, Account, Control

@@ -1,7 +1,7 @@
 """Storages of heat: entropies of energies, and the entropy that a step made."""
 
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
-from ephs.semantics.kernel_table import TEMPERATURE
+from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 from ephs.solve.heats import LITTLE, PLAIN
 

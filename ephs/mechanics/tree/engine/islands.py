@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.tree.engine.links import Found
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad.disjoint import DisjointSets
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ASSEMBLY, TINY

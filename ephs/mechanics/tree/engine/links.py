@@ -10,7 +10,7 @@ from ephs.mechanics.constraints.subgroup import Subgroup, generated
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
 from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Packed, Part, packed
 from ephs.mechanics.tree.sweeps.records import Joint
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix

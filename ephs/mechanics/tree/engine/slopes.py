@@ -11,7 +11,7 @@ from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired_tables
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Evaluator, Integer, Program, Vector, vector
 from ephs.solve.sparse import Index
 

@@ -5,7 +5,7 @@ Poses are quaternions that are continuous along the motion, and bodies are those
 
 from typing import Final
 
-from ephs.semantics.kernel_table import SIGNATURE
+from ephs.semantics.descriptor.kernel_table import SIGNATURE
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import codes, se3
 from ephs.semantics.spaces.vectors import add, apply, scale

@@ -16,7 +16,7 @@ from ephs.mechanics.tree.sweeps.acting import (
     Sink,
 )
 from ephs.mechanics.tree.sweeps.grouping import Group, Middle
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Record, Table
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
 from ephs.solve.sparse import Index

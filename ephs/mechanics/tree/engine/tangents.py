@@ -16,7 +16,7 @@ from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.engine.tables import copied
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import (
     Entry,
     Evaluator,

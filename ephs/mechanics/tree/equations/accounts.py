@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.march import Status
 from ephs.solve.march.account import WORTH

@@ -10,7 +10,7 @@ from ephs.mechanics.tree.engine.heats import ROUNDING
 from ephs.mechanics.tree.engine.states import STATES, Stored
 from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.equations.paper import PaperStates
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError

@@ -12,8 +12,8 @@ from ephs.mechanics.tree.equations.residual import Residual
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.kernel_table import TEMPERATURE
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.linear.rows import row_program
 from ephs.semantics.spaces.rank import CLOSED_SINGULAR, GAP
 from ephs.solve.errors import Outcome, SolveError

@@ -27,7 +27,7 @@ from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad.collector import paused_collector
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rank import SPARSE, TINY
 from ephs.solve.control import Tolerance

@@ -10,7 +10,7 @@ from ephs.mechanics.tree.finding.frames import GROUND
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.solve.problem import Problem
 

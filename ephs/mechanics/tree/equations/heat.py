@@ -4,7 +4,7 @@ import numpy as np
 
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.sweeps.acting import Node
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.heats import Heats
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.mechanics.tree.sweeps.records import Link
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import Equations

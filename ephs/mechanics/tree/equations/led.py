@@ -12,8 +12,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.mobility import mobility
 from ephs.solve.problem import Problem
 

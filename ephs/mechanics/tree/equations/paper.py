@@ -11,7 +11,7 @@ from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, manifold
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigen
 from ephs.semantics.stage.calling import Bound

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.mechanics.tree.equations.state import ReducedState
 from ephs.mechanics.tree.finding.mechanism import Reduced
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

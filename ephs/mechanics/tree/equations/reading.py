@@ -6,7 +6,7 @@ from typing import final
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

@@ -14,7 +14,7 @@ from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.expanding import Expansion
 from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
 from ephs.mechanics.tree.sweeps.pack import STANDARD
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rank import REGULAR, TINY
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.residuals import ACTIVE
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 def evaluated(

@@ -7,7 +7,7 @@ import numpy as np
 from ephs.mechanics.rewrite.coordinates import unread
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.sweeps.cuts import Place
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 @final

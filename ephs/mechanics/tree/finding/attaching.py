@@ -14,9 +14,9 @@ from ephs.mechanics.tree.finding.parts import Parts
 from ephs.mechanics.tree.finding.spanning import Edge
 from ephs.mechanics.tree.finding.tables import SPRING, Mechanism
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.descriptor import ComponentSlot
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.descriptor.descriptor import ComponentSlot
+from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.sparse import Index
 

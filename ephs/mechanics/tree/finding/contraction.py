@@ -9,10 +9,10 @@ from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.network import Attached, Inertia, Injection, Network, Tie
 from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import StateSlot
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import StateSlot
 from ephs.semantics.linear.sums import uncancelled
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.sparse import Index
 

@@ -13,11 +13,11 @@ import numpy as np
 from ephs.mechanics.tree.finding.roles import Role, Roles, offset_of
 from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path, quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import Descriptor, StateSlot
-from ephs.semantics.kept import once
-from ephs.semantics.primitives import Primitive
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
+from ephs.semantics.primitives.primitives import Primitive
 from ephs.semantics.spaces import SE3, Pair
+from ephs.semantics.systems.kept import once
 
 GROUND = -1
 """Number of the ground among links."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.network import Network
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import ComponentSlot
-from ephs.semantics.primitives import Reversible
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import ComponentSlot
+from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.verdicts.checks import random_point
 
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.tree.finding.mechanism import Edge, Reduced
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import listed
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import listed
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN
 from ephs.solve.sparse import Index

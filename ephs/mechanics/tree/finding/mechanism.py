@@ -16,12 +16,12 @@ from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_al
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Node
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.kept import Kept, once
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.stage import Table
+from ephs.semantics.systems.kept import Kept, once
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN, exponential_law
 from ephs.solve.model import Model

@@ -4,7 +4,7 @@ import numpy as np
 
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Tolerance
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 

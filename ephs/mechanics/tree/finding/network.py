@@ -17,8 +17,8 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.descriptor import StateSlot
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import StateSlot
 
 
 @final

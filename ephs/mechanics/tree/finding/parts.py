@@ -16,8 +16,8 @@ from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.roles import Role
 from ephs.mechanics.tree.finding.spanning import Edge, islands
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.primitives import Irreversible, Primitive, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
 from ephs.solve.motion_law import MotionLaw, PolynomialMotion
 from ephs.solve.problem import Problem

@@ -6,9 +6,9 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path, quantity
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
-from ephs.semantics.pullback import pulled_ports
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.primitives.pullback import pulled_ports
 from ephs.solve.heats import exponential_law
 
 

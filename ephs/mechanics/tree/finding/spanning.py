@@ -10,7 +10,7 @@ import numpy as np
 from ephs.mechanics.constraints.subgroup import generated
 from ephs.operad import Path
 from ephs.operad.disjoint import DisjointSets
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, Pair
 from ephs.solve.motion_law import MotionLaw
 

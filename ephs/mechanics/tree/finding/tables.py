@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.sparse import Index
 
 TREE, CUT, SPRING = 0, 1, 2

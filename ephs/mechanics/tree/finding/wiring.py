@@ -7,9 +7,9 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.descriptor import ComponentSlot, Descriptor, StateSlot
-from ephs.semantics.numbering import Index, starts
-from ephs.semantics.primitives import Storage
+from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, StateSlot
+from ephs.semantics.descriptor.numbering import Index, starts
+from ephs.semantics.primitives.primitives import Storage
 
 
 @final

@@ -9,7 +9,7 @@ from ephs.mechanics.tree.sweeps.charts import Chart
 from ephs.mechanics.tree.sweeps.cuts import Place, Relative
 from ephs.mechanics.tree.sweeps.grouping import Group, Middle
 from ephs.mechanics.tree.sweeps.rigid import SUMS
-from ephs.semantics.kernel_table import SIGNATURE
+from ephs.semantics.descriptor.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
     Integer,
     Integers,

@@ -10,7 +10,7 @@ from typing import Any, Final, final
 
 import numpy as np
 
-from ephs.semantics.kernel_table import SIGNATURE
+from ephs.semantics.descriptor.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
     Evaluator,
     Integer,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.tree.sweeps.records import Joint, Link
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import codes, pair
 from ephs.semantics.stage import Table
 

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.operad import Directory, Interface, Path, PortType, Quantity
-from ephs.semantics import forms, structures
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.domains import Bounds, bounded, domain_of, within_domain
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.bundles.given import defined, finite_matrix, flat_vector, real_number, require_arguments, value_of
 from ephs.semantics.derive.recording import Untraceable
-from ephs.semantics.domains import Bounds, bounded, domain_of, within_domain
-from ephs.semantics.errors import StructureError
-from ephs.semantics.given import defined, finite_matrix, flat_vector, real_number, require_arguments, value_of
-from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
+from ephs.semantics.primitives import forms, structures
+from ephs.semantics.primitives.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
 from ephs.semantics.verdicts.checks import random_point
 
 Ports = Mapping[str, Quantity]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
 
 
 def real_number(name: str, value: Any) -> float:

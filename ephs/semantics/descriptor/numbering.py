@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.errors import AssemblyError
-from ephs.semantics.primitives import Primitive, Reversible, Storage
-from ephs.semantics.system import System
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
+from ephs.semantics.systems.system import System
 
 Index = NDArray[np.int64]
 T = TypeVar("T", bound=Hashable)

@@ -12,17 +12,17 @@ from ephs.operad import Directory, Interface, Path, PortType
 from ephs.operad.documents import domain_from, domain_record, port_from, port_record
 from ephs.operad.errors import PatternError
 from ephs.operad.reading import Reader
-from ephs.semantics import constructors, structures
-from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.catalogue import find_part, part_of
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.domains import Bounds
+from ephs.semantics.bundles.errors import SemanticsError, StructureError
+from ephs.semantics.bundles.extents import between
 from ephs.semantics.derive.recording import Untraceable
 from ephs.semantics.derive.recording import record as recording
-from ephs.semantics.domains import Bounds
-from ephs.semantics.errors import SemanticsError, StructureError
-from ephs.semantics.extents import between
-from ephs.semantics.forms import stacked
+from ephs.semantics.documents.catalogue import find_part, part_of
 from ephs.semantics.library.chemistry import Species
-from ephs.semantics.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
+from ephs.semantics.primitives import constructors, structures
+from ephs.semantics.primitives.forms import stacked
+from ephs.semantics.primitives.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, recorded, simple, term_from
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.proving import proof_of, replay

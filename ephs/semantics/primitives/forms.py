@@ -8,12 +8,21 @@ import numpy as np
 
 from ephs.operad import Interface, Path
 from ephs.operad.charges import ENTROPY, VOLUME
-from ephs.semantics.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relating import Port
 from ephs.semantics.derive.tape import Tape, evaluate
-from ephs.semantics.primitives import Domain, Formula, Irreversible, Kernel, Point, Primitive, Reversible, Storage
+from ephs.semantics.primitives.primitives import (
+    Domain,
+    Formula,
+    Irreversible,
+    Kernel,
+    Point,
+    Primitive,
+    Reversible,
+    Storage,
+)
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN
 

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from ephs.operad import Interface, Path
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import StructureError
-from ephs.semantics.primitives import Domain, Point
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.primitives.primitives import Domain, Point
 from ephs.semantics.spaces import codes, manifold
 
 Bounds = Mapping[str, tuple[float, float]]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ephs.operad import Path, Pattern, Quantity
 from ephs.operad.disjoint import DisjointSets
-from ephs.semantics.numbering import Index, Interned, Numbering, Parts
-from ephs.semantics.primitives import Primitive, Storage
-from ephs.semantics.system import Filling, System
+from ephs.semantics.descriptor.numbering import Index, Interned, Numbering, Parts
+from ephs.semantics.primitives.primitives import Primitive, Storage
+from ephs.semantics.systems.system import Filling, System
 
 WORTH = 8
 """Kinds are numbered from so many components for each of them on: a kind costs as much as some components."""

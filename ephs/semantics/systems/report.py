@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, final
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Reference
-from ephs.semantics.descriptor import Descriptor
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.forms import obstacle
-from ephs.semantics.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
-from ephs.semantics.markup import table
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.primitives.forms import obstacle
+from ephs.semantics.systems.laws import SYSTEM_LAWS, Probe, SystemLaw, random_probe
+from ephs.semantics.systems.markup import table
+from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.search import search
 
 PROBES = 3

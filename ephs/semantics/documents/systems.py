@@ -14,12 +14,12 @@ from ephs.operad.documents import pattern_within, record_in_order
 from ephs.operad.documents import to_dict as pattern_record
 from ephs.operad.names import MOST_NAMES
 from ephs.operad.reading import Reader
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.primitive_documents import primitive_from, primitive_record
-from ephs.semantics.system import Filling, System
+from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.documents.primitives import primitive_from, primitive_record
+from ephs.semantics.systems.system import Filling, System
 
 FORMAT = 1
-SCHEMA_FILE = FilePath(__file__).with_name("system.schema.json")
+SCHEMA_FILE = FilePath(__file__).parents[1] / "system.schema.json"
 LARGEST = 10_000_000
 """Limit on the number of primitives of a system, reused parts counted at each use."""
 _READ = Reader("system")

@@ -13,14 +13,14 @@ from typing import final
 import numpy as np
 
 from ephs.operad import ROOT, Path, Quantity
-from ephs.semantics.behaviour import Continuous, Natural, Relating, Storing
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError, listed
-from ephs.semantics.kept import Kept
-from ephs.semantics.numbering import Index, Numbering, bearing_junctions, number_flat, starts
-from ephs.semantics.primitives import Point, Primitive, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError, listed
+from ephs.semantics.descriptor.numbering import Index, Numbering, bearing_junctions, number_flat, starts
+from ephs.semantics.primitives.behaviour import Continuous, Natural, Relating, Storing
+from ephs.semantics.primitives.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import Pair, manifold
-from ephs.semantics.system import System
+from ephs.semantics.systems.kept import Kept
+from ephs.semantics.systems.system import System
 
 
 @final
@@ -298,7 +298,7 @@ def descriptor_of(system: System) -> Descriptor:
     AssemblyError
         As of `assemble`.
     """
-    from ephs.semantics.kinds import number_by_kinds, repeats
+    from ephs.semantics.descriptor.kinds import number_by_kinds, repeats
 
     while system.pattern.is_identity and isinstance(inner := system.fillings[ROOT], System):
         system = inner

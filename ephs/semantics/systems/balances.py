@@ -10,13 +10,13 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.operad.charges import ENTROPY
-from ephs.semantics.behaviour import Natural
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.meaning.step import Solved, solved
-from ephs.semantics.primitives import Irreversible, Storage
-from ephs.semantics.probe import Probe, Verdict
+from ephs.semantics.primitives.behaviour import Natural
+from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import TINY
+from ephs.semantics.systems.probe import Probe, Verdict
 
 UNSOLVED = 1e-6
 """A step whose residual stays above this has no solution near by; the laws of steps are vacuous there."""

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from ephs.operad import ROOT, Path, Pattern
-from ephs.semantics import balances
 from ephs.semantics.meaning import Instant, Relation, relation_of_pattern
 from ephs.semantics.meaning.components import at_instant
 from ephs.semantics.meaning.fields import Rational
 from ephs.semantics.meaning.functor import filled, is_dirac
-from ephs.semantics.primitives import Reversible
-from ephs.semantics.probe import Probe, SystemLaw, Verdict, random_probe
-from ephs.semantics.system import System
+from ephs.semantics.primitives.primitives import Reversible
+from ephs.semantics.systems import balances
+from ephs.semantics.systems.probe import Probe, SystemLaw, Verdict, random_probe
+from ephs.semantics.systems.system import System
 
 __all__ = ["SYSTEM_LAWS", "Probe", "SystemLaw", "Verdict", "random_probe", "system_law"]
 

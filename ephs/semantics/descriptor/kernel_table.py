@@ -12,11 +12,11 @@ from typing import Any, Final, final
 
 import numpy as np
 
-from ephs.semantics.behaviour import Natural, Storing
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.derive.relations import compiled
-from ephs.semantics.errors import SemanticsError
-from ephs.semantics.primitives import Primitive, Reversible, Storage
+from ephs.semantics.primitives.behaviour import Natural, Storing
+from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import DIFFERENCE
 from ephs.semantics.stage import Signature

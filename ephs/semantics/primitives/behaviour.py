@@ -10,9 +10,9 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.given import defined
-from ephs.semantics.primitives import Irreversible, Point, Primitive, Reversible, Storage, midpoint
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.given import defined
+from ephs.semantics.primitives.primitives import Irreversible, Point, Primitive, Reversible, Storage, midpoint
 
 
 @final

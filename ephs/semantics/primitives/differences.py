@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.semantics.bundle import Array
-from ephs.semantics.extents import room
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.extents import room
 from ephs.semantics.spaces.rank import DIFFERENCE
 
 if TYPE_CHECKING:
-    from ephs.semantics.primitives import Point, Storage
+    from ephs.semantics.primitives.primitives import Point, Storage
 
 NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
 """Gauss' quadrature with three nodes on an interval: the outer nodes' distance from the middle, their weight."""

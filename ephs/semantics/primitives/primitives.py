@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Literal, final
 import numpy as np
 
 from ephs.operad import Algebra, Directory, Interface, Path, PortType, Quantity
-from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.errors import StructureError
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.bundles.support import Support
 from ephs.semantics.spaces import manifold
-from ephs.semantics.support import Support
 from ephs.semantics.verdicts.verdict import Condition, StructureVerdict, examine
 
 if TYPE_CHECKING:
     from ephs.semantics.derive.linear import Linear
     from ephs.semantics.derive.relations import Relation
-    from ephs.semantics.system import Filling
+    from ephs.semantics.systems.system import Filling
 
 Point = Mapping[Path, Array]
 """States of the ports that a primitive reads: port -> (size,)."""
@@ -206,7 +206,7 @@ class Storage(_Structure):
         AssemblyError
             An unknown port, a wrong shape, or a number that is not finite.
         """
-        from ephs.semantics.initial import started
+        from ephs.semantics.systems.initial import started
 
         return started(self, {Path.of(port): value for port, value in values.items()}, Path())
 
@@ -218,7 +218,7 @@ class Storage(_Structure):
         """dE(x), left-trivialised, (n,)."""
         if self.gradient is not None:
             return np.asarray(self.gradient(x), dtype=float)
-        from ephs.semantics.differences import differences
+        from ephs.semantics.primitives.differences import differences
 
         return differences(self, x)
 
@@ -235,7 +235,7 @@ class Storage(_Structure):
         if self.discrete_gradient is not None:
             gradient = np.asarray(self.discrete_gradient(x0, v), dtype=float)
         else:
-            from ephs.semantics.differences import increments
+            from ephs.semantics.primitives.differences import increments
 
             gradient = increments(self, x0, v)
         return gradient - self.bundle.intensive(reference)

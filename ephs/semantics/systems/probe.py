@@ -7,10 +7,10 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Directory, Path, PortType
-from ephs.semantics.bundle import Array, Bundle, Reference
-from ephs.semantics.descriptor import Input
-from ephs.semantics.primitives import Irreversible, Storage
-from ephs.semantics.system import System
+from ephs.semantics.bundles.bundle import Array, Bundle, Reference
+from ephs.semantics.descriptor.descriptor import Input
+from ephs.semantics.primitives.primitives import Irreversible, Storage
+from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import random_point
 
 

@@ -13,19 +13,19 @@ from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Patt
 from ephs.operad.frames import in_frames_of
 from ephs.operad.links import closure
 from ephs.operad.matching import interfaces_match
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.errors import AssemblyError, SemanticsError, listed
-from ephs.semantics.initial import read_state, saved_state, started
-from ephs.semantics.kept import Kept, once
-from ephs.semantics.primitives import Irreversible, Primitive, Reversible, Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.bundles.errors import AssemblyError, SemanticsError, listed
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.systems.initial import read_state, saved_state, started
+from ephs.semantics.systems.kept import Kept, once
 
 if TYPE_CHECKING:
-    from ephs.semantics.descriptor import Descriptor
-    from ephs.semantics.ledger import Ledger
+    from ephs.semantics.descriptor.descriptor import Descriptor
     from ephs.semantics.meaning import Relation, Route
-    from ephs.semantics.report import CheckReport
     from ephs.semantics.symbols.equations import Equations
+    from ephs.semantics.systems.ledger import Ledger
+    from ephs.semantics.systems.report import CheckReport
 
 T = TypeVar("T")
 
@@ -191,7 +191,7 @@ class System:
     @property
     def ledger(self) -> "Ledger":
         """Accounts of stored amounts and entropy production at a state."""
-        from ephs.semantics.ledger import Ledger
+        from ephs.semantics.systems.ledger import Ledger
 
         return Ledger(self)
 
@@ -222,7 +222,7 @@ class System:
 
         Subsystems of one pattern with components of the same ports are numbered once, and all of them by index maps.
         """
-        from ephs.semantics.descriptor import descriptor_of
+        from ephs.semantics.descriptor.descriptor import descriptor_of
 
         return once(self, "descriptor", lambda: descriptor_of(self))
 
@@ -253,7 +253,7 @@ class System:
             Where the laws are measured, missing values at the start; where None at random states, the first of which is
             the start of a system that carries one.
         """
-        from ephs.semantics.report import check_system
+        from ephs.semantics.systems.report import check_system
 
         if isinstance(cast("object", reference), Mapping):
             raise AssemblyError("reference", ROOT, found=str(reference))
@@ -270,7 +270,7 @@ class System:
         SemanticsError
             A component is no part of the library, and its formula cannot be traced; the message says which.
         """
-        from ephs.semantics.documents import to_dict
+        from ephs.semantics.documents.systems import to_dict
 
         return to_dict(self, proofs)
 
@@ -283,20 +283,20 @@ class System:
         PatternError
             For what is no document, or no system; the message says at which key.
         """
-        from ephs.semantics.documents import from_dict
+        from ephs.semantics.documents.systems import from_dict
 
         return from_dict(document)
 
     def to_json(self, *, proofs: bool = False) -> str:
         """The document as JSON text, by the schema ``ephs/semantics/system.schema.json``; as `to_dict`."""
-        from ephs.semantics.documents import to_json
+        from ephs.semantics.documents.systems import to_json
 
         return to_json(self, proofs)
 
     @staticmethod
     def from_json(text: str | bytes) -> "System":
         """Read JSON text; errors as of `from_dict`."""
-        from ephs.semantics.documents import from_json
+        from ephs.semantics.documents.systems import from_json
 
         return from_json(text)
 

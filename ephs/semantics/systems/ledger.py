@@ -8,11 +8,11 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.operad.charges import ENTROPY, VOLUME
-from ephs.semantics.bundle import Array, Reference
-from ephs.semantics.primitives import Irreversible, Storage
+from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.primitives.primitives import Irreversible, Storage
 
 if TYPE_CHECKING:
-    from ephs.semantics.system import System
+    from ephs.semantics.systems.system import System
 
 State = Mapping[str, object]
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ephs.operad import Quantity
-from ephs.semantics.bundle import Array
+from ephs.semantics.bundles.bundle import Array
 
 
 def inside(quantity: Quantity, x: Array) -> bool:

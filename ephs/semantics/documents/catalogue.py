@@ -11,7 +11,7 @@ import numpy as np
 
 from ephs.operad import Interface
 from ephs.semantics import library
-from ephs.semantics.primitives import Formula, Primitive
+from ephs.semantics.primitives.primitives import Formula, Primitive
 
 
 @final

@@ -11,13 +11,13 @@ from typing import final
 import numpy as np
 
 from ephs.operad import Directory, Interface, Path, PortType
-from ephs.semantics import structures
-from ephs.semantics.bundle import Array, Reference
+from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.derive.closing import Closing
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relations import Storage
-from ephs.semantics.primitives import Irreversible, Kernel, Point, Reversible
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.primitives import Irreversible, Kernel, Point, Reversible
 from ephs.semantics.verdicts.verdict import Condition
 
 

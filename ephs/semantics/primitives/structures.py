@@ -7,10 +7,19 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Interface, Path, quantity
-from ephs.semantics.bundle import Array, Bundle
+from ephs.semantics.bundles.bundle import Array, Bundle
 from ephs.semantics.derive.linear import Linear
-from ephs.semantics.forms import dissipated, stored
-from ephs.semantics.primitives import Formula, Irreversible, Kernel, Point, Proof, Reversible, Storage, power_ports
+from ephs.semantics.primitives.forms import dissipated, stored
+from ephs.semantics.primitives.primitives import (
+    Formula,
+    Irreversible,
+    Kernel,
+    Point,
+    Proof,
+    Reversible,
+    Storage,
+    power_ports,
+)
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.verdicts.checks import STATEMENTS

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Path, Quantity
-from ephs.semantics.bundle import Array
-from ephs.semantics.errors import AssemblyError, listed
-from ephs.semantics.primitives import Initial, Storage
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import AssemblyError, listed
+from ephs.semantics.primitives.primitives import Initial, Storage
 from ephs.semantics.spaces import Pair, manifold
 
 SLIVER = 1e-9

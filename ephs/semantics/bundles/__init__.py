@@ -1,0 +1,1 @@
+"""What a port carries: layouts, arguments, domains, errors."""

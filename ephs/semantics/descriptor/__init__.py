@@ -1,0 +1,1 @@
+"""The square form for solvers."""

@@ -1,0 +1,1 @@
+"""Components: a primitive is its structure."""

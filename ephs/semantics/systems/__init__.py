@@ -1,0 +1,1 @@
+"""Filled patterns: values, their laws, balances and reports."""
