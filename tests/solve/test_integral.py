@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.cells import grid, ladder
 from ephs import Reference
-from ephs.semantics.descriptor.descriptor import Input, assemble
+from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.descriptor.numbering import spans
 from ephs.solve.control import Proportional
 from ephs.solve.methods.continuous import Continuous
@@ -23,7 +23,7 @@ def compiled(system):
     """The model, an effort given at its first outer port and flows at the others, and the values there."""
     ports = [(path, port.quantity.space.dim) for path, port in system.interface.items() if port.power]
     given = {path: Input(np.full(dim, 0.3), i == 0) for i, (path, dim) in enumerate(ports)}
-    model = compile_model(assemble(system.flatten()), Reference(), given)
+    model = compile_model(descriptor_of(system.flatten()), Reference(), given)
     return model, model.input_values()
 
 

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.operad import ROOT, Path, Quantity
+from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.descriptor.numbering import Index, Numbering, bearing_junctions, number_flat, starts
@@ -291,27 +291,11 @@ def _related(local: Relating, e: Array, lam: Array, read: Mapping[Path, Array]) 
 
 
 def descriptor_of(system: System) -> Descriptor:
-    """Descriptor form of a system; subsystems of a shape that many have are numbered once, others are flattened.
-
-    Raises
-    ------
-    AssemblyError
-        As of `assemble`.
-    """
-    from ephs.semantics.descriptor.kinds import number_by_kinds, repeats
-
-    while system.pattern.is_identity and isinstance(inner := system.fillings[ROOT], System):
-        system = inner
-    numbering = number_by_kinds(system) if repeats(system) else None
-    return assemble(system.flatten()) if numbering is None else Descriptor(system, numbering)
-
-
-def assemble(flat: System) -> Descriptor:
-    """Descriptor form of a flat system, component by component; the reference for faster constructions.
+    """Descriptor form of a system, numbered component by component.
 
     Raises
     ------
     AssemblyError
         A state stored twice, or read and stored nowhere.
     """
-    return Descriptor(flat, number_flat(flat))
+    return Descriptor(system, number_flat(system.flatten()))

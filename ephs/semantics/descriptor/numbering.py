@@ -18,22 +18,6 @@ T = TypeVar("T", bound=Hashable)
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Parts:
-    """Copies of one kind of subsystem, by the numbers of their contents.
-
-    Parameters
-    ----------
-    states, junctions, components
-        (copies, …) copy by copy in the same order.
-    """
-
-    states: Index
-    junctions: Index
-    components: Index
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
 class Numbering:
     """The incidences of a closed system as arrays; in them a list of lists is one array, row after row.
 
@@ -53,8 +37,6 @@ class Numbering:
         (outer ports,) their junctions.
     states
         (states,) quantity of each; they come in the order of the storages and their ports.
-    parts
-        The subsystems that it was numbered by, innermost first; none of a flat system.
     """
 
     primitives: tuple[Primitive, ...]
@@ -65,7 +47,6 @@ class Numbering:
     junctions: Index
     outer: Index
     states: Index
-    parts: tuple[Parts, ...] = ()
 
     def dims(self, numbers: Index) -> Index:
         """Dimensions of the fibres over so many quantities."""
@@ -161,7 +142,7 @@ def number_flat(flat: System) -> Numbering:
     of = [quantities.number(pattern.junctions[path].quantity.in_frame(None)) for path in number]
     outer = [i for path, i in number.items() if pattern.junctions[path].exposed and pattern.junctions[path].power]
     index = [np.array(numbers, dtype=np.int64) for numbers in (order, wires, reads, of, outer, states)]
-    return Numbering(tuple(primitives.values), tuple(quantities.values), *index, parts=())
+    return Numbering(tuple(primitives.values), tuple(quantities.values), *index)
 
 
 def _states(flat: System, quantities: Interned[Quantity]) -> tuple[list[int], dict[Path, int]]:

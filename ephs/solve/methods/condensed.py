@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.copies import copies_of
 from ephs.semantics.descriptor.numbering import Index, starts
 from ephs.semantics.spaces.decompositions import least_squares, singular_values
 from ephs.semantics.spaces.rank import IMPLICIT
+from ephs.semantics.systems.kept import once
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.methods.stored import guessed_efforts
 from ephs.solve.model import Evaluation, Model
@@ -89,7 +91,8 @@ def _inner_unknowns(model: Model) -> list[Index]:
         (starts(n.multipliers), n.multipliers, int(t.counts[0] + t.counts[1])),
     )
     found: list[Index] = []
-    for part in n.parts:
+    d = model.descriptor
+    for part in once(d, "copies", lambda: copies_of(d.system)):
         blocks = [np.zeros((part.components.shape[0], 0), dtype=np.int64)]
         for numbers, (at, length, first) in zip((part.states, part.junctions, part.components), places, strict=True):
             if numbers.size:  # the unknowns inside a part are contiguous

@@ -1,4 +1,4 @@
-"""A system of repeated parts, numbered kind by kind, has the numbers of its flattening."""
+"""Copies of one part in a system: what is inside each, by the numbers of the flattened system."""
 
 from dataclasses import replace
 
@@ -11,35 +11,10 @@ import ephs
 from ephs import AssemblyError, Pattern, System, junction
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.semantics.descriptor import kinds
-from ephs.semantics.descriptor.descriptor import Descriptor, assemble, descriptor_of
-from ephs.semantics.descriptor.kinds import number_by_kinds, repeats
-from ephs.semantics.descriptor.numbering import Numbering, number_flat
+from ephs.semantics import Storage
+from ephs.semantics.descriptor.copies import copies_of
+from ephs.semantics.descriptor.descriptor import descriptor_of
 from ephs.testing import fillings, nestings, systems
-
-ARRAYS = ("wires", "reads", "outer")
-
-
-def same(one, other):
-    """Whether two numberings say the same of every component, junction and state."""
-    values = [
-        [numbering.primitives[i] for i in numbering.primitive]
-        + [numbering.quantities[i] for i in (*numbering.junctions, *numbering.states)]
-        for numbering in (one, other)
-    ]
-    return (
-        len(values[0]) == len(values[1])
-        and all(a is b or a == b for a, b in zip(*values, strict=True))
-        and all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ARRAYS)
-    )
-
-
-def flat_numbers(system):
-    """The numbering of the flattened system; None where there is none."""
-    try:
-        return number_flat(system.flatten())
-    except AssemblyError:
-        return None
 
 
 @st.composite
@@ -79,31 +54,50 @@ def repeating(draw):
     return system
 
 
+def wired(numbering):
+    """The components on each junction."""
+    ports = [len(numbering.primitives[i].bundle.ports) for i in numbering.primitive]
+    owner = np.repeat(np.arange(numbering.primitive.size), ports)
+    return [set(owner[numbering.wires == i].tolist()) for i in range(numbering.junctions.size)]
+
+
 @settings(max_examples=60)
 @given(repeating())
-def test_numbers_by_kinds_are_those_of_the_flattened_system(system):
-    flat, found = flat_numbers(system), number_by_kinds(system)
-    assert (flat is None) == (found is None)
-    if flat is not None:
-        assert same(found, flat)
-        by_kinds, plain = Descriptor(system, found), assemble(system.flatten())
-        assert by_kinds.outer == plain.outer
-        assert (by_kinds.states, by_kinds.junctions) == (plain.states, plain.junctions)
-        assert by_kinds.components == plain.components
+def test_contents_of_copies_lie_together_and_alike(system):
+    """Inner junctions bear ports of the copy's components alone, and those of each copy as those of the first."""
+    try:
+        descriptor = descriptor_of(system)
+    except AssemblyError:
+        return  # a state is stored twice or nowhere
+    n = descriptor.numbering
+    on, outer = wired(n), set(n.outer.tolist())
+    stores = [(i, each) for i, (_, each) in enumerate(system.leaves()) if isinstance(each, Storage)]
+    owners = [i for i, each in stores for _ in each.bundle.ports]
+    found = copies_of(system)
+    for each in found:
+        first = [numbers[0] for numbers in (each.states, each.junctions, each.components)]
+        for states, junctions, components in zip(each.states, each.junctions, each.components, strict=True):
+            assert all(np.all(np.diff(numbers) == 1) for numbers in (states, junctions, components))
+            inside = set(components.tolist())
+            assert not outer & set(junctions.tolist()) and all(on[i] <= inside for i in junctions)
+            assert {owners[i] for i in states} <= inside
+            shift = components[0] - first[2][0]
+            assert [{i - shift for i in on[j]} for j in junctions] == [on[j] for j in first[1]]
+            assert np.array_equal(n.states[states], n.states[first[0]])
+    # inner copies come first
+    sizes = [each.components.shape[1] for each in found]
+    assert all(size <= max(sizes[i:]) for i, size in enumerate(sizes))
 
 
-def test_parts_that_differ_by_numbers_are_of_one_kind():
+def test_parts_that_differ_by_numbers_are_of_one_shape():
     cells = [remade(CELL) for _ in range(20)]
     level = chain(CELL, 20)
     system = System.of(level.pattern, dict(zip(level.pattern.boxes, cells, strict=True)))
-    assert repeats(system)
-    found, flat = number_by_kinds(system), flat_numbers(system)
-    assert same(found, flat)
-    assert [id(found.primitives[i]) for i in found.primitive] == [id(flat.primitives[i]) for i in flat.primitive]
-    assert [part.components.shape for part in found.parts] == [(20, len(CELL.fillings))]
+    (found,) = copies_of(system)
+    assert found.components.shape == (20, len(CELL.fillings))
 
 
-def test_parts_that_read_other_ports_are_of_several_kinds():
+def test_parts_that_read_other_ports_are_of_several_shapes():
     interface = {"c": Q.charge, "f": Q.flux_linkage, "~x": Q.displacement, "~y": Q.displacement}
     one = ephs.gyrator(interface, lambda x, y: [[0, x], [-x, 0]])
     other = replace(one, reads=one.reads[::-1])
@@ -118,41 +112,7 @@ def test_parts_that_read_other_ports_are_of_several_kinds():
     )
     system = whole(p=parts[0], q=parts[1])
     assert parts[0].pattern is parts[1].pattern
-    assert same(number_by_kinds(system), flat_numbers(system))
-
-
-def test_a_system_wired_in_another_way_has_other_numbers():
-    found = number_by_kinds(chain(CELL, 3))
-    others = (found.primitives, found.quantities, found.primitive, found.wires[::-1], found.reads)
-    assert same(found, flat_numbers(chain(CELL, 3)))
-    assert not same(Numbering(*others, found.junctions, found.outer, found.states), found)
-
-
-def joined():
-    """Two copies of a part that makes its two outer states one; what one stores, a reader of the other reads."""
-    wire = Pattern.from_text(
-        "a: displacement, exposed as state; b: displacement, exposed as state; a ~ b; c: charge; f: flux_linkage;"
-        "e(q=c, p=f, a=~a); C(q=c); L(b=f)"
-    )
-    turn = ephs.gyrator({"q": Q.charge, "p": Q.flux_linkage, "~a": Q.displacement}, lambda a: [[0, 1 + a], [-1 - a, 0]])
-    part = wire(e=turn, C=lib.capacitor(c=1.0), L=lib.inductor(l=1.0))
-    top = Pattern.from_text(
-        "j: displacement; k: displacement; m: displacement; s(q=j); v(a=~j, b=~k); w(a=~k, b=~m);"
-        "c: charge; f: flux_linkage; r(q=c, p=f, a=~m); C(q=c); L(b=f)"
-    )
-    return top(s=lib.spring(k=2.0), v=part, w=part, r=turn, C=lib.capacitor(c=1.0), L=lib.inductor(l=1.0))
-
-
-def test_a_part_that_joins_two_states_joins_those_around_it():
-    system = joined()
-    found = number_by_kinds(system)
-    assert same(found, flat_numbers(system))
-    assert set(found.reads[-4:].tolist()) >= {0}  # the last reader reads the spring's state, two parts away
-
-
-def test_forgetting_what_parts_join_is_noticed(monkeypatch):
-    monkeypatch.setattr(kinds, "_labels", lambda pattern, copies: np.arange(len(pattern.junctions)))
-    assert number_by_kinds(joined()) is None
+    assert len(copies_of(system)) == 2
 
 
 CELL = Pattern.from_text(
@@ -179,7 +139,7 @@ def chain(part, count, ports=("q", "out")):
 
 def test_parts_of_parts_run_as_their_flattening_does():
     system = chain(chain(CELL, 5), 6, ("j0", "j5"))
-    assert repeats(system) and not descriptor_of(system).system.is_flat
+    assert [each.components.shape[0] for each in copies_of(system)] == [30, 6]
     run = {"initial": {"c2.c3.cap.q": 0.1}, "inputs": {"j0": {"effort": np.sin}, "j6": {"flow": 0.0}}, "step": 0.05}
     nested, flat = (ephs.simulate(one, 2.0, **run) for one in (system, system.flatten()))
     assert nested.states.keys() == flat.states.keys()
@@ -187,11 +147,6 @@ def test_parts_of_parts_run_as_their_flattening_does():
         np.testing.assert_array_equal(nested[path], flat[path])
     for totals in ("energy", "exergy", "entropy", "heat", "work"):
         np.testing.assert_array_equal(getattr(nested, totals), getattr(flat, totals))
-
-
-def test_what_does_not_repeat_is_flattened():
-    assert not repeats(chain(CELL, 2))
-    assert descriptor_of(chain(CELL, 2)).system.is_flat
 
 
 @pytest.mark.parametrize("fault", ["two-storages", "unread-state"])
@@ -209,20 +164,7 @@ def test_faults_inside_parts_are_named_as_in_the_flattened_system(fault):
     boxes = {f"c{i}": {port: f"j{i}"} for i in range(20)}
     junctions = {f"j{i}": junction(part.interface[port].quantity) for i in range(20)}
     system = System.of(Pattern(junctions, boxes), dict.fromkeys(boxes, part))
-    assert repeats(system)
     with pytest.raises(AssemblyError) as raised:
         system.descriptor()
     assert raised.value.kind == fault
     assert str(raised.value.path).startswith("c0")
-
-
-def test_frames_from_the_levels_above_are_no_part_of_numbers():
-    part = Pattern.from_text("a: displacement, exposed as state; b: displacement; a ~ b; k(q=b)")(k=lib.spring(k=1.0))
-    framed = Pattern(
-        junctions={name: junction(Q.displacement.in_frame("world")) for name in ("x", "y")},
-        boxes={"p": {"a": "~x"}, "q": {"a": "~y"}},
-    )
-    system = framed(p=part, q=part)
-    assert "world" in {each.quantity.frame for each in system.flatten().pattern.junctions.values()}
-    by_kinds, plain = Descriptor(system, number_by_kinds(system)), assemble(system.flatten())
-    assert by_kinds.junctions == plain.junctions and len(plain.junctions) == 2
