@@ -15,18 +15,19 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.derive import relations
+from ephs.semantics.derive.charts import moved
 from ephs.semantics.derive.tape import evaluate
 from ephs.semantics.meaning.base import BasePoint
-from ephs.semantics.meaning.components import efforts_of, rates_of
+from ephs.semantics.meaning.components import efforts_of, largest, rates_of
 from ephs.semantics.meaning.elimination import eliminated
 from ephs.semantics.meaning.fields import ROUNDED, Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, Variable
 from ephs.semantics.primitives.differences import slope
 from ephs.semantics.primitives.primitives import Point, Primitive, Storage
-from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.rank import DIFFERENCE
 from ephs.semantics.stage.duals import Duals
+from ephs.semantics.stage.numbers import Real
 from ephs.semantics.stage.plain import PLAIN
 
 Labelled: TypeAlias = "tuple[str, Path, Row[Any]]"
@@ -121,9 +122,10 @@ def _determined(fibre: _Fibre, point: BasePoint, given: str) -> Answer:
 def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
     """Hidden equations a·e = 0 last: two rates that both keep them differ by v with a·H″ v = 0."""
     equations = hidden(fibre, point).equations
+    asked = {effort for equation in equations for effort in equation}
     slopes: dict[Variable, Row[Any]] = {}
-    for path, storage in fibre.leaves() if equations else ():
-        if isinstance(storage, Storage):
+    for path, storage in fibre.leaves() if asked else ():
+        if isinstance(storage, Storage) and not asked.isdisjoint(efforts_of(storage, path)):
             slopes |= _slopes(storage, path, point)
     rows: list[Row[Any]] = []
     for equation in equations:
@@ -138,34 +140,39 @@ def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Ro
     """H″ by rows: of each effort at a storage's ports, minus its change with the rates of the states."""
     rates, efforts = rates_of(storage, path, point.names), efforts_of(storage, path)
     hessian, error = curvature(storage, point.read(path, storage))
+    beside = error * largest(storage.bundle, largest(storage.bundle, hessian).T).T
     return {
         name: {
-            rate: point.field.number(-entry, error * abs(entry))
-            for rate, entry in zip(rates, row, strict=True)
-            if entry
+            rate: point.field.number(-entry, bound)
+            for rate, entry, bound in zip(rates, row, bounds, strict=True)
+            if bound
         }
-        for name, row in zip(efforts, hessian.tolist(), strict=True)
+        for name, row, bounds in zip(efforts, hessian.tolist(), beside.tolist(), strict=True)
     }
 
 
 def curvature(storage: Storage, x: Point) -> tuple[Array, float]:
-    """H″ (n, n) in trivialised directions, with the relative error of its entries.
+    """H″ (n, n) in trivialised directions, of E(x exp(v) exp(w)) by w and v, with the relative error of its entries.
 
-    Exact derivatives of the recorded energy of vectors; else differences of the efforts.
+    Exact derivatives of the recorded energy; else differences of the efforts.
     """
     kernel, n = storage.kernel, storage.bundle.size
     if kernel is not None and isinstance(kernel.relation, relations.Storage):
         tape, parameters = kernel.relation.energy, kernel.parameters[len(kernel.potentials) :]
-        if all(port.code == codes.VECTOR for port in kernel.relation.ports):
-            first = Duals(PLAIN, n)
-            second = Duals(first, n)
-            numbers = np.concatenate([x[port] for port in storage.reads])
-            inputs = [second.along(first.along(value, i), i) for i, value in enumerate(map(float, numbers))]
-            constants = [second.dual(first.dual(value)) for value in parameters[: tape.parameters]]
-            with np.errstate(all="ignore"):
-                (energy,) = evaluate(second, tape, inputs, constants)
-            slopes = [first.dual(each).slopes for each in second.dual(energy).slopes]
-            return np.array(slopes, dtype=float).reshape(n, n), ROUNDED
+        first = Duals(PLAIN, n)
+        second = Duals(first, n)
+        along = [second.dual(first.along(0.0, i)) for i in range(n)]
+        by = [second.along(first.dual(0.0), i) for i in range(n)]
+        inputs: list[Real] = []
+        for port, (name, where, _) in zip(kernel.relation.ports, storage.bundle.items(), strict=True):
+            there = [second.dual(first.dual(value)) for value in x[name].tolist()]
+            span = slice(where.start, where.stop)
+            inputs += moved(second, port.code, moved(second, port.code, there, along[span]), by[span])
+        constants = [second.dual(first.dual(value)) for value in parameters[: tape.parameters]]
+        with np.errstate(all="ignore"):
+            (energy,) = evaluate(second, tape, inputs, constants)
+        slopes = [first.dual(each).slopes for each in second.dual(energy).slopes]
+        return np.array(slopes, dtype=float).reshape(n, n), ROUNDED
 
     def effort(v: Array) -> Array:
         return storage.effort(storage.retract(x, v), Reference())

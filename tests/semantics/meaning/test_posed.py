@@ -10,6 +10,7 @@ import ephs
 from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
+from ephs.mechanics.elements.components import gravity, pair_spring
 from ephs.operad import ROOT, Path
 from ephs.semantics import SemanticsError
 from ephs.semantics.meaning import relation_of_pattern
@@ -18,6 +19,8 @@ from ephs.semantics.meaning.functor import filled
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import curvature
 from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.primitives.differences import slope
+from ephs.semantics.spaces import manifold, pair
 from ephs.testing import nestings
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -207,6 +210,26 @@ def test_the_curvature_of_a_recorded_energy_is_exact(name):
             ephs.storage({"q": ephs.quantity.displacement}, energy), {ephs.Path.of("q"): np.array([x])}
         )
         assert found[0, 0] == pytest.approx(second(x), rel=1e-14) and error < 1e-14
+
+
+TURNED = {
+    "gravity": gravity(np.array([1.0, 2.0, 3.0]), "SE3"),
+    "gravity beside": gravity(np.array([1.0, 2.0, 3.0]), "SO3xR3"),
+    "a spherical spring": pair_spring(pair("spherical"), np.full(3, 1.5), np.zeros(3)),
+    "a planar spring": pair_spring(pair("planar"), np.full(3, 1.5), np.zeros(3)),
+    "a function": ephs.storage({"q": Q.pose}, lambda q: q[1] ** 2 * q[4] + q[5] ** 2 * q[2] ** 2),
+}
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_the_curvature_on_groups_is_that_of_the_efforts_along_increments(name):
+    storage, rng = TURNED[name], np.random.default_rng(5)
+    x = {port: manifold(storage.interface[port].quantity.space).random(rng) for port in storage.reads}
+    found, error = curvature(storage, x)
+    expected = slope(lambda v: storage.effort(storage.retract(x, v), ephs.Reference()), np.zeros(storage.bundle.size))
+    assert np.allclose(found, expected, rtol=1e-8, atol=1e-8) and error < 1e-14
+    # the bracket of increments makes it asymmetric where there is an effort
+    assert np.abs(found - found.T).max() > 0.1 or name in ("gravity beside", "a planar spring")
 
 
 def test_that_of_two_states_is_symmetric_and_what_is_not_recorded_is_differenced():
