@@ -15,8 +15,11 @@ import ephs
 from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
+from ephs.semantics.bundles.bundle import Bundle
+from ephs.semantics.library import power_ports
 from ephs.semantics.stage.store import STORE
 from ephs.semantics.verdicts import proving as prover
+from ephs.semantics.verdicts.checks import _apart
 from ephs.semantics.verdicts.proving import conditions_of
 from ephs.semantics.verdicts.verdict import Condition, StructureVerdict
 from ephs.testing import check_entropy_production, check_primitive
@@ -287,3 +290,25 @@ def test_printed_components_and_checks_say_the_verdict():
     assert "[irreversible, searched]" in str(system) and "[storage, proved]" in str(system)
     item = next(item for item in system.check().items if item.name == "structure")
     assert item.ok and "2 of them by proof" in item.detail and "watched in runs: wall" in item.detail
+
+
+PORTS = {name: Q.momentum for name in ("a", "b", "c")}
+TURNED = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+HELD = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
+SHIFT = HELD.T @ np.array([[0.3, 0.0, 1.0], [0.0, -2.0, 0.5]])
+STRUCTURES = {
+    "other rows of the same span": (TURNED, np.array([[2.0, -1.0], [1.0, 3.0]]) @ HELD, 0.0),
+    "what multipliers take up": (TURNED + SHIFT - SHIFT.T, HELD, 0.0),
+    "up to rounding of evaluations": (TURNED, HELD[::-1] * (1.0 + 1e-12), 0.0),
+    "another span": (TURNED, HELD + np.array([[0.0, 0.0, 1e-3], [0.0, 0.0, 0.0]]), 5e-4),
+    "a constraint less": (TURNED, HELD * np.array([[1.0], [0.0]]), 0.5),
+    "another turn": (TURNED + np.outer([0, 0, 1], [1.0, 0, 0]) - np.outer([1.0, 0, 0], [0, 0, 1]), HELD[:1], 0.5),
+}
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+def test_structures_are_compared_as_relations(name):
+    skew, constraint, least = STRUCTURES[name]
+    bundle = Bundle.of(power_ports(**PORTS))
+    found = _apart(bundle, (TURNED, HELD[: len(constraint)]), (skew, constraint))
+    assert found == 0.0 if least == 0.0 else found >= least
