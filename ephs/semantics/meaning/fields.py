@@ -154,8 +154,9 @@ class Rounded(Field[Bounded]):
 
     def number(self, value: float | Fraction, error: float = 0.0) -> Bounded:
         """A float and the bound of its error."""
-        size = abs(float(value))
-        return (float(value), error) if size > error else (0.0, error + size)
+        nearest = float(value)
+        size = abs(nearest)
+        return (nearest, error) if size > error else (0.0, error + size)
 
     def value(self, number: Bounded) -> float:
         """The float."""

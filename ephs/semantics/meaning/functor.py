@@ -71,10 +71,11 @@ def relation_of_pattern(
     for group in together.values():
         signs = [sign for sign, *_ in group]
         for kind in (*theory.balanced, *theory.shared):
+            balanced = kind in theory.balanced
             # by places of the vector
             for each in zip(*(_at(inside, kind, where) for where in group), strict=True):
                 variables += each
-                if kind in theory.balanced:
+                if balanced:
                     rows.append(field.exact(dict(zip(each, signs, strict=True))))
                 else:
                     rows += [field.exact({each[0]: 1.0, other: -1.0}) for other in each[1:]]
