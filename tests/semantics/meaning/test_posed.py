@@ -139,7 +139,8 @@ def test_the_relation_of_a_composite_pattern_is_the_composite_of_the_relations(n
         found = filled(relation_of_pattern(field, f), parts)
         assert found.same(relation_of_pattern(field, whole))
         of = relation_of_pattern(field, f)
-        same = {box: relation_of_pattern(field, Pattern.identity(content.interface)) for box, content in f.boxes.items()}
+        units = {box: Pattern.identity(content.interface) for box, content in f.boxes.items()}
+        same = {box: relation_of_pattern(field, unit) for box, unit in units.items()}
         assert filled(of, same).same(of)
         if of.equations:  # none is implied by the others, but inside of a part one may be
             less = LinearRelation.of(field, of.variables, of.equations[1:])
