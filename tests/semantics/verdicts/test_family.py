@@ -14,7 +14,8 @@ import pytest
 import ephs
 from ephs import quantity as Q
 from ephs.semantics import StructureError
-from tests.semantics.verdicts.family import RIGHT, WRONG
+from tests.semantics.verdicts.right_parts import RIGHT
+from tests.semantics.verdicts.wrong_parts import WRONG
 
 DRAWS = 3
 """Of each kind: 120 wrong parts, and 57 right ones."""

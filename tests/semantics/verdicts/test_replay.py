@@ -7,6 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, System, junction
@@ -321,3 +323,15 @@ def test_what_is_decided_to_rounding_is_of_dirac_structures(kind):
     seen = (Seen(("p",), (-np.inf, np.inf), 0, -1),)
     claim = Claim(kind, (0.0, -1.0, 1.0, 0.0), seen, (1, 1), (), (False, True), None, {})
     assert not replayed(claim, {statement: ("rounding",) for statement in STATEMENTS[kind]})
+
+
+@given(st.floats(-12.0, 0.0), st.floats(0.0, 9.0))
+def test_each_number_is_rounded_by_itself(size, large):
+    """What leaks energy, or a charge, beside large numbers is not decided to be rounding."""
+    leak, big = 10.0**size, 10.0**large
+    energy = np.array([[0.0, -big, 0.0], [big, 0.0, leak], [0.0, leak, 0.0]])
+    charge = np.array([[0.0, -big, 0.0], [big, 0.0, -leak], [0.0, leak, 0.0]])
+    for matrix, place in ((energy, 0), (charge, 1)):
+        claim = Claim("reversible", tuple(matrix.ravel().tolist()), (), (1, -1, 1), ((0.0, 0.0, 1.0),), (), None, {})
+        statement = STATEMENTS["reversible"][place]
+        assert not replayed(claim, {statement: ("rounding",)})
