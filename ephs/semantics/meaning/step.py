@@ -1,8 +1,9 @@
 """One step of the natural discretisation, or the motion at an instant, by the same gluing: the oracle of all solvers.
 
 Each primitive relates flows, efforts and the rates of the states that it reads, over a step or at an instant. Where it
-does so nonlinearly it has an affine tangent at each guess; Newton's method glues tangents, so that the functor does not
-know that time is discrete, nor at how many levels the system is written.
+does so nonlinearly it has an affine tangent at each guess. The pattern glues open boxes once, level by level; Newton's
+method puts tangents into it, and the solution is held against all tangents glued level by level. So the functor does
+not know that time is discrete.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -99,17 +99,20 @@ def volume_of_a_constraint(source):
 
 def energy_of_a_function(source):
     ports, whole = beside(source, leak(source) * np.array([[0.0, 1.0], [1.0, 0.0]]), CB)
-    return gyrator({**ports, **X}, lambda x: x * whole)
+    hide = source.choice((float, lambda x: x))
+    return gyrator({**ports, **X}, lambda x: hide(x) * whole)
 
 
 def entropy_of_a_function(source):
     ports, whole = beside(source, leak(source) * TURN, {"b": Q.flux_linkage, "s": Q.entropy})
-    return gyrator({**ports, **X}, lambda x: (1.0 + x**2) * whole)
+    hide = source.choice((float, lambda x: x))
+    return gyrator({**ports, **X}, lambda x: (1.0 + hide(x) ** 2) * whole)
 
 
 def parity_of_a_function(source):
     ports, whole = beside(source, leak(source) * TURN, {"b": Q.flux_linkage, "i": Q.magnetic_flux})
-    return gyrator({**ports, **X}, lambda x: np.exp(x) * whole)
+    hide = source.choice((float, lambda x: x))
+    return gyrator({**ports, **X}, lambda x: np.exp(hide(x)) * whole)
 
 
 def energy_of_friction(source):
