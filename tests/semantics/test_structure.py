@@ -220,7 +220,7 @@ def test_right_primitives_that_cannot_be_traced_are_searched(name):
 def test_a_verdict_is_a_word_with_its_conditions():
     verdict = StructureVerdict([Condition("a", True, ("stated", "x")), Condition("b", False, ("off", "y"))])
     assert verdict == "searched" and verdict.open == (Condition("b", False, ("off", "y")),)
-    assert verdict.text == "searched\n  a: proved, by construction: x\n  b: searched, y"
+    assert verdict.text == "searched\n  a: proved, as whoever made it states, by construction: x\n  b: searched, y"
     assert pickle.loads(pickle.dumps(verdict)).conditions == verdict.conditions
 
 

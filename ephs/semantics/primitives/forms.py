@@ -163,18 +163,24 @@ def recorded_structure(kernel: Kernel, n: int, reads: tuple[Path, ...]) -> Calla
     return structure
 
 
+def tape_of(kernel: Kernel) -> Tape | None:
+    """The record of a formula, of a kernel that has one."""
+    match kernel.relation:
+        case relations.Storage():
+            return kernel.relation.energy
+        case relations.Reversible():
+            return kernel.relation.structure
+        case relations.Irreversible():
+            return kernel.relation.matrix
+        case _:
+            return None
+
+
 def recorded_values(kernel: Kernel) -> Callable[[Sequence[float]], Array]:
     """Evaluation of a kernel's tape at numbers, in the recorded shape; NaN where it has no value."""
-    relation = kernel.relation
-    match relation:
-        case relations.Storage():
-            tape = relation.energy
-        case relations.Reversible():
-            tape = relation.structure
-        case relations.Irreversible():
-            tape = relation.matrix
-        case _:
-            raise TypeError(f"{type(relation).__name__} has no tape")
+    tape = tape_of(kernel)
+    if tape is None:
+        raise TypeError(f"{type(kernel.relation).__name__} has no tape")
     first = len(kernel.potentials)
     parameters = kernel.parameters[first : first + tape.parameters]
     return lambda numbers: run_tape(tape, numbers, parameters)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,6 @@ from ephs.semantics.primitives.primitives import (
     power_ports,
 )
 from ephs.semantics.spaces import codes, manifold
-from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import Condition, stated
 
@@ -184,6 +184,17 @@ def _product(row: Any, u: Any) -> Any:
     return sum((a * b for a, b in zip(row, u, strict=True) if not (isinstance(a, float) and a == 0.0)), 0.0)
 
 
+def _semidefinite(matrix: Array) -> bool:
+    """Whether a symmetric matrix (n, n) is ⪰ 0, by elimination over ℚ of its numbers as given."""
+    rows = [[Fraction(entry) for entry in row] for row in matrix.tolist()]
+    while rows:
+        (d, *pivot), *rest = rows
+        if d < 0 or (d == 0 and any(pivot)):
+            return False
+        rows = [[a - row[0] * b / (d or 1) for a, b in zip(row[1:], pivot, strict=True)] for row in rest]
+    return True
+
+
 def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition, ...]:
     """The conditions on M = Bᵀ (μ/θ) B with B = [θ, −u], which has B eᴱ = θ u − u θ = 0: conditions on μ remain.
 
@@ -193,7 +204,7 @@ def dissipation_proof(interface: Interface, mu: Array | None) -> tuple[Condition
         (d, d) constant; None where it is a function of the states that is known to be non-negative and even.
     """
     sound = mu is None or (np.array_equal(mu, mu.T) and bool(np.all(np.isfinite(mu))))
-    square = sound and (mu is None or not mu.any() or float(symmetric_eigenvalues(mu)[0]) >= 0.0)
+    square = sound and (mu is None or _semidefinite(mu))
     power, *_ = interface.values()
     symmetric, definite, energy, conserving, mirrored, turned = STATEMENTS["irreversible"]
     form = "M = Bᵀ (μ/θ) B with B = [θ, −u]"

@@ -11,6 +11,8 @@ from ephs.semantics.symbols.terms import OPERATIONS, Term
 
 LARGE = 300
 """Largest number of operations in an expression to rewrite; beyond it rewriting may take minutes."""
+MANY = 300
+"""The same of all matrices that one is eliminated through."""
 FACTORED = (60, 4)
 """Operations and symbols up to which a sum is factored."""
 Squares = tuple[tuple[Term, tuple[Term, ...]], ...]
@@ -109,8 +111,11 @@ class Signs:
         """A symmetric matrix (n, n) as Σ d v vᵀ, by elimination along the diagonal, each d ≥ 0."""
         n = int(len(matrix) ** 0.5)
         rest = sp.Matrix(n, n, [rational(self.expression(entry)) for entry in matrix])
-        left, found = list(range(n)), list[tuple[Term, tuple[Term, ...]]]()
+        left, found, operations = list(range(n)), list[tuple[Term, tuple[Term, ...]]](), 0
         while any(rest[i, j] != 0 for i in left for j in left):
+            operations += sum(entry.count_ops() for entry in rest)
+            if operations > MANY:
+                return None
             for pivot in left:
                 d = rest[pivot, pivot]
                 shown = None if d == 0 else self.shown(self.term(d))

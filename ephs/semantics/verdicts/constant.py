@@ -13,7 +13,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import StructureError
-from ephs.semantics.meaning.components import constant_relation
+from ephs.semantics.meaning.components import constant_relation, largest
 from ephs.semantics.meaning.fields import ROUNDED, Rational
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.verdicts.checks import FLAGS, STATEMENTS
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 BESIDE = 8.0 * ROUNDED
 """Rounding that products of matrices leave, relative to the largest number of the same units."""
+EVALUATED = 64.0 * BESIDE
+"""The same of functions of states, which may be some hundred operations deep."""
+NOWHERE = Trial({}, np.zeros(0), Reference())
 OF_UNITS = "up to the rounding of numbers of the same units"
 
 
@@ -47,13 +50,32 @@ def decided(reversible: "Reversible") -> tuple[Condition, ...]:
         evidence |= dict.fromkeys(replayed(claim, dict.fromkeys(STATEMENTS["reversible"], form)), form)
     found = {statement: Condition(statement, True, how) for statement, how in evidence.items()}
     if isotropic not in found:
-        beside = BESIDE * _beside(reversible, skew)
-        found[isotropic] = _searched(reversible, isotropic, "isotropy", skew + skew.T, np.maximum(beside, beside.T))
+        found[isotropic] = _off(isotropic, _isotropy(reversible, skew))
     if conserved not in found:
-        found[conserved] = _conservation(reversible, conserved, skew, constraint)
+        found[conserved] = _off(conserved, _conservation(reversible, skew, constraint))
     if mirrored not in found and not reversible.external_field:
         found[mirrored] = _parity(reversible, mirrored, skew, constraint)
     return tuple(found[statement] for statement in STATEMENTS["reversible"] if statement in found)
+
+
+def require_by_units(reversible: "Reversible", trial: Trial) -> None:
+    """Check a structure at a state beside numbers of the same units, which others of other units are not.
+
+    Raises
+    ------
+    StructureError
+        An entry is off by more than evaluations are rounded by.
+    """
+    skew, constraint = reversible.structure(trial.states)
+    if not (np.all(np.isfinite(skew)) and np.all(np.isfinite(constraint))):
+        return
+    _isotropy(reversible, skew, trial)
+    _conservation(reversible, skew, constraint, trial)
+    if not constraint.size and not reversible.external_field:
+        signs, interface = reversible.bundle.parity(), reversible.interface
+        there, _ = reversible.structure({p: interface[p].quantity.parity * x for p, x in trial.states.items()})
+        if np.all(np.isfinite(there)):
+            _defect(reversible, "parity", there + signs[:, None] * skew * signs, _beside(reversible, skew), trial)
 
 
 def numbers_of(reversible: "Reversible") -> Claim:
@@ -61,20 +83,22 @@ def numbers_of(reversible: "Reversible") -> Claim:
     return of_formulas(reversible, tuple(float(x) for matrix in reversible.structure({}) for x in np.ravel(matrix)))
 
 
-def _conservation(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
-    """L w = 0 and C w = 0 of the amounts w of each charge, row by row."""
-    of_rows = np.broadcast_to(np.abs(constraint).max(axis=1, keepdims=True, initial=0.0), constraint.shape)
-    rows, largest = np.concatenate([skew, constraint]), np.concatenate([_beside(reversible, skew), of_rows])
-    off = 0.0
-    for kind in reversible.bundle.charges:
-        amounts = reversible.bundle.indicator(kind)
-        defect = rows @ amounts
-        parts = np.abs(defect) / np.maximum(BESIDE * (largest @ np.abs(amounts)), TINY)
-        if parts.max() > 1.0:
-            worst = int(np.argmax(parts))
-            raise _refuted(reversible, "conservation", float(defect[worst]), (worst,), quantity=kind)
-        off = max(off, float(np.abs(defect).max()))
-    return _off(statement, off)
+def _isotropy(reversible: "Reversible", skew: Array, trial: Trial = NOWHERE) -> float:
+    """The largest entry of L + Lᵀ, which is rounding."""
+    beside = _beside(reversible, skew)
+    return _defect(reversible, "isotropy", skew + skew.T, np.maximum(beside, beside.T), trial)
+
+
+def _conservation(reversible: "Reversible", skew: Array, constraint: Array, trial: Trial = NOWHERE) -> float:
+    """The largest entry of L w and C w, which is rounding, of the amounts w of each charge."""
+    rows = np.concatenate([skew, constraint])
+    around = np.concatenate([_beside(reversible, skew), largest(reversible.bundle, constraint.T).T])
+    amounts = {kind: reversible.bundle.indicator(kind) for kind in reversible.bundle.charges}
+    found = [
+        _defect(reversible, "conservation", rows @ each, around @ np.abs(each), trial, quantity=kind)
+        for kind, each in amounts.items()
+    ]
+    return max(found, default=0.0)
 
 
 def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: Array) -> Condition:
@@ -82,7 +106,7 @@ def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: A
     parity = reversible.bundle.parity()
     if all(len(set(parity[row != 0.0])) <= 1 for row in constraint):
         alike = np.where(np.multiply.outer(parity, parity) > 0.0, skew, 0.0)
-        return _searched(reversible, statement, "parity", alike, BESIDE * _beside(reversible, skew))
+        return _off(statement, _defect(reversible, "parity", alike, _beside(reversible, skew), NOWHERE))
     mirrored = -parity[:, None] * skew * parity, constraint * parity
     for words, read in READINGS.items():
         one, other = (
@@ -94,36 +118,29 @@ def _parity(reversible: "Reversible", statement: str, skew: Array, constraint: A
 
 
 def _beside(reversible: "Reversible", matrix: Array) -> Array:
-    """(n, n) the largest entry between ports of the same units, for each."""
-    units = [quantity.unit for _, where, quantity in reversible.bundle.items() for _ in range(where.start, where.stop)]
-    kinds = np.unique(units, return_inverse=True)[1] if units else np.zeros(0, dtype=int)
-    largest = np.zeros((kinds.max(initial=-1) + 1,) * 2)
-    np.maximum.at(largest, (kinds[:, None], kinds), np.abs(matrix))
-    return largest[kinds[:, None], kinds]
+    """(n, n) the largest entry between coordinates of the same units, for each."""
+    bundle = reversible.bundle
+    return largest(bundle, largest(bundle, matrix).T).T
 
 
-def _searched(reversible: "Reversible", statement: str, kind: str, defect: Array, allowed: Array) -> Condition:
-    """A condition whose defect is rounding beside numbers of the same units.
+def _defect(reversible: "Reversible", kind: str, defect: Array, beside: Array, trial: Trial, **facts: object) -> float:
+    """The largest entry of a defect that is rounding beside numbers of the same units.
 
     Raises
     ------
     StructureError
-        An entry of the defect is larger than is ``allowed`` there.
+        An entry is larger than that.
     """
-    off = np.abs(defect) / np.maximum(allowed, TINY)
+    part = BESIDE if trial is NOWHERE else EVALUATED
+    off = np.abs(defect) / np.maximum(part * beside, TINY)
     if off.max(initial=0.0) <= 1.0:
-        return _off(statement, float(np.abs(defect).max(initial=0.0)))
+        return float(np.abs(defect).max(initial=0.0))
     entry = tuple(int(i) for i in np.unravel_index(int(np.argmax(off)), off.shape))
-    raise _refuted(reversible, kind, float(defect[entry]), entry)
+    found = float(defect[entry])
+    facts = {"flag": FLAGS["reversible"], **facts} if kind == "parity" else facts
+    witness = trial.witness(reversible, entry, found)
+    raise StructureError(kind, reversible.name, found=found, entry=entry, witness=witness, **facts)
 
 
 def _off(statement: str, size: float) -> Condition:
     return Condition(statement, False, ("off", f"the numbers are off by {size:.1e}, {OF_UNITS}"))
-
-
-def _refuted(
-    reversible: "Reversible", kind: str, found: float, entry: tuple[int, ...], **facts: object
-) -> StructureError:
-    witness = Trial({}, np.zeros(reversible.bundle.size), Reference()).witness(reversible, entry, found)
-    facts = {"flag": FLAGS["reversible"], **facts} if kind == "parity" else facts
-    return StructureError(kind, reversible.name, found=found, entry=entry, witness=witness, **facts)

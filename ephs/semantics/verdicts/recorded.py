@@ -7,6 +7,7 @@ function computes.
 
 import random
 from collections.abc import Callable, Iterator, Mapping
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,13 +15,14 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.recording import Recording, Untraceable, record
-from ephs.semantics.primitives.forms import run_tape, stacked
+from ephs.semantics.primitives.forms import run_tape, stacked, tape_of
 from ephs.semantics.spaces import manifold
-from ephs.semantics.verdicts.rounding import ROUNDED, rounding, steps_of
+from ephs.semantics.verdicts.rounding import ROUNDED, Factor, exactly, rounding, steps_of
 from ephs.semantics.verdicts.trials import (
     NEAR,
     REFERENCES,
     Trial,
+    affordable,
     beside,
     chosen,
     coordinates,
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 
 POINTS = 32
 """Points of all sizes at which a function and its record are compared."""
+MOST = 4000
+"""Points beside special numbers, at most."""
 OWN = 8
 """Points at which a primitive's own numbers are compared with its formula's, and calls are repeated."""
 DECADES = 6.0
@@ -74,6 +78,9 @@ def require_recorded(primitive: "Primitive") -> tuple[Condition, ...]:
         found = _called(function, given, np.float64 if number % 2 else float)
         if found is not None:
             _require_alike(primitive, recording, trial, found, expected)
+        off = beyond_rounding(primitive, trial) if number < OWN else None
+        if off is not None:
+            raise off
         own = _own(primitive, trial) if number < OWN else None
         if own is not None and np.all(np.isfinite(own)):
             if offset is None:  # an energy is known up to a constant
@@ -101,6 +108,46 @@ def require_steady(primitive: "Primitive") -> None:
         here, there = (_of_record(each, _given(primitive, trial)) for each in (one, two))
         i = int(np.argmax(here != there)) if here.shape == there.shape else 0
         raise _unlike("changing", primitive, trial, i, there[i], here[i])
+
+
+def beyond_rounding(
+    primitive: "Primitive", trial: Trial, otherwise: StructureError | None = None
+) -> StructureError | None:
+    """An identity of a matrix that is off by more than rounding of its record's operations.
+
+    Parameters
+    ----------
+    otherwise
+        The answer where there is no matrix, or no record of it.
+    """
+    tape = None if primitive.kernel is None else tape_of(primitive.kernel)
+    if tape is None or primitive.kernel is None or primitive.kind not in ("reversible", "irreversible"):
+        return otherwise
+    bundle, first, irreversible = primitive.bundle, len(primitive.kernel.potentials), primitive.kind == "irreversible"
+    recording = Recording(tape, primitive.kernel.parameters[first : first + tape.parameters])
+    numbers, outputs, n = _flat(_given(primitive, trial)), list(tape.outputs), bundle.size
+    kept = [kind for kind in bundle.charges if not irreversible or kind != "entropy"]
+    vectors = [("conservation", kind, bundle.indicator(kind)) for kind in kept]
+    vectors += [("energy", "", np.array(numbers[:n]))] * irreversible
+
+    def defects(factor: Factor) -> Array:
+        rows = steps_of(recording, numbers, factor)[outputs].reshape(-1, n)
+        turned = rows[:n] - rows[:n].T if irreversible else rows[:n] + rows[:n].T
+        return np.concatenate([turned, *([rows @ vector] for *_, vector in vectors)], axis=None)
+
+    with np.errstate(all="ignore"):
+        found = defects(exactly)
+        off = ~(np.abs(found) <= rounding(defects, found)) & np.isfinite(found)
+    if not off.any():
+        return None
+    place = int(np.argmax(off))
+    kind, charge, entry = "symmetry" if irreversible else "isotropy", "", (place // n, place % n)
+    if place >= n * n:
+        number, row = divmod(place - n * n, len(outputs) // n)
+        (kind, charge, _), entry = vectors[number], (row,)
+    size = float(found[place])
+    witness = trial.witness(primitive, entry, size)
+    return StructureError(kind, primitive.name, found=size, entry=entry, witness=witness, quantity=charge)
 
 
 def _function(primitive: "Primitive") -> Callable[..., Any]:
@@ -158,7 +205,8 @@ def _points(primitive: "Primitive", recording: Recording) -> Iterator[Point]:
             size = source.choice((1.0, -1.0)) * 10.0 ** source.uniform(-DECADES, DECADES)
             numbers.append(source.uniform(-3.0, 3.0) if coordinate.angle else coordinate.within(size))
         yield numbers, REFERENCES[number // 2 % len(REFERENCES)]
-    for numbers in beside(primitive, special_numbers(primitive, recording.parameters)):
+    near = beside(primitive, special_numbers(primitive, recording.parameters))
+    for numbers in islice(near, affordable(primitive, MOST)):
         yield numbers, reference
 
 

@@ -14,9 +14,12 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.verdicts.checks import NEARER, check_at
+from ephs.semantics.verdicts.constant import require_by_units
+from ephs.semantics.verdicts.recorded import beyond_rounding
 from ephs.semantics.verdicts.trials import (
     REFERENCES,
     Trial,
+    affordable,
     beside,
     chosen,
     coordinates,
@@ -35,6 +38,8 @@ DEFINED = 40
 """Trials in which a structure has to have a finite value once."""
 SHRINKS = 2000
 """Trials on the way to the simplest counterexample, at most."""
+IDENTITIES = ("isotropy", "symmetry", "energy", "conservation")
+"""Exceptions that may be rounding."""
 UNDEFINED = ("finite", "undefined", "no-value")
 """Exceptions that mean that the structure is undefined at a state."""
 
@@ -44,8 +49,10 @@ def failure(primitive: "Primitive", where: Trial) -> StructureError | None:
     try:
         with np.errstate(all="ignore"):  # NaN and infinities are detected in the value
             check_at(primitive, where)
+            if primitive.kind == "reversible":
+                require_by_units(primitive, where)
     except StructureError as error:
-        return error
+        return beyond_rounding(primitive, where, error) if error.kind in IDENTITIES else error
     except (ArithmeticError, ValueError) as error:
         return StructureError(
             "finite", primitive.name, what="the structure", found=f"{type(error).__name__}: {error}",
@@ -82,6 +89,7 @@ def search(primitive: "Primitive", count: int) -> int:
         With the simplest counterexample found as its witness.
     """
     source, special = random.Random(20), special_numbers(primitive)
+    count = affordable(primitive, count)
     undefined: StructureError | None = None
     defined = 0
     for numbers in islice(beside(primitive, special), count):
@@ -110,7 +118,7 @@ def shrunk(
 ) -> StructureError:
     """The same failure at the simplest numbers: each made simpler, as far as the structure still fails."""
     where = coordinates(primitive)
-    numbers, left, changed = list(numbers), SHRINKS, True
+    numbers, left, changed = list(numbers), affordable(primitive, SHRINKS), True
     for start in (REFERENCES[0], reference):
         now = failure(primitive, trial_of(primitive, numbers, start))
         if now is not None and now.kind == found.kind:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.primitives.forms import tape_of
 from ephs.semantics.spaces import SO3, codes, manifold
 
 if TYPE_CHECKING:
@@ -40,6 +41,10 @@ NEAR = 1e-3
 """Relative distance from a special number at which it is near."""
 SPECIAL = 64
 """Numbers of a function that are tried, at most."""
+EVALUATIONS = 4
+"""Evaluations of a structure in a trial: at a state, at its reversal, and at the other quaternions."""
+WORK = 100_000
+"""Operations of a record that trials of one kind take, at most: a fraction of a second."""
 REFERENCES = (Reference(1.0, 0.0), Reference(), Reference(300.0, 300.0))
 """With θ₀ = 1 K and π₀ = 0, numbers of human size are exact as efforts of exergy, too."""
 
@@ -167,11 +172,17 @@ def coordinates(primitive: "Primitive") -> list[Coordinate]:
     return out
 
 
+def affordable(primitive: "Primitive", count: int) -> int:
+    """So many trials of a structure, fewer where its record is long."""
+    tape = None if primitive.kernel is None else tape_of(primitive.kernel)
+    return count if tape is None else max(1, min(count, WORK // (EVALUATIONS * len(tape.operations) + 1)))
+
+
 def special_numbers(primitive: "Primitive", more: Iterable[float] = ()) -> tuple[float, ...]:
     """Numbers beside which a structure may change: those that its function is written with, and usual temperatures."""
     found = [*TEMPERATURES, *more]
     if primitive.formula is not None:
-        found += _written(primitive.formula.function, set())
+        found += _written((primitive.formula.function, primitive.formula.gradient), set())
     found += [float(value) for _, value in primitive.parameters if isinstance(value, int | float)]
     return tuple(dict.fromkeys(x for x in found if math.isfinite(x) and x))[:SPECIAL]
 

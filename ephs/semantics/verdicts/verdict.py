@@ -19,7 +19,7 @@ FORMS: Mapping[str, str] = {
     "squares": "a sum of squares with factors ≥ 0",
     "rounding": "decided up to the rounding of each number",
     "relations": "both are one relation over ℚ, of the numbers {0}",
-    "stated": "by construction: {0}",
+    "stated": "as whoever made it states, by construction: {0}",
     "seen": "that of the process it is made of, seen through e' = T e",
     "both": "as of both parts that it is made of",
     "open": "not proved",

@@ -19,6 +19,7 @@ from ephs.semantics.primitives.primitives import midpoint
 from ephs.semantics.primitives.special import root
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.stage import PLAIN
+from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 
 EPS = np.finfo(float).eps
@@ -169,6 +170,23 @@ def test_slopes_of_functions_are_difference_quotients_without_cancellation(name,
     if expected is not None:
         assert abs(found.slopes[0] - expected) <= 100 * EPS * max(1.0, abs(expected)) / (1.0 - a)
     assert abs(found.start - float(one)) <= 20 * EPS * (1.0 + abs(float(one))) / (1.0 - a)
+
+
+SMALL = ["sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "expm1", "log1p", "cos", "cosh", "acos", "exp"]
+
+
+@pytest.mark.parametrize("name", SMALL)
+@given(decade=st.floats(-15.0, -0.1), sign=st.sampled_from([-1.0, 1.0]))
+def test_functions_and_their_derivatives_have_all_digits_near_zero(name, decade, sign):
+    """Where a cosine less 1 or a quotient of nearly equal numbers would have few."""
+    x, on = sign * 10.0**decade, Duals(PLAIN, 1)
+    found = on.dual(OPERATIONS[name](on, on.along(np.float64(x), 0)))
+    with mpmath.workdps(60):
+        function = EXACT.get(name) or getattr(mpmath, name)
+        at = mpmath.mpf(x)
+        value, slope = function(at), mpmath.diff(function, at, h=abs(at) * mpmath.mpf(10) ** -25)
+        assert abs(float(found.value / value) - 1.0) <= 16 * EPS
+        assert abs(float(found.slopes[0] / slope) - 1.0) <= 16 * EPS
 
 
 def test_every_function_is_tried():

@@ -1,7 +1,11 @@
 """Instants and steps solved by a system's own nesting: what is prescribed, and bounds of rounding."""
 
+import time
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, Reference
@@ -11,8 +15,11 @@ from ephs.operad import Path
 from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.meaning.components import largest, process
 from ephs.semantics.meaning.fields import ROUNDED, Rounded
-from ephs.semantics.meaning.step import solved
-from ephs.semantics.primitives.behaviour import Continuous
+from ephs.semantics.meaning.step import part_of, solved
+from ephs.semantics.primitives.behaviour import Continuous, Natural
+from ephs.semantics.primitives.differences import slope
+from ephs.semantics.systems.laws import random_probe
+from ephs.testing import systems
 
 NOW = Continuous(Reference())
 
@@ -61,3 +68,47 @@ def test_numbers_are_rounded_beside_the_largest_of_their_units():
     assert errors["r", "p"] == pytest.approx(1e6 * ROUNDED)
     assert errors["p", "s"] == pytest.approx(1e9 * ROUNDED)
     assert largest(bundle, np.array([1.0, -3.0, 7.0])).tolist() == [3.0, 3.0, 7.0]
+
+
+def parts_of(system, seed, behaviour):
+    probe = random_probe(system, seed)
+    names = {path: path for path in probe.state}
+    return [part_of(each, path, Whole(probe.state), names, behaviour) for path, each in system.leaves()]
+
+
+class Whole(dict):
+    """States, at the identity where none is given."""
+
+    def __missing__(self, path):
+        return np.zeros(1)
+
+
+@settings(max_examples=20)
+@given(system=systems(max_depth=2), seed=st.integers(0, 2**16), now=st.booleans())
+def test_slopes_of_components_are_those_of_their_results(system, seed, now):
+    """Those of structures are exact, of columns all at once; over a step and at an instant."""
+    rng = np.random.default_rng(seed)
+    for part in parts_of(system, seed, NOW if now else Natural(Reference(293.15, 300.0), 1e-2)):
+        at = 0.1 * rng.standard_normal(len(part.arguments))
+        found, expected = part.slope(at), slope(part.value, at)
+        assert found.shape == (len(part.results), len(part.arguments))
+        assert np.abs(found - expected).max(initial=0.0) <= 1e-6 * (1.0 + np.abs(expected).max(initial=0.0))
+
+
+def chain(count):
+    """Masses in a line, with springs to both sides and friction."""
+    text, parts = ["s: entropy", "env(s)"], {"env": lib.environment()}
+    for i in range(count):
+        text += [f"q{i}: displacement", f"p{i}: momentum", f"k{i}(q=q{i})", f"m{i}(p=p{i})", f"d{i}(p=p{i}, s)"]
+        text += [f"g{i}(q=q{i}, p=p{i})"] + [f"h{i}(q=q{i}, p=p{i - 1})"] * (i > 0)
+        parts |= {f"k{i}": lib.spring(k=1.0 + i), f"m{i}": lib.point_mass(m=1.0), f"d{i}": lib.friction(d=0.1)}
+        parts |= {f"g{i}": lib.pkc()} | ({f"h{i}": lib.pkc()} if i else {})
+    return Pattern.from_text("; ".join(text))(**parts)
+
+
+def test_fifty_boxes_are_checked_in_ten_seconds():
+    system = chain(10)
+    assert len(list(system.leaves())) == 50
+    start = time.process_time()
+    assert system.check().ok
+    assert time.process_time() - start <= 10.0

@@ -1,4 +1,4 @@
-"""Proofs are data that a small checker replays: what proves the library, and nothing that was tampered with."""
+"""Proofs are data, replayed without search: what proves the library, and nothing that was tampered with."""
 
 import json
 import random
@@ -7,21 +7,24 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, System, junction
 from ephs import quantity as Q
 from ephs.operad import PatternError, Space
-from ephs.semantics import Reference, library
+from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.primitives.primitives import Formula
 from ephs.semantics.primitives.special import sinhc
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.bounds import signs
 from ephs.semantics.symbols.terms import OPERATIONS
 from ephs.semantics.verdicts.checks import STATEMENTS
-from ephs.semantics.verdicts.claims import Seen, frame_of
+from ephs.semantics.verdicts.claims import Claim, Seen, frame_of
 from ephs.semantics.verdicts.expansion import Expander
 from ephs.semantics.verdicts.proving import proof_of, replay
+from ephs.semantics.verdicts.replay import replayed
 from ephs.semantics.verdicts.sums import Unexpandable, number_of, scaled
 from ephs.semantics.verdicts.verdict import as_evidence
 from tests.semantics.test_primitives import ARGUMENTS, made
@@ -303,3 +306,32 @@ def test_the_gradient_of_a_turned_energy_is_proved_and_a_wrong_one_is_not():
     assert replay(lifted, {gradient: ["expansion", "as given"]}) == {gradient}
     wrong = replace(lifted, formula=Formula(height, (), lambda q: [-slope(q)[0]]), trusted=True)
     assert not replay(wrong, {gradient: ["expansion", "as given"]})
+
+
+@pytest.mark.parametrize("energy", [lambda s: s**3, lambda s: s + np.sin(s), lambda s: s * abs(s)])
+def test_a_temperature_that_may_be_zero_is_not_proved(energy):
+    """∂E/∂s ≥ 0 is no proof of ∂E/∂s > 0."""
+    try:
+        assert ephs.storage({"s": Q.entropy}, energy).verdict == "searched"
+    except StructureError as error:
+        assert error.kind == "cold"
+
+
+@pytest.mark.parametrize("kind", ["irreversible", "storage"])
+def test_what_is_decided_to_rounding_is_of_dirac_structures(kind):
+    """Skewness is no symmetry, and no sign: evidence of one kind proves nothing of another."""
+    seen = (Seen(("p",), (-np.inf, np.inf), 0, -1),)
+    claim = Claim(kind, (0.0, -1.0, 1.0, 0.0), seen, (1, 1), (), (False, True), None, {})
+    assert not replayed(claim, {statement: ("rounding",) for statement in STATEMENTS[kind]})
+
+
+@given(st.floats(-12.0, 0.0), st.floats(0.0, 9.0))
+def test_each_number_is_rounded_by_itself(size, large):
+    """What leaks energy, or a charge, beside large numbers is not decided to be rounding."""
+    leak, big = 10.0**size, 10.0**large
+    energy = np.array([[0.0, -big, 0.0], [big, 0.0, leak], [0.0, leak, 0.0]])
+    charge = np.array([[0.0, -big, 0.0], [big, 0.0, -leak], [0.0, leak, 0.0]])
+    for matrix, place in ((energy, 0), (charge, 1)):
+        claim = Claim("reversible", tuple(matrix.ravel().tolist()), (), (1, -1, 1), ((0.0, 0.0, 1.0),), (), None, {})
+        statement = STATEMENTS["reversible"][place]
+        assert not replayed(claim, {statement: ("rounding",)})

@@ -1,0 +1,200 @@
+"""Drawn right parts, by kinds: none is to be refused."""
+
+import math
+
+import numpy as np
+
+import ephs
+from ephs import quantity as Q
+from ephs.operad import Quantity, Space
+from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, friction, gyrator, large, stored
+
+
+def motor(source):
+    """A constant gyrator between odd quantities, in a magnet's field; with the numbers as a product leaves them."""
+    k = source.uniform(0.1, 3.0) * 0.1 / 0.3
+    return gyrator({"p": Q.momentum, "b": Q.flux_linkage}, k * TURN, external_field=True)
+
+
+def circulator(source):
+    a, b, c = (source.uniform(-2.0, 2.0) for _ in "abc")
+    ports = {name: Q.momentum for name in ("p", "q", "r")}
+    return gyrator(ports, [[0.0, a, -b], [-a, 0.0, c], [b, -c, 0.0]], external_field=True)
+
+
+def lorentz(source):
+    """A charge in a field of its place."""
+    b = source.uniform(0.1, 2.0)
+    ports = {"p": Q.momentum, "r": Q.momentum, **X}
+    return gyrator(ports, lambda x: b * np.cosh(x) * TURN, external_field=True)
+
+
+def two_units(source):
+    whole = np.zeros((4, 4))
+    whole[:2, :2], whole[2:, 2:] = large(source) * TURN, source.uniform(0.1, 3.0) * TURN
+    return gyrator({**QP, **CB}, whole)
+
+
+def turned(source):
+    """A coupling of three axes in turned coordinates: a product of matrices, which rounds."""
+    angle = source.uniform(0.0, 6.0)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    block = turn @ np.diag([source.uniform(0.5, 2.0), 1e3]) @ turn.T
+    whole = np.block([[np.zeros((2, 2)), -block], [block.T, np.zeros((2, 2))]])
+    ports = {"x": Q.displacement, "y": Q.displacement, "p": Q.momentum, "r": Q.momentum}
+    return gyrator(ports, whole)
+
+
+def skew_of_states(source):
+    a, b = source.uniform(-2.0, 2.0), source.uniform(-2.0, 2.0)
+    hide = source.choice((float, lambda x: x))
+
+    def matrix(x):
+        y = hide(x)
+        k = 1.0 + a * y + b * y**2
+        return [[0.0, -k], [k, 0.0]]
+
+    return gyrator({**QP, **X}, matrix)
+
+
+def written_in_two_ways(source):
+    a = source.uniform(0.5, 2.0)
+    return gyrator({**QP, **X}, lambda x: [[0.0, (x + a) ** 2 - a**2], [-x * (x + 2.0 * a), 0.0]])
+
+
+def lever(source):
+    length = source.uniform(0.5, 2.0)
+    ports = {"p": Q.momentum, "r": Q.momentum, "~a": Q.angle}
+    return lambda: ephs.transformer(ports, lambda a: [[length * np.cos(a)]])
+
+
+def rolling(source):
+    radius = source.uniform(0.1, 2.0)
+    ports = {"x": Q.momentum, "y": Q.momentum, "w": Q.angular_momentum, "~a": Q.angle}
+    return lambda: ephs.constraint(
+        ports, lambda a: [[1.0, 0.0, -radius * np.cos(a)], [0.0, 1.0, -radius * np.sin(a)]], multipliers=2
+    )
+
+
+def rotated_pair(source):
+    k = source.uniform(0.5, 2.0)
+
+    def matrix(a):
+        w, x, y, z = a[0], a[1], a[2], a[3]
+        turn = np.array([
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ])  # fmt: skip
+        whole = np.zeros((12, 12), dtype=object)
+        whole[:3, 6:9], whole[6:9, :3] = -k * turn, k * turn.T
+        whole[3:6, 9:], whole[9:, 3:6] = -turn, turn.T
+        return whole
+
+    return gyrator({"q": Q.pose, "p": Q.body_momentum, "~a": Q.pose}, matrix)
+
+
+def convex(source):
+    a, b = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    energy, gradient = source.choice((
+        (lambda q: a * q**4 + b * q**2, lambda q: [4.0 * a * q**3 + 2.0 * b * q]),
+        (lambda q: a * (np.cosh(b * q) - 1.0), lambda q: [a * b * np.sinh(b * q)]),
+        (lambda q: a * np.sqrt(b + q**2), lambda q: [a * q / np.sqrt(b + q * q)]),
+        (lambda q: a * np.log(b + q**2), lambda q: [2.0 * a * q / (b + q**2)]),
+        (lambda q: a * np.log(np.exp(q) + np.exp(-q)), lambda q: [a * np.tanh(q)]),
+    ))  # fmt: skip
+    return stored(energy, gradient)
+
+
+def convex_hidden(source):
+    a, b = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    energy, gradient = source.choice((
+        (lambda q: a * float(q) ** 4 + b, lambda q: [4.0 * a * float(q) ** 3]),
+        (lambda q: a * math.cosh(b * float(q)), lambda q: [a * b * math.sinh(b * float(q))]),
+        (lambda q: a * abs(float(q)) ** 3, lambda q: [3.0 * a * float(q) * abs(float(q))]),
+        (lambda q: a * math.atan(b * float(q)), lambda q: [a * b / (1.0 + (b * float(q)) ** 2)]),
+    ))  # fmt: skip
+    return stored(energy, gradient)
+
+
+def several_states(source):
+    a = np.array([[source.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(3)])
+    k = a @ a.T
+    k = 0.5 * (k + k.T)
+
+    def energy(x, y, z):
+        v = np.array([x, y, z])
+        return 0.5 * (v @ k @ v) + x**2 * y**2
+
+    def gradient(x, y, z):
+        return list(k @ np.array([x, y, z]) + np.array([2.0 * x * y**2, 2.0 * x**2 * y, 0.0 * z]))
+
+    return stored(energy, gradient, ports={"x": Q.displacement, "y": Q.charge, "z": Q.angle})
+
+
+def warm(source):
+    a, b = source.uniform(0.1, 3.0), source.uniform(1.0, 300.0)
+    energy = source.choice((
+        lambda s: a * np.exp(s / b),
+        lambda s: a * b * s + np.log(1.0 + np.exp(s)),
+        lambda s: a * (s + np.sqrt(b + s**2)),
+    ))  # fmt: skip
+    return stored(energy, ports={"s": Q.entropy})
+
+
+def damper(source):
+    a, b = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    d = source.choice((
+        lambda p, s: a, lambda p, s: abs(p), lambda p, s: p**2, lambda p, s: a * abs(p) + b * p**2,
+        lambda p, s: a * np.exp(-b * p**2), lambda p, s: a / np.sqrt(b + p**2), lambda p, s: a * np.exp(-s / 300.0),
+        lambda p, s: a if abs(p) < b else 2.0 * a, lambda p, s: a + b * math.tanh(float(s)),
+    ))  # fmt: skip
+    return friction(d)
+
+
+def valve(source):
+    a = source.uniform(0.1, 3.0)
+    return friction(lambda p, s: a * (1.0 + np.tanh(p)), one_sided=True)
+
+
+def conductor(source):
+    a = source.uniform(0.1, 3.0)
+    k = source.choice((
+        lambda x, y: a, lambda x, y: a * x * y, lambda x, y: a * (x + y), lambda x, y: a * (x**2 + y**2) * (x + y),
+        lambda x, y: math.sqrt(float(x) * float(y)),
+    ))  # fmt: skip
+    return conduct(k)
+
+
+def friction_of_two(source):
+    """Both bodies of a contact are heated; a matrix of rank one, and a lawful block of other units."""
+    a, b = source.uniform(0.1, 3.0), large(source)
+
+    def matrix(p, r, s, x, y):
+        n = np.array([s, -s, r - p, 0.0 * x, 0.0 * y])
+        m = a * np.outer(n, n) / s
+        m[3:, 3:] = b * np.array([[y / x, -1.0], [-1.0, x / y]])
+        return m
+
+    ports = {"p": Q.momentum, "r": Q.momentum, "s": Q.entropy, "x": Q.entropy, "y": Q.entropy}
+    return lambda: ephs.irreversible(ports, matrix)
+
+
+def sheared(source):
+    """A damper in three directions, whose matrix is a product that rounds."""
+    a = np.array([[source.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(3)])
+    d = a.T @ a
+
+    def matrix(p, s):
+        force = d @ p
+        m = np.zeros((4, 4), dtype=object)
+        m[:3, :3], m[:3, 3], m[3, :3], m[3, 3] = s * d, -force, -force, (p @ force) / s
+        return m
+
+    return lambda: ephs.irreversible({"p": Quantity("momentum", Space("real", 3, 3), -1), "s": Q.entropy}, matrix)
+
+
+RIGHT = (
+    motor, circulator, lorentz, two_units, turned, skew_of_states, written_in_two_ways, lever, rolling, rotated_pair,
+    convex, convex_hidden, several_states, warm, damper, valve, conductor, friction_of_two, sheared,
+)  # fmt: skip
