@@ -4,9 +4,9 @@ Where surfaces may touch and tolerances are coarse, steps are semi-implicit: los
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
-Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less. Where surfaces may
-touch, radau is tried when explicit steps have cost as much as a trial does, which grows with the cube of the freedoms;
-after a trial in vain, when they have cost twice as much as before.
+Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less. Many bodies, whose
+surfaces may touch, try radau when explicit steps have cost as much as a trial does, which grows with the cube of the
+freedoms; after a trial in vain, when they have cost twice as much as before.
 """
 
 from typing import TYPE_CHECKING, Any, final
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
 FREEDOMS = 64
-"""Degrees of freedom up to which factorising their matrix costs less than an explicit method's shorter steps."""
+"""Degrees of freedom up to which a trial of radau costs little."""
 TRIAL = 400
 """Explicit steps between surfaces that may touch, after which radau is tried: a stop at slip 0 hides its stiffness."""
 SOLUTIONS = 6
@@ -61,16 +61,16 @@ class Auto(ReducedMethod):
         self._held = self._free = self._failures = 0
         self._trial: int | None = None
         self._waits = self._asleep = 0
-        self._returns = _touches(equations)
+        self._returns, touches = False, _touches(equations)
         self._semi: Explicit | None = None
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
         self.counts: dict[str, Any] = {"chosen": name, "switches": []}
-        if self._returns and name == "rk54" and control.rtol.value > COARSE and cheap(equations):
+        if touches and name == "rk54" and control.rtol.value > COARSE and cheap(equations):
             self._semi = semi_implicit(equations, control)
             self.name = self.counts["chosen"] = self._semi.name
             self.exponent, self.share = self._semi.exponent, self._semi.share
-        elif self._returns:
+        elif touches:
             self._begin()
 
     def _begin(self) -> None:
@@ -78,14 +78,15 @@ class Auto(ReducedMethod):
         self._semi = None
         self.exponent, self.share = self._explicit.exponent, self._explicit.share
         self.name = self._explicit.name
-        factors, solutions = costs(self.equations.n)
-        self._waits = self._asleep = WINDOW * (factors + SOLUTIONS * solutions) // self._explicit.method.c.size
-        if self.name == "rk54" and self.equations.n <= FREEDOMS:
-            self._trial = TRIAL
-            if self.control.rtol.value > LOOSE:
-                self._trial, self._returns = None, False
-                self._go_implicit()
-                self.name = "radau"
+        if self.equations.n > FREEDOMS:
+            factors, solutions = costs(self.equations.n)
+            self._waits = self._asleep = WINDOW * (factors + SOLUTIONS * solutions) // self._explicit.method.c.size
+            self._returns = True
+        elif self.name == "rk54" and self.control.rtol.value > LOOSE:
+            self._go_implicit()
+            self.name = "radau"
+        elif self.name == "rk54":
+            self._trial, self._returns = TRIAL, True
         self.counts["chosen"] = self.name
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:

@@ -240,8 +240,7 @@ def acosh(on: Evaluator, x: Real) -> Real:
 
 def atanh(on: Evaluator, x: Real) -> Real:
     """Area whose hyperbolic tangent is x."""
-    size = on.absolute(x)
-    return on.copysign(0.5, x) * log1p(on, 2.0 * size / (1.0 - size))
+    return 0.5 * (log1p(on, x) - log1p(on, -x))
 
 
 COMPOSED: Final[Mapping[str, Value]] = MappingProxyType(
