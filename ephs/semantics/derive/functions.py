@@ -142,6 +142,15 @@ def _of_asinh(on: Evaluator, a: Real, b: Real) -> Real:
     return _of_logarithm(on, a + one, b + other) * (1.0 + (a + b) / (one + other))
 
 
+def atanh(on: Evaluator, x: Real) -> Real:
+    """Area whose hyperbolic tangent is x."""
+    return 0.5 * (log1p(on, x) - log1p(on, -x))
+
+
+def _of_atanh(on: Evaluator, a: Real, b: Real) -> Real:
+    return 0.5 * (_of_logarithm(on, 1.0 + a, 1.0 + b) + _of_logarithm(on, 1.0 - a, 1.0 - b))
+
+
 def _of_absolute(on: Evaluator, a: Real, b: Real) -> Real:
     """(a + b)/(|a| + |b|); 0 at the kink."""
     below = on.absolute(a) + on.absolute(b)
@@ -194,6 +203,7 @@ FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
         "log1p": Rule(log1p, lambda on, a, b: _of_logarithm(on, 1.0 + a, 1.0 + b)),
         "atan": Rule(atan, _of_angle),
         "asinh": Rule(asinh, _of_asinh),
+        "atanh": Rule(atanh, _of_atanh),
         "turn_ratio": series(_TURN_RATIO),
         "turn_curve": series(_TURN_CURVE),
         "turn_curve_slope": series(_TURN_CURVE_SLOPE),
@@ -238,12 +248,7 @@ def acosh(on: Evaluator, x: Real) -> Real:
     return on.log(x + on.sqrt((x - 1.0) * (x + 1.0)))
 
 
-def atanh(on: Evaluator, x: Real) -> Real:
-    """Area whose hyperbolic tangent is x."""
-    return 0.5 * (log1p(on, x) - log1p(on, -x))
-
-
 COMPOSED: Final[Mapping[str, Value]] = MappingProxyType(
-    {"tan": tan, "asin": asin, "acos": acos, "acosh": acosh, "atanh": atanh, "sinhc": sinhc}
+    {"tan": tan, "asin": asin, "acos": acos, "acosh": acosh, "sinhc": sinhc}
 )
 """Functions without one."""
