@@ -176,6 +176,13 @@ def tape_of(kernel: Kernel) -> Tape | None:
             return None
 
 
+def own_tape(kernel: Kernel) -> Tape | None:
+    """The same of a kernel that is not seen through maps: its tape gives the component's own matrix."""
+    of = kernel.relation
+    seen = isinstance(of, relations.Reversible | relations.Irreversible) and of.maps is not None
+    return None if seen else tape_of(kernel)
+
+
 def recorded_values(kernel: Kernel) -> Callable[[Sequence[float]], Array]:
     """Evaluation of a kernel's tape at numbers, in the recorded shape; NaN where it has no value."""
     tape = tape_of(kernel)

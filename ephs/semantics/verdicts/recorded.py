@@ -15,7 +15,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.recording import Recording, Untraceable, record
-from ephs.semantics.primitives.forms import run_tape, stacked, tape_of
+from ephs.semantics.primitives.forms import own_tape, run_tape, stacked
 from ephs.semantics.spaces import manifold
 from ephs.semantics.verdicts.rounding import ROUNDED, Factor, exactly, rounding, steps_of
 from ephs.semantics.verdicts.trials import (
@@ -120,7 +120,7 @@ def beyond_rounding(
     otherwise
         The answer where there is no matrix, or no record of it.
     """
-    tape = None if primitive.kernel is None else tape_of(primitive.kernel)
+    tape = None if primitive.kernel is None else own_tape(primitive.kernel)
     if tape is None or primitive.kernel is None or primitive.kind not in ("reversible", "irreversible"):
         return otherwise
     bundle, first, irreversible = primitive.bundle, len(primitive.kernel.potentials), primitive.kind == "irreversible"
