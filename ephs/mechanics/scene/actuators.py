@@ -27,7 +27,7 @@ class Actuator(Element, section="actuators", said="actuators: forces on joints b
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """How many ratios there may be: one is that of all joints."""
+        """Admissible numbers of ratios; a single ratio holds for all joints."""
         return 1, len(self.joints) or 1
 
     @rule(

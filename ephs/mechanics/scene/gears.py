@@ -55,7 +55,7 @@ class Gear(Element, section="gears", said="linear relations between the rates of
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """How many ratios there may be."""
+        """Admissible numbers of ratios."""
         return (len(self.joints) - 1,)
 
     @rule(

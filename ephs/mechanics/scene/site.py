@@ -195,7 +195,7 @@ class Site:
 
 
 def built(scene: "Scene") -> Level:
-    """What the elements of a level that build themselves add to its system; made once and kept with the scene."""
+    """Junctions, boxes and inputs of the elements of a level; made once and kept with the scene."""
     from ephs.mechanics.scene.model import elements_of
 
     def made() -> Level:

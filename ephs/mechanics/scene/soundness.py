@@ -87,10 +87,10 @@ def _all(scene: Scene) -> Iterator[tuple[str, SceneElement | Element]]:
 
 
 def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
-    """Every number with its required shape."""
+    """Every number with its required shape, but those of elements whose models check them."""
     yield "world", scene.world.values()
     yield from ((f"{path}ground", {"origin": (level.origin, (7,))}) for path, level in scene.levels())
-    for name, each in _all(scene):
+    for name, each in (pair for section in ELEMENTS for pair in scene.every(section)):
         match each:
             case Joint():
                 yield name, _joint(name, each)
@@ -102,8 +102,6 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
                 yield name, each.values() | {"points": (each.points, (len(each.bodies), 3))}
             case SceneElement():
                 yield name, each.values()
-            case Element():
-                pass  # its model has checked them
 
 
 def _surface(name: str, surface: Surface) -> Sizes:

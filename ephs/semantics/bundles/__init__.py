@@ -1,1 +1,1 @@
-"""What a port carries: layouts, arguments, domains, errors."""
+"""Port bundles: layout of flows and efforts at ports, checked arguments, domains, errors."""

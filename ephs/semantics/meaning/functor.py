@@ -25,7 +25,7 @@ _Port: TypeAlias = tuple[float, Path | None, Path, PortType]
 @final
 @dataclass(frozen=True, slots=True)
 class Theory:
-    """What a pattern says of the variables at ports, by their kind.
+    """Junction rules by kind of variable: balance or equality.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def _open(primitive: Primitive) -> LinearRelation:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """What a component relates over a step or at an instant, at fixed states.
+    """Local relation of a component over a step or at an instant, at fixed states.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def part_of(
     names: Mapping[Path, Path],
     behaviour: Continuous | Natural,
 ) -> Part:
-    """What the component at this path relates."""
+    """Local relation of the component at a path."""
     bundle = primitive.bundle
     local = behaviour.behaviour(primitive, {port: states[path / port] for port in primitive.reads})
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
@@ -207,7 +207,7 @@ def touching(primitive: Primitive, path: Path, part: Part, guess: Guess) -> Line
 class Tangents:
     """Equations between rates, efforts, multipliers and outer variables alone, affine ones at each guess.
 
-    What the pattern says is found once, by its own nesting; what components say is put in.
+    Equations of the pattern are eliminated once, by its own nesting; those of components are inserted at each guess.
     """
 
     def __init__(self, junctions: LinearRelation, parts: Mapping[Path, Part]) -> None:

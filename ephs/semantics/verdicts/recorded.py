@@ -126,6 +126,13 @@ def beyond_rounding(
     bundle, first, irreversible = primitive.bundle, len(primitive.kernel.potentials), primitive.kind == "irreversible"
     recording = Recording(tape, primitive.kernel.parameters[first : first + tape.parameters])
     numbers, outputs, n = _flat(_given(primitive, trial)), list(tape.outputs), bundle.size
+    if otherwise is not None:
+        own = _own(primitive, trial)
+        try:  # a record says nothing of another matrix
+            expected = steps_of(recording, numbers)[outputs]
+            _require_alike(primitive, recording, trial, np.zeros(0) if own is None else own, expected)
+        except StructureError:
+            return otherwise
     kept = [kind for kind in bundle.charges if not irreversible or kind != "entropy"]
     vectors = [("conservation", kind, bundle.indicator(kind)) for kind in kept]
     vectors += [("energy", "", np.array(numbers[:n]))] * irreversible

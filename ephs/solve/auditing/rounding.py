@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.operad import Quantity
+from ephs.operad import Quantity, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import Pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.methods.stored import guessed_efforts
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import compile_model
 from ephs.solve.result.states import RecordedStates
 
@@ -24,6 +24,9 @@ SOLVED = 100.0 * float(np.finfo(float).eps)
 """Relative rounding of solved unknowns, times the root of the number of steps: 10 κ ε with a condition κ of 10."""
 ROUNDING = 8.0 * float(np.finfo(float).eps)
 """Rounding of a difference of stored amounts, relative to them."""
+LINEAR = 3
+"""Number of the first linear entry of a twist, (angular, linear)."""
+UNIT = np.eye(6)[LINEAR]
 POSE = np.eye(6)
 """Twists of a pose's coordinates: (angular, linear)."""
 PLACES = {"displacement": POSE[:, 3:4], "angle": POSE[:, :1]}
@@ -70,43 +73,55 @@ def trembling(solution: "Solution") -> float:
     d, states = problem.descriptor, solution.states
     places = [states[slot.path][:, 4:] for slot in d.states if slot.quantity.kind == "pose"]
     far = max((float(np.abs(place).max(initial=0.0)) for place in places), default=0.0)
-    mass = 0.0 if problem.scene is None else sum(float(body.mass) for _, body in problem.scene.all_bodies())
     away = _part(solution) * max(far, problem.length)
     x = states.x[-1] if isinstance(states, RecordedStates) else d.pack(solution.state_at(len(solution) - 1))
-    turned, pushed = _pushes(problem, float(solution.t[0]), x)
+    mass, turned, pushed = _held(problem, float(solution.t[0]), x)
     return 0.5 * mass * (away / h) ** 2 + pushed * away + turned * _part(solution) if h else 0.0
 
 
-def _pushes(problem: "Problem", t: float, x: Array) -> tuple[float, float]:
-    """Sums of the sizes of torques in N m and forces in N of storages at the states x."""
+def _held(problem: "Problem", t: float, x: Array) -> tuple[float, float, float]:
+    """Mass of all bodies in kg; sums of the sizes of torques in N m and forces in N of storages at the states x."""
     d = problem.descriptor
-    turning, moving = once(d, "places of storages", lambda: _places(d))
-    if not (turning.size or moving.size):
-        return 0.0, 0.0
-    model = compile_model(d, problem.reference, problem.inputs(t, problem.initial))
-    sizes = np.abs(guessed_efforts(model, x)[d.rate_size :])
-    return float(sizes[turning].sum()), float(sizes[moving].sum())
+    turning, moving, momenta, velocities = once(d, "places of storages", lambda: _places(d))
+    if not (turning.size or moving.size or velocities.size):
+        return 0.0, 0.0, 0.0
+    stored = Stored(compile_model(d, problem.reference, problem.inputs(t, problem.initial)))
+    sizes = np.abs(stored.efforts(x)[d.rate_size :])
+    unit = x.copy()  # momenta of 1 N s along x: velocities are inverse masses
+    unit[momenta] = UNIT
+    inverse = stored.efforts(unit)[d.rate_size :][velocities]
+    mass = float(np.sum(1.0 / inverse[inverse > 0.0]))
+    return mass, float(sizes[turning].sum()), float(sizes[moving].sum())
 
 
-def _places(d: Descriptor) -> tuple[Index, Index]:
-    """Numbers of the efforts of storages that are torques on places, and of those that are forces."""
+def _places(d: Descriptor) -> tuple[Index, Index, Index, Index]:
+    """Numbers of the efforts of storages that are torques on places, and of those that are forces; (bodies, 6) numbers
+    of the momenta of bodies, and those of their velocities along x."""
     turning: list[int] = []
     moving: list[int] = []
+    momenta: list[list[int]] = []
+    velocities: list[int] = []
     for slot in d.components:
-        of = slot.primitive
-        for _, where, quantity in of.bundle.items() if isinstance(of, Storage) else ():
-            twists = _twists(quantity)
+        if not isinstance(slot.primitive, Storage):
+            continue
+        for (_, where, carried), state in zip(slot.primitive.bundle.items(), slot.reads, strict=True):
+            twists = _twists(carried)
             if twists is not None:
                 for turns, effort in zip(np.any(twists[:3], axis=0).tolist(), slot.efforts[where], strict=True):
                     (turning if turns else moving).append(effort)
-    return np.array(turning, dtype=np.int64), np.array(moving, dtype=np.int64)
+            if carried == quantity.body_momentum:
+                momenta.append(list(range(state.point.start, state.point.stop)))
+                velocities.append(slot.efforts[where][LINEAR])
+    whole = np.array(momenta, dtype=np.int64).reshape(-1, 6)
+    one, two, three = (np.array(each, dtype=np.int64) for each in (turning, moving, velocities))
+    return one, two, whole, three
 
 
-def _twists(quantity: Quantity) -> Array | None:
+def _twists(carried: Quantity) -> Array | None:
     """(6, d) twists of a place's coordinates; None of what is no place."""
-    if quantity.kind == "pose":
+    if carried.kind == "pose":
         return POSE
-    return Pair.from_space(quantity.space).basis if quantity.kind == "relative_pose" else PLACES.get(quantity.kind)
+    return Pair.from_space(carried.space).basis if carried.kind == "relative_pose" else PLACES.get(carried.kind)
 
 
 def _part(solution: "Solution") -> float:
