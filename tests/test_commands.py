@@ -165,7 +165,7 @@ def test_animate_refuses_what_it_cannot_show(tmp_path, capsys, folder, page, wor
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_run_is_readable_and_goes_on_to_the_undisturbed_numbers(tmp_path, capsys, how):
     scene, folder = ROOT / "scenes/slider-crank.toml", tmp_path / "out"
-    words = ["run", str(scene), "--until", "5", "--method", "natural", "--step", "1e-4", "--keep", "400", "--out"]
+    words = ["run", str(scene), "--until", "2", "--method", "natural", "--step", "1e-4", "--keep", "160", "--out"]
     journal = folder / "run.journal"
     listening = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "  # also in background
     command = [sys.executable, "-c", f"{listening}from ephs.cli import main; sys.exit(main(sys.argv[1:]))"]
@@ -182,7 +182,7 @@ def test_an_interrupted_run_is_readable_and_goes_on_to_the_undisturbed_numbers(t
     assert main(["run", str(folder), "--resume"]) == 0
     assert main([*words, str(tmp_path / "whole")]) == 0
     found, whole = (ephs.load_solution(tmp_path / name / "solution.nc") for name in ("out", "whole"))
-    assert 1 < len(there) < len(whole) == 401
+    assert 1 < len(there) < len(whole) == 161
     for path, values in whole.states.items():
         assert (found[path] == values).all()
         assert (there[path] == values[: len(there)]).all()

@@ -1,5 +1,7 @@
 """Primitives are the structure that they claim to be, or are refused with the condition that fails."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,7 +35,9 @@ ARGUMENTS = {
 seeds = st.integers(0, 2**20)
 
 
+@cache
 def made(name):
+    """A primitive of the library; its verdict, up to two seconds, is asked once."""
     return getattr(library, name)(**ARGUMENTS[name])
 
 

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
@@ -40,6 +40,7 @@ def through_a_file(sol: ephs.Solution, folder, **options) -> ephs.Solution:
     return ephs.load_solution(folder / "sol.nc")
 
 
+@settings(max_examples=25)
 @given(mechanisms(), st.booleans(), st.booleans())
 def test_mechanisms_come_back_bit_by_bit(tmp_path_factory, scene, pushed, wrenches):
     last = list(scene.bodies)[-1]

@@ -50,7 +50,7 @@ def shifted(model, state, part, by):
     return model.unpack(array)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(drawn=moving())
 def test_accelerations_differentiate_as_differences_say(drawn):
     _, model, state, rng = drawn
@@ -75,7 +75,7 @@ def test_accelerations_differentiate_as_differences_say(drawn):
     close(exact.acceleration_force, linear)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(drawn=moving())
 def test_forces_differentiate_as_differences_say(drawn):
     _, model, state, rng = drawn
@@ -96,7 +96,7 @@ def test_forces_differentiate_as_differences_say(drawn):
     close(exact.force_a, difference(lambda v: forces(state, model.layout.by_joint(wanted + v)), n))
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(drawn=moving(loops=False))
 def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
     """∂ṙ/∂q = −M⁻¹ ∂τ/∂q at the same accelerations, where nothing is prescribed and no loop closed: to rounding."""

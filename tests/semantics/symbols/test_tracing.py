@@ -20,7 +20,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text
 from ephs.semantics.verdicts.checks import random_point
-from tests.semantics.test_primitives import ARGUMENTS
+from tests.semantics.test_primitives import ARGUMENTS, made
 
 UNARY = [np.sin, np.cos, np.tanh, np.arctan, np.exp, np.cosh, np.sinh, np.expm1, abs]
 seeds = st.integers(0, 2**20)
@@ -145,14 +145,14 @@ EXPANDED = ("coil", "winding", "orifice", "reaction", "ideal_mixture")
 
 @pytest.mark.parametrize("name", [name for name in ARGUMENTS if name not in ("environment", *EXPANDED)])
 def test_docstrings_show_what_the_formula_says(name):
-    primitive = getattr(library, name)(**ARGUMENTS[name])
+    primitive = made(name)
     assert formula_text(primitive) in " ".join(getattr(library, name).__doc__.split())
 
 
 @pytest.mark.parametrize("name", [name for name in ARGUMENTS if name != "environment"])
 @given(seed=seeds)
 def test_what_is_simulated_is_what_the_formula_says(name, seed):
-    primitive = getattr(library, name)(**ARGUMENTS[name])
+    primitive = made(name)
     _agrees(primitive, np.random.default_rng(seed))
 
 
