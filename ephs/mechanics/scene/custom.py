@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 import numpy as np
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 
-from ephs.mechanics.scene.element import OUTSIDE, Number
+from ephs.mechanics.scene.element import GROUND, OUTSIDE, Number
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.schema_numbers import Entry
 from ephs.mechanics.scene.units import dimension, written
 from ephs.operad import Path, PatternError
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.site import Site
@@ -48,7 +49,14 @@ class ElementError(ValueError):
 
 
 def key(
-    meaning: str, default: Any = ..., *, unit: str = "", shown: str | None = None, names: str = "", **more: Any
+    meaning: str,
+    default: Any = ...,
+    *,
+    unit: str = "",
+    shown: str | None = None,
+    names: str = "",
+    frame: str = "",
+    **more: Any,
 ) -> Any:
     """A key of an element's table; it is required where it has no default.
 
@@ -65,29 +73,32 @@ def key(
     names
         Kind of the elements that it names: ``body``, ``node`` (of heat), ``joint``, ``axis`` (a joint with one free
         degree of freedom), ``single`` (with one, free or prescribed), ``tendon``, ``surface``.
+    frame
+        Of a point: the key of the body in whose frame it is, or on the ground in the world; ``bodies[1]`` of a list, of
+        a list of points that of a list with a body for each. Points of the ground move with the part that has them.
     more
         Bounds, as of pydantic's ``Field``: ``ge``, ``gt``, ``le``, ``lt``, ``min_length``, ``max_length``.
     """
     said = shown if shown is not None else written(unit) if unit else ""
     text = meaning.format(said) if "{}" in meaning else ", ".join(filter(None, (meaning, said)))
-    extra = {name: value for name, value in (("unit", unit), ("names", names)) if value}
-    return Field(default=default, description=text, json_schema_extra=_hidden(extra), **more)
+    return Field(default=default, description=text, json_schema_extra=_hidden(unit, names, frame), **more)
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class _Hidden:
-    """Unit and references of a key; they are not shown to editors."""
+    """Unit, references and frame of a key; they are not shown to editors."""
 
     unit: str = ""
     names: str = ""
+    frame: str = ""
 
     def __call__(self, schema: dict[str, Any]) -> None:
         """Leave the schema as it is."""
 
 
-def _hidden(extra: Mapping[str, str]) -> Any:
-    return _Hidden(**extra)
+def _hidden(*given: str) -> Any:
+    return _Hidden(*given)
 
 
 @final
@@ -168,6 +179,8 @@ class Element(Entry):
     """Keys that name elements, and of which kind."""
     numbers: ClassVar[Mapping[str, Number]] = {}
     """Keys that are numbers, and their dimensions."""
+    frames: ClassVar[Mapping[str, str]] = {}
+    """Keys that are points, and the keys of their bodies."""
     rules: ClassVar[tuple[KeyRule, ...]] = ()
     _name: str = PrivateAttr("")
 
@@ -182,6 +195,7 @@ class Element(Entry):
         extras = {name: _extra(field.json_schema_extra) for name, field in cls.model_fields.items()}
         cls.names = {name: of.names for name, of in extras.items() if of.names}
         cls.numbers = {name: _dimension(f"{cls.__name__}.{name}", of.unit) for name, of in extras.items() if of.unit}
+        cls.frames = {name: of.frame for name, of in extras.items() if of.frame}
         cls.__doc__ = f"``[{cls.section}.NAME]``\n\n{cls.__doc__ or ''}"
 
     @property
@@ -260,6 +274,23 @@ class Element(Entry):
             elif given is not None:
                 changes[name] = [each if each in same else path + each for each in given]
         return self.changed(**changes).called(path + self.name)
+
+    def carriers(self, name: str) -> list[str]:
+        """The bodies in whose frames the points at a key are."""
+        of, _, index = type(self).frames[name].partition("[")
+        given = getattr(self, of)
+        return [given] if isinstance(given, str) else [given[int(index[:-1])]] if index else list(given)
+
+    def moved(self, pose: Array) -> Self:
+        """The same where the ground of its scene is moved by a pose (7,)."""
+        turn, changes = quaternion_to_matrix(pose[:4]), dict[str, Any]()
+        for name in type(self).frames:
+            points = np.reshape(getattr(self, name), (-1, 3))
+            for i, body in enumerate(self.carriers(name)):
+                if body == GROUND:
+                    points[i] = turn @ points[i] + pose[4:]
+            changes[name] = np.reshape(points, np.shape(getattr(self, name))).tolist()
+        return self.changed(**changes)
 
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         """The same in other units; ``coordinates`` are those of its joints."""

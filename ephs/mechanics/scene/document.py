@@ -65,10 +65,15 @@ def _array(value: Any) -> Any:
     return None if value is None else frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
 
 
+def _rows(array: dict[str, Any]) -> Any:
+    """An array of an older file."""
+    return np.reshape(array["values"], array["shape"]).tolist()
+
+
 def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
     if issubclass(cls, Element):
-        plain = {key: value["values"] if isinstance(value, dict) else value for key, value in data.items()}
+        plain = {key: _rows(value) if isinstance(value, dict) else value for key, value in data.items()}
         if cls is Actuator:  # older files have a place for their heat
             plain.pop("heat", None)
         return cls.of_table(data["name"], plain)

@@ -1,12 +1,12 @@
-"""Resolved beams, tendons and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
+"""Resolved beams and tendons: elasticity of an element, nodes and elements of a rod."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Measured, Named, Number, SceneElement, frozen
+from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Measured, Named, Number, SceneElement
 from ephs.semantics.bundles.bundle import Array
 
 
@@ -96,22 +96,3 @@ class Tendon(SceneElement):
         """Length of the segments within bodies, m."""
         spots = zip(self.bodies, self.points, strict=True)
         return sum(float(np.linalg.norm(q - p)) for (a, p), (b, q) in pairwise(spots) if a == b)
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Load(SceneElement):
-    """A force and a moment on a body's centre of mass."""
-
-    name: str
-    body: Annotated[str, Named("body"), "body; the load acts at its centre of mass"]
-    force: Annotated[Array, Number(energy=1, length=-1, count=3), "force in world axes, N"] = field(
-        default_factory=lambda: frozen([0.0, 0.0, 0.0])
-    )
-    moment: Annotated[Array, Number(energy=1, count=3), "moment in world axes, N m"] = field(
-        default_factory=lambda: frozen([0.0, 0.0, 0.0])
-    )
-    follower: Annotated[bool, "force and moment are given in body axes and turn with the body"] = False
-    ramp: Annotated[float, Number(time=1, least=NON_NEGATIVE), "time over which the load grows linearly from 0, s"] = (
-        0.0
-    )

@@ -138,9 +138,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
     springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
     thermal = resolve.resolve_plain("thermal", document, names, faults)
-    markers = resolve.resolve_plain("markers", document, names, faults)
     surfaces = resolve_surfaces(document, names, path.parent, faults)
-    loads = resolve.resolve_plain("loads", document, names, faults)
     elements = resolve_elements(document, parts, names, faults)
     if faults:
         return None
@@ -160,10 +158,8 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
         parts=parts,
         source=str(path),
-        markers=markers,
         surfaces=surfaces,
         beams={name: rod.beam for name, rod in rods.items()},
-        loads=loads,
         tendons=tendons,
     )
     elements["actuators"] |= pulls(document, elements["actuators"], tendons, faults)

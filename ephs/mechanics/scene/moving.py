@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.flexible import Load, Tendon
-from ephs.mechanics.scene.model import GROUND, Scene, Spring, World, frozen, mapped
+from ephs.mechanics.scene.flexible import Tendon
+from ephs.mechanics.scene.model import GROUND, KINDS, Scene, Spring, World, frozen, mapped
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces import rotations as so3
@@ -23,10 +24,6 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
     def point(body: str, position: Array) -> Array:
         return frozen(so3.quaternion_to_matrix(pose[:4]) @ position + pose[4:]) if body == GROUND else position
 
-    def load(_: str, x: Load) -> Load:
-        turn = np.eye(3) if x.follower else so3.quaternion_to_matrix(pose[:4])
-        return replace(x, force=frozen(turn @ x.force), moment=frozen(turn @ x.moment))
-
     def tendon(_: str, t: Tendon) -> Tendon:
         return replace(t, points=frozen([point(body, at) for body, at in zip(t.bodies, t.points, strict=True)]))
 
@@ -34,9 +31,8 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
         mapped(
             scene,
             {
-                "loads": load,
+                **dict.fromkeys((*KINDS, *REGISTERED), lambda _, x: x.moved(pose)),
                 "tendons": tendon,
-                "markers": lambda _, m: replace(m, at=point(m.body, m.at)),
                 "bodies": lambda _, b: replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose)))),
                 "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
                 "springs": lambda _, s: replace(s, at1=point(s.body1, s.at1), at2=point(s.body2, s.at2)),

@@ -236,8 +236,6 @@ def resolve_plain(section: str, document: Document, names: Names, faults: list[F
         key = f"{section}.{name}"
         names.check_all(kind, table, key, faults)
         found[name] = kind(name=name, **attributes(kind, table.entry))
-        if section == "loads" and table.sound("body") and table.entry.body == GROUND:
-            faults.append(fault("load ground", f"{key}.body", shown(GROUND)))
     return found
 
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.bodies import Marker, Spring, World
-from ephs.mechanics.scene.flexible import Load, Tendon
+from ephs.mechanics.scene.bodies import Spring, World
+from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import ELEMENTS, KINDS
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
@@ -173,9 +173,7 @@ _TABLES: dict[str, tuple[type[Entry], str]] = {
         ),
         "tendons through points of bodies",
     ),
-    "loads": (table_of(Load, "loads.NAME"), "forces and moments on bodies"),
     "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
-    "markers": (table_of(Marker, "markers.NAME"), "points on bodies"),
 }
 _SECTIONS = {name: (KINDS[name], KINDS[name].said) if name in KINDS else _TABLES[name] for name in ELEMENTS}
 _SECTIONS["parts"] = PartEntry, "other scene files as subsystems"

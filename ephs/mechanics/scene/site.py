@@ -60,6 +60,11 @@ class Site:
     element: "Element"
     _level: Level
 
+    @property
+    def origin(self) -> Array:
+        """(7,) pose in the world of the ground on which the element's points are: those with a frame are placed."""
+        return IDENTITY_POSE if type(self.element).frames else self.scene.origin
+
     # ---- what it may read ----------------------------------------------------------------------------------------
 
     @property
@@ -82,7 +87,7 @@ class Site:
     def point(self, body: str, at: "ArrayLike") -> Array:
         """(3,) a point of a body in its frame, of the ground in the world, m: a part's own ground may be moved."""
         given = np.array(at, dtype=float)
-        return SE3.compose(self.scene.origin, translation(given))[4:] if body == GROUND else given
+        return SE3.compose(self.origin, translation(given))[4:] if body == GROUND else given
 
     def direction(self, along: "ArrayLike") -> Array:
         """(3,) in the world, of a direction in world axes of the element's file: a part may be turned."""

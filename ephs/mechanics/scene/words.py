@@ -42,7 +42,7 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
         *(("contact", name, " – ".join(c.surfaces)) for name, c in scene.all_contacts()),
         *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
         *(("tendon", name, f"{' – '.join(t.bodies)}, {t.stiffness:g} N/m") for name, t in scene.all_tendons()),
-        *(("load", name, f"on {load.body}") for name, load in scene.all_loads()),
+        *(("load", name, str(load)) for name, load in scene.all_loads()),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
         *(("conduction", name, str(each)) for name, each in scene.all_conduction()),
