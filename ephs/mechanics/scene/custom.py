@@ -6,7 +6,7 @@ part follow from these.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 
@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 
 from ephs.mechanics.scene.element import GROUND, OUTSIDE, Number
 from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.rules import KeyRule
 from ephs.mechanics.scene.schema_numbers import Entry
 from ephs.mechanics.scene.units import dimension, written
 from ephs.operad import Path, PatternError
@@ -101,63 +102,6 @@ def _hidden(*given: str) -> Any:
     return _Hidden(*given)
 
 
-@final
-@dataclass(frozen=True, slots=True)
-class KeyRule:
-    """A condition on keys of a table, with its texts."""
-
-    keys: tuple[str, ...]
-    holds: Callable[..., bool | Mapping[str, object]]
-    expected: str
-    advice: str
-    found: str
-    at: str
-    placed: bool
-
-    def texts(self, element: "Element", *site: "Site") -> tuple[str, str, str] | None:
-        """Texts of the found value, the expected one and the advice; None where it holds."""
-        told = self.holds(element, *site)
-        if told and not isinstance(told, Mapping):
-            return None
-        values = {name: getattr(element, name, None) for name in type(element).model_fields}
-        values |= told or {}
-        found, expected, advice = (text.format_map(values) for text in (self.found, self.expected, self.advice))
-        return found, expected, advice
-
-
-def rule(
-    *keys: str,
-    expected: str,
-    advice: str = "correct the value",
-    found: str = "",
-    at: str | None = None,
-    placed: bool = False,
-) -> Callable[[Callable[..., bool | Mapping[str, object]]], KeyRule]:
-    """Mark a method as a condition on keys of the table: where it is false there is a fault.
-
-    In place of False it may return values by name, which may stand in braces, too. It is asked where none of
-    these keys has a fault of its own.
-
-    Parameters
-    ----------
-    keys
-        The keys that it reads.
-    expected, advice
-        Texts of the message; values of keys may stand in braces.
-    found
-        Text of the found value, with values of keys in braces; default: the value at the key, or ``a table``.
-    at
-        The key that the message names, ``""`` for the whole table; default: the first one.
-    placed
-        Whether it is asked once all bodies are where they are at the start: then the method takes a `Site`, too.
-    """
-
-    def marked(holds: Callable[..., bool | Mapping[str, object]]) -> KeyRule:
-        return KeyRule(keys, holds, expected, advice, found, keys[0] if at is None else at, placed)
-
-    return marked
-
-
 class Element(Entry):
     """Base of elements of one's own: subclass it with keys, rules and ``build``, and call `register_element`.
 
@@ -235,6 +179,10 @@ class Element(Entry):
         """Itself with one number written as a list where it may be both, and the like."""
         return self
 
+    def settled(self, site: "Site") -> Self:
+        """Itself with values for keys whose default depends on where bodies are."""
+        return self
+
     def called(self, name: str) -> Self:
         """Itself with a name."""
         found = self.model_copy()
@@ -275,7 +223,7 @@ class Element(Entry):
                 changes[name] = [each if each in same else path + each for each in given]
         return self.changed(**changes).called(path + self.name)
 
-    def carriers(self, name: str) -> list[str]:
+    def _carriers(self, name: str) -> list[str]:
         """The bodies in whose frames the points at a key are."""
         of, _, index = type(self).frames[name].partition("[")
         given = getattr(self, of)
@@ -286,7 +234,7 @@ class Element(Entry):
         turn, changes = quaternion_to_matrix(pose[:4]), dict[str, Any]()
         for name in type(self).frames:
             points = np.reshape(getattr(self, name), (-1, 3))
-            for i, body in enumerate(self.carriers(name)):
+            for i, body in enumerate(self._carriers(name)):
                 if body == GROUND:
                     points[i] = turn @ points[i] + pose[4:]
             changes[name] = np.reshape(points, np.shape(getattr(self, name))).tolist()
@@ -295,7 +243,8 @@ class Element(Entry):
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         """The same in other units; ``coordinates`` are those of its joints."""
         changes: dict[str, Any] = {}
-        for name, number in type(self).numbers.items():
+        points = dict.fromkeys(type(self).frames, Number(length=1))
+        for name, number in (points | dict(type(self).numbers)).items():
             given = getattr(self, name)
             if given is not None:
                 if number.others:
@@ -380,7 +329,7 @@ def _check_keys(kind: type[Element]) -> None:
         if of.names and (of.names not in OUTSIDE or forms - {"string", "null"}):
             raise ElementError("names", where, f'names "{of.names}"')
     for each in kind.rules:
-        unknown = [name for name in (*each.keys, each.at) if name and name not in kind.model_fields]
+        unknown = [name for name in (*each.keys, each.at.partition("[")[0]) if name and name not in kind.model_fields]
         if unknown:
             raise ElementError("rule", f"{kind.__name__}.{each.holds.__name__}", ", ".join(unknown))
 

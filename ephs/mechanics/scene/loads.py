@@ -4,8 +4,9 @@ from typing import Self, final
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import Element, key, rule
+from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import GROUND
+from ephs.mechanics.scene.rules import rule
 from ephs.mechanics.scene.schema_numbers import Flag, NonNegative, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.semantics.bundles.bundle import Array

@@ -38,10 +38,10 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
     return [
         *(("body", name, f"{body.mass:g} kg") for name, body in scene.all_bodies()),
         *(("joint", name, f"{j.kind}, {j.body1} – {j.body2}") for name, j in scene.all_joints()),
-        *(("spring", name, f"{s.body1} – {s.body2}, {s.stiffness:g} N/m") for name, s in scene.all_springs()),
+        *(("spring", name, str(spring)) for name, spring in scene.all_springs()),
         *(("contact", name, " – ".join(c.surfaces)) for name, c in scene.all_contacts()),
         *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
-        *(("tendon", name, f"{' – '.join(t.bodies)}, {t.stiffness:g} N/m") for name, t in scene.all_tendons()),
+        *(("tendon", name, str(tendon)) for name, tendon in scene.all_tendons()),
         *(("load", name, str(load)) for name, load in scene.all_loads()),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
