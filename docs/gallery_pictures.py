@@ -135,7 +135,8 @@ def moving_scene(sol: Any, view: View | None = None) -> str:
         for shape in body.shapes or filter(None, [body.shape]):
             bodies.append((np.hstack([motion.quaternion, motion.position]), shape))
     ends = [
-        np.stack([_point(sol, s.body1, s.at1), _point(sol, s.body2, s.at2)], axis=1) for _, s in scene.all_springs()
+        np.stack([_point(sol, s.bodies[0], s.at1), _point(sol, s.bodies[1], s.at2)], axis=1)
+        for _, s in scene.all_springs()
     ]
     joints = [(j, _point(sol, j.body2, j.frame2[4:])) for _, j in scene.all_joints()]
     links = [

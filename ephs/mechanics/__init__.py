@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene.custom import Element as Element
     from ephs.mechanics.scene.custom import key as key
     from ephs.mechanics.scene.custom import register_element as register_element
-    from ephs.mechanics.scene.custom import rule as rule
+    from ephs.mechanics.scene.rules import rule as rule
     from ephs.mechanics.scene.site import Site as Site
 
 _HOME = {
@@ -41,7 +41,7 @@ _HOME = {
     "Element": "ephs.mechanics.scene.custom",
     "key": "ephs.mechanics.scene.custom",
     "register_element": "ephs.mechanics.scene.custom",
-    "rule": "ephs.mechanics.scene.custom",
+    "rule": "ephs.mechanics.scene.rules",
     "Site": "ephs.mechanics.scene.site",
     "joint": "ephs.mechanics.elements.joints",
     "body_pattern": "ephs.mechanics.elements.bodies",

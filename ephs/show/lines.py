@@ -25,7 +25,7 @@ class BodyLine:
 
 def lines_of(scene: Any) -> dict[str, BodyLine]:
     """The springs of a scene, the segments NAME-1, NAME-2, … of its tendons, and lines of its elements."""
-    found = {name: BodyLine(s.body1, s.body2, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
+    found = {name: BodyLine(*s.bodies, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
     for name, tendon in scene.all_tendons():
         ends = pairwise(zip(tendon.bodies, tendon.points, strict=True))
         for k, ((one, here), (two, there)) in enumerate(ends, 1):

@@ -9,7 +9,8 @@ from hypothesis.errors import InvalidArgument
 
 from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.geometry import coupling
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Body, Joint, Scene, Spring, World, frozen
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, IDENTITY_POSE, Body, Joint, Scene, World, frozen
+from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -122,10 +123,14 @@ class _Maker:
         springs: dict[str, Spring] = {}
         if self.springs:
             last = list(self.bodies)[-1]
-            far = frozen(self.bodies[last].pose[4:] + np.array([1.0, 0.5, 2.0]))
-            at = frozen(0.1 * self.rng.standard_normal(3))
-            damping = 0.3 if self.friction else 0.0
-            springs["spring"] = Spring("spring", GROUND, last, far, at, 5.0, 1.5, damping, self.sinks[-1])
+            far = self.bodies[last].pose[4:] + np.array([1.0, 0.5, 2.0])
+            at = 0.1 * self.rng.standard_normal(3)
+            damping, heat = 0.3 if self.friction else 0.0, self.sinks[-1]
+            made = Spring(
+                bodies=[GROUND, last], at1=far.tolist(), at2=at.tolist(), stiffness=5.0, length=1.5, damping=damping,
+                heat=heat,
+            )  # fmt: skip
+            springs["spring"] = made.called("spring")
         heated = len(self.sinks) > 1
         return Scene(
             "mechanism",

@@ -45,5 +45,8 @@ def floating(draw, gravity=(0.0, 0.0, 0.0), **options):
 
     return replace(
         scene, world=World(gravity=frozen(list(gravity))), bodies=bodies, joints=released(scene.joints),
-        springs=released(scene.springs),
+        springs={
+            name: spring.changed(bodies=["base" if body == "ground" else body for body in spring.bodies])
+            for name, spring in scene.springs.items()
+        },
     )  # fmt: skip

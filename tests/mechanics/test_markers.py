@@ -77,7 +77,7 @@ def test_markers_of_parts_move_with_their_ground(pendulum, tmp_path):
     assert np.allclose(sol.marker("left.wall").position[0], [1.0, 7.0, 3.0])
     assert np.allclose(sol.marker("left.tip").position[0], [0.1, 5.0, -0.5])
     again = scene_from_text(scene_to_text(hall))
-    assert [(n, m.at.tolist()) for n, m in again.all_markers()] == [(n, m.at.tolist()) for n, m in hall.all_markers()]
+    assert [(n, m.at) for n, m in again.all_markers()] == [(n, m.at) for n, m in hall.all_markers()]
 
 
 @pytest.mark.parametrize(

@@ -234,8 +234,7 @@ def pendulum() -> FakeSolution:
         "middle": None,
     }
     spring = {
-        "body1": "ground",
-        "body2": "rod",
+        "bodies": ["ground", "rod"],
         "at1": [0.0, 0.5, 1.0],
         "at2": [0.0, 0.0, -0.25],
         "heat": "environment",

@@ -40,8 +40,7 @@ class Loading:
         self._links.place(q, r)
         self._equations.wrench[:] = 0.0
         for link, load in self._loads:
-            turn = np.eye(3) if load.follower else quaternion_to_matrix(self._equations.dense.residual.pose(link)[:4]).T
-            self._equations.wrench[link] += self.share * np.concatenate([turn @ load.moment, turn @ load.force])
+            self._equations.wrench[link] += self.share * load.wrench(self._rotation(link))
 
     def stiffened(self, found: Derivatives, q: Array, r: Array) -> Derivatives:
         """Derivatives with those of the loads' directions, which keep to the world while their bodies turn."""
@@ -52,8 +51,12 @@ class Loading:
         for link, load in self._loads:
             if not load.follower:
                 jacobian = self._links.jacobian(load.body, None)
-                turn = quaternion_to_matrix(self._equations.dense.residual.pose(link)[:4]).T
-                turning = np.vstack([hat(turn @ load.moment), hat(turn @ load.force)])
+                moment, force = np.split(load.wrench(self._rotation(link)), 2)
+                turning = np.vstack([hat(moment), hat(force)])
                 change += self.share * jacobian.T @ turning @ jacobian[:3]
         by_place = found.acceleration_q + found.acceleration_force @ change
         return replace(found, acceleration_q=by_place, force_q=found.force_q - change)
+
+    def _rotation(self, link: int) -> Array:
+        """(3, 3) of a link to the world."""
+        return quaternion_to_matrix(self._equations.dense.residual.pose(link)[:4])

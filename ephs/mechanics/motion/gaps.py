@@ -6,8 +6,8 @@ from typing import Protocol
 import numpy as np
 
 from ephs.mechanics.motion.batch import compose, gap, product
-from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.model import Joint
+from ephs.mechanics.scene.tendons import Tendon
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import translation
 
@@ -45,7 +45,7 @@ def open_by(joints: Mapping[str, Joint], read: Read, chunks: Iterable[slice]) ->
 def span_of(tendon: Tendon, read: Read) -> Array:
     """(n,) sum of the distances between the points of each segment, in m, by the poses of the bodies."""
 
-    def point(end: tuple[str, Array]) -> Array:
+    def point(end: tuple[str, list[float]]) -> Array:
         poses = read.poses(end[0])
         return compose(poses, np.broadcast_to(translation(end[1]), poses.shape))[:, 4:]
 

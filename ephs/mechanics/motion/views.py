@@ -13,7 +13,8 @@ import numpy as np
 
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.kinematics import Link, twist
-from ephs.mechanics.scene.model import GROUND, Marker, Scene
+from ephs.mechanics.scene.markers import Marker
+from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.tree.equations.reading import JointStates
@@ -264,7 +265,7 @@ class StateView(Mapping[Path, Array]):
         marker = self._names.markers[name]
         if marker.body == GROUND:
             return MarkerState(np.array(marker.at), np.zeros(3))
-        return MarkerState(*self._body(marker.body).point(marker.at))
+        return MarkerState(*self._body(marker.body).point(np.array(marker.at)))
 
     def _node(self, name: str) -> ThermalState:
         at, states = component_path("thermal", name), self._states

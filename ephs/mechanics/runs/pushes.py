@@ -9,8 +9,9 @@ import numpy as np
 from ephs.mechanics.runs.signals import View, signal
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path, element_inputs, tension_port
-from ephs.mechanics.scene.flexible import Load
-from ephs.mechanics.scene.model import Marker, Scene
+from ephs.mechanics.scene.loads import Load
+from ephs.mechanics.scene.markers import Marker
+from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError, listed
@@ -142,13 +143,11 @@ def _at_marker(marker: Marker, force: Signal) -> Signal:
 
 def _of_load(load: Load) -> Signal:
     """A load as a wrench in the body's frame."""
-    full, pose = np.concatenate([load.moment, load.force]), component_path("bodies", load.body) / "pe" / "q"
+    still, pose = np.eye(3), component_path("bodies", load.body) / "pe" / "q"
 
     def wrench(t: float, state: Mapping[Path, Array]) -> Array:
         share = 1.0 if t >= load.ramp else max(t, 0.0) / load.ramp
-        if load.follower:
-            return share * full
-        turn = quaternion_to_matrix(state[pose][:4]).T
-        return share * np.concatenate([turn @ load.moment, turn @ load.force])
+        return share * load.wrench(still if load.follower else quaternion_to_matrix(state[pose][:4]))
 
-    return Signal(full) if load.follower and not load.ramp else Signal(wrench, timed=load.follower)
+    steady = load.follower and not load.ramp
+    return Signal(load.wrench(still)) if steady else Signal(wrench, timed=load.follower)

@@ -14,6 +14,6 @@ from ephs.mechanics.scene.errors import SceneWarning as SceneWarning
 from ephs.mechanics.scene.model import Body as Body
 from ephs.mechanics.scene.model import Joint as Joint
 from ephs.mechanics.scene.model import Scene as Scene
-from ephs.mechanics.scene.model import Spring as Spring
 from ephs.mechanics.scene.model import World as World
+from ephs.mechanics.scene.springs import Spring as Spring
 from ephs.mechanics.scene.thermal import ThermalNode as ThermalNode

@@ -5,9 +5,10 @@ from typing import Self, final
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import Element, key, rule
+from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import AXIS
 from ephs.mechanics.scene.gears import counted, different
+from ephs.mechanics.scene.rules import rule
 from ephs.mechanics.scene.schema_numbers import Numbers, Range, Text
 from ephs.mechanics.scene.site import Site
 

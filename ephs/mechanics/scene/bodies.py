@@ -1,4 +1,4 @@
-"""World, bodies, joints, springs and markers of a resolved scene."""
+"""World, bodies and joints of a resolved scene."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -119,34 +119,6 @@ class Joint(SceneElement):
     def dim(self) -> int:
         """The number of freedoms d."""
         return int(self.rate.shape[0])
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Spring(SceneElement):
-    """A massless spring-damper between two points, ``½ k (distance − length)²``."""
-
-    name: str
-    body1: Annotated[str, Named("body")]
-    body2: Annotated[str, Named("body")]
-    at1: Annotated[Array, Number(length=1, count=3), "point in body 1's centre-of-mass frame (ground: world), m"]
-    at2: Annotated[Array, Number(length=1, count=3), "point in body 2's, m"]
-    stiffness: Annotated[float, Number(energy=1, length=-2), "N/m"] = 0.0
-    length: Annotated[float, Number(length=1, least=NON_NEGATIVE), "length without force, m"] = 0.0
-    damping: Annotated[float, Number(energy=1, length=-2, time=1, least=NON_NEGATIVE), "N s/m"] = 0.0
-    heat: Annotated[str, Named("node"), "thermal node that takes up the heat"] = ENVIRONMENT
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Marker(SceneElement):
-    """A point of interest."""
-
-    name: str
-    body: Annotated[str, Named("body"), 'the body that carries it, or "ground"']
-    at: Annotated[Array, Number(length=1, count=3), "point in its centre-of-mass frame (ground: world), m"] = field(
-        default_factory=lambda: frozen([0.0, 0.0, 0.0])
-    )
 
 
 def free_joint(body: Body) -> Joint:

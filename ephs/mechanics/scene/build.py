@@ -17,17 +17,16 @@ from ephs.mechanics.elements.beam import thermoelastic
 from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
 from ephs.mechanics.scene.demands import Demands, demands_on_parts
-from ephs.mechanics.scene.made import Made, spring_system
+from ephs.mechanics.scene.made import Made
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
-from ephs.mechanics.scene.site import INPUTS, built
+from ephs.mechanics.scene.site import INPUTS, Level, built
 from ephs.mechanics.scene.surfaces import Contact, Surface
-from ephs.mechanics.scene.tendons import tendon_ports, tendon_starts, tendon_system
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
-from ephs.semantics.spaces import SE3, translation
+from ephs.semantics.spaces import SE3
 from ephs.semantics.systems.kept import once
 from ephs.semantics.systems.system import Filling, System
 from ephs.solve.problem import Signal
@@ -105,14 +104,8 @@ def _initial_state(scene: Scene) -> dict[Path, Array]:
                 out[place / "env" / "s"] = np.zeros(1)
         if j.armature:
             out[component_path("armatures", name) / "p"] = j.armature * j.rate
-    for name, tendon in scene.all_tendons():
-        at = component_path("tendons", name)
-        out |= {Path([*at, *path.split(".")]): value for path, value in tendon_starts(tendon, poses).items()}
-    between = [
-        (component_path("springs", name), (s.body1, s.body2), (translation(s.at1), translation(s.at2)))
-        for name, s in scene.all_springs()
-    ]
-    warm = [(component_path("springs", name), s.heat) for name, s in scene.all_springs()]
+    between: list[tuple[Path, tuple[str, str], tuple[Array, Array]]] = []
+    warm: list[tuple[Path, str]] = []
     for name, c in scene.all_contacts():
         bodies, touches = contact_points(scene, c)
         at = component_path("contacts", name)
@@ -153,8 +146,7 @@ def scene_inputs(scene: Scene) -> dict[Path, Signal]:
     """Prescribed drives as flows, motions as efforts at the ports of `drive_ports`, inputs of elements; of tendons no
     force but their own.
     """
-    out = {tension_port(name): Signal(np.zeros(1)) for name, _ in scene.all_tendons()}
-    out |= {port: signal for ports in element_inputs(scene).values() for port, signal in ports.items()}
+    out = {port: signal for ports in element_signals(scene).values() for port, signal in ports.items()}
     for _, j in scene.all_joints():
         if _is_driven(j):
             for port, where in drive_ports(j):
@@ -163,14 +155,19 @@ def scene_inputs(scene: Scene) -> dict[Path, Signal]:
 
 
 def element_inputs(scene: Scene) -> Mapping[str, Mapping[Path, Signal]]:
-    """Inputs of elements of registered sections by their names, each with its ports and what these have without it."""
+    """Inputs of elements by their names, each with its ports and what these have without it."""
+    return {name: ports for name, ports in element_signals(scene).items() if name}
+
+
+def element_signals(scene: Scene) -> Mapping[str, Mapping[Path, Signal]]:
+    """The same with the ports that runs do not name, under the empty name."""
 
     def made() -> dict[str, dict[Path, Signal]]:
         out: dict[str, dict[Path, Signal]] = {}
         for path, level in scene.levels():
             for port, (name, signal) in built(level).inputs.items():
                 section, _, own = name.partition(".")
-                out.setdefault(f"{section}.{path}{own}", {})[_outside(port, path)] = signal
+                out.setdefault(f"{section}.{path}{own}" if name else "", {})[_outside(port, path)] = signal
         return out
 
     return once(scene, "element inputs", made)
@@ -231,11 +228,21 @@ class _Builder:
         self.junctions[path] = junction(of, exposed=name in self.demands.joints)
         return str(path)
 
-    def tension(self, tendon: str) -> str:
-        """The exposed junction at which forces act on a tendon's length."""
-        path = tension_port(tendon)
-        self.junctions[path] = junction(quantity.momentum, exposed=True)
-        return str(path)
+    def join(self, own: Level, path: Path) -> None:
+        """A junction of elements."""
+        group, name = path[0], ".".join(path[1:])
+        if group in ("momenta", "entropies"):
+            self.momentum(name) if group == "momenta" else self.entropy(name)
+        elif group != "drives":
+            self.junctions[path] = own.junctions[path]
+
+    def take(self, own: Level, section: str) -> None:
+        """The boxes of elements of a section, with their junctions: states are in the order of boxes."""
+        for path, ports in own.boxes.items():
+            if path[0] == section:
+                for at in ports.values():
+                    self.join(own, Path.of(at))
+                self.add(path, own.fillings[path], ports)
 
     def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
         """A box with its filling."""
@@ -266,22 +273,15 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
         if j.armature:
             at = _at("drives", name)
             b.add(Path(["armatures", name]), armature(b.junctions[at].quantity, j.armature), {"p": str(at)})
-    for name, s in scene.springs.items():
-        ports = {"p1": b.momentum(s.body1), "p2": b.momentum(s.body2)}
-        if s.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(s.heat)
-        b.add(Path(["springs", name]), spring_system(s), ports)
+    own = built(scene)
+    b.take(own, "springs")
     for name, c in scene.contacts.items():
         ends, points = contact_points(scene, c)
         ports = {"p1": b.momentum(ends[0]), "p2": b.momentum(ends[1])}
         if c.heat != ENVIRONMENT:
             ports["s"] = b.entropy(c.heat)
         b.add(Path(["contacts", name]), contact(points, c.law, heat=c.heat != ENVIRONMENT), ports)
-    for name, tendon in scene.tendons.items():
-        ports = {port: b.momentum(body) for port, body in tendon_ports(tendon).items()} | {"p": b.tension(name)}
-        if tendon.damping and tendon.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(tendon.heat)
-        b.add(Path(["tendons", name]), tendon_system(tendon), ports)
+    b.take(own, "tendons")
     for name, node in scene.thermal.items():
         ports = {"s": b.entropy(name)} | ({"e": b.lengthening(name)} if node.pull else {})
         b.add(Path(["thermal", name]), _storing(node), ports)
@@ -289,13 +289,8 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
         system = _level(part, inner.of_part(name), top=False)
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
-    own = built(scene)
-    for path, of in own.junctions.items():
-        group, name = path[0], ".".join(path[1:])
-        if group in ("momenta", "entropies"):
-            b.momentum(name) if group == "momenta" else b.entropy(name)
-        elif group != "drives":
-            b.junctions[path] = of
+    for path in own.junctions:
+        b.join(own, path)
     b.boxes.update(own.boxes)
     b.fillings.update(own.fillings)
     if top and _at("momenta", GROUND) in b.junctions:

@@ -2,7 +2,8 @@
 
 from typing import final
 
-from ephs.mechanics.scene.custom import Element, key, rule
+from ephs.mechanics.scene.custom import Element, key
+from ephs.mechanics.scene.rules import rule
 from ephs.mechanics.scene.schema_numbers import NonNegative, Pair
 from ephs.mechanics.scene.site import Site
 from ephs.semantics import library

@@ -6,19 +6,21 @@ part follow from these.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 
 import numpy as np
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 
-from ephs.mechanics.scene.element import OUTSIDE, Number
+from ephs.mechanics.scene.element import GROUND, OUTSIDE, Number
 from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.rules import KeyRule
 from ephs.mechanics.scene.schema_numbers import Entry
 from ephs.mechanics.scene.units import dimension, written
 from ephs.operad import Path, PatternError
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.site import Site
@@ -48,7 +50,14 @@ class ElementError(ValueError):
 
 
 def key(
-    meaning: str, default: Any = ..., *, unit: str = "", shown: str | None = None, names: str = "", **more: Any
+    meaning: str,
+    default: Any = ...,
+    *,
+    unit: str = "",
+    shown: str | None = None,
+    names: str = "",
+    frame: str = "",
+    **more: Any,
 ) -> Any:
     """A key of an element's table; it is required where it has no default.
 
@@ -65,86 +74,32 @@ def key(
     names
         Kind of the elements that it names: ``body``, ``node`` (of heat), ``joint``, ``axis`` (a joint with one free
         degree of freedom), ``single`` (with one, free or prescribed), ``tendon``, ``surface``.
+    frame
+        Of a point: the key of the body in whose frame it is, or on the ground in the world; ``bodies[1]`` of a list, of
+        a list of points that of a list with a body for each. Points of the ground move with the part that has them.
     more
         Bounds, as of pydantic's ``Field``: ``ge``, ``gt``, ``le``, ``lt``, ``min_length``, ``max_length``.
     """
     said = shown if shown is not None else written(unit) if unit else ""
     text = meaning.format(said) if "{}" in meaning else ", ".join(filter(None, (meaning, said)))
-    extra = {name: value for name, value in (("unit", unit), ("names", names)) if value}
-    return Field(default=default, description=text, json_schema_extra=_hidden(extra), **more)
+    return Field(default=default, description=text, json_schema_extra=_hidden(unit, names, frame), **more)
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class _Hidden:
-    """Unit and references of a key; they are not shown to editors."""
+    """Unit, references and frame of a key; they are not shown to editors."""
 
     unit: str = ""
     names: str = ""
+    frame: str = ""
 
     def __call__(self, schema: dict[str, Any]) -> None:
         """Leave the schema as it is."""
 
 
-def _hidden(extra: Mapping[str, str]) -> Any:
-    return _Hidden(**extra)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class KeyRule:
-    """A condition on keys of a table, with its texts."""
-
-    keys: tuple[str, ...]
-    holds: Callable[..., bool | Mapping[str, object]]
-    expected: str
-    advice: str
-    found: str
-    at: str
-    placed: bool
-
-    def texts(self, element: "Element", *site: "Site") -> tuple[str, str, str] | None:
-        """Texts of the found value, the expected one and the advice; None where it holds."""
-        told = self.holds(element, *site)
-        if told and not isinstance(told, Mapping):
-            return None
-        values = {name: getattr(element, name, None) for name in type(element).model_fields}
-        values |= told or {}
-        found, expected, advice = (text.format_map(values) for text in (self.found, self.expected, self.advice))
-        return found, expected, advice
-
-
-def rule(
-    *keys: str,
-    expected: str,
-    advice: str = "correct the value",
-    found: str = "",
-    at: str | None = None,
-    placed: bool = False,
-) -> Callable[[Callable[..., bool | Mapping[str, object]]], KeyRule]:
-    """Mark a method as a condition on keys of the table: where it is false there is a fault.
-
-    In place of False it may return values by name, which may stand in braces, too. It is asked where none of
-    these keys has a fault of its own.
-
-    Parameters
-    ----------
-    keys
-        The keys that it reads.
-    expected, advice
-        Texts of the message; values of keys may stand in braces.
-    found
-        Text of the found value, with values of keys in braces; default: the value at the key, or ``a table``.
-    at
-        The key that the message names, ``""`` for the whole table; default: the first one.
-    placed
-        Whether it is asked once all bodies are where they are at the start: then the method takes a `Site`, too.
-    """
-
-    def marked(holds: Callable[..., bool | Mapping[str, object]]) -> KeyRule:
-        return KeyRule(keys, holds, expected, advice, found, keys[0] if at is None else at, placed)
-
-    return marked
+def _hidden(*given: str) -> Any:
+    return _Hidden(*given)
 
 
 class Element(Entry):
@@ -168,6 +123,8 @@ class Element(Entry):
     """Keys that name elements, and of which kind."""
     numbers: ClassVar[Mapping[str, Number]] = {}
     """Keys that are numbers, and their dimensions."""
+    frames: ClassVar[Mapping[str, str]] = {}
+    """Keys that are points, and the keys of their bodies."""
     rules: ClassVar[tuple[KeyRule, ...]] = ()
     _name: str = PrivateAttr("")
 
@@ -182,6 +139,7 @@ class Element(Entry):
         extras = {name: _extra(field.json_schema_extra) for name, field in cls.model_fields.items()}
         cls.names = {name: of.names for name, of in extras.items() if of.names}
         cls.numbers = {name: _dimension(f"{cls.__name__}.{name}", of.unit) for name, of in extras.items() if of.unit}
+        cls.frames = {name: of.frame for name, of in extras.items() if of.frame}
         cls.__doc__ = f"``[{cls.section}.NAME]``\n\n{cls.__doc__ or ''}"
 
     @property
@@ -219,6 +177,10 @@ class Element(Entry):
 
     def normalised(self) -> Self:
         """Itself with one number written as a list where it may be both, and the like."""
+        return self
+
+    def settled(self, site: "Site") -> Self:
+        """Itself with values for keys whose default depends on where bodies are."""
         return self
 
     def called(self, name: str) -> Self:
@@ -261,10 +223,28 @@ class Element(Entry):
                 changes[name] = [each if each in same else path + each for each in given]
         return self.changed(**changes).called(path + self.name)
 
+    def _carriers(self, name: str) -> list[str]:
+        """The bodies in whose frames the points at a key are."""
+        of, _, index = type(self).frames[name].partition("[")
+        given = getattr(self, of)
+        return [given] if isinstance(given, str) else [given[int(index[:-1])]] if index else list(given)
+
+    def moved(self, pose: Array) -> Self:
+        """The same where the ground of its scene is moved by a pose (7,)."""
+        turn, changes = quaternion_to_matrix(pose[:4]), dict[str, Any]()
+        for name in type(self).frames:
+            points = np.reshape(getattr(self, name), (-1, 3))
+            for i, body in enumerate(self._carriers(name)):
+                if body == GROUND:
+                    points[i] = turn @ points[i] + pose[4:]
+            changes[name] = np.reshape(points, np.shape(getattr(self, name))).tolist()
+        return self.changed(**changes)
+
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         """The same in other units; ``coordinates`` are those of its joints."""
         changes: dict[str, Any] = {}
-        for name, number in type(self).numbers.items():
+        points = dict.fromkeys(type(self).frames, Number(length=1))
+        for name, number in (points | dict(type(self).numbers)).items():
             given = getattr(self, name)
             if given is not None:
                 if number.others:
@@ -349,7 +329,7 @@ def _check_keys(kind: type[Element]) -> None:
         if of.names and (of.names not in OUTSIDE or forms - {"string", "null"}):
             raise ElementError("names", where, f'names "{of.names}"')
     for each in kind.rules:
-        unknown = [name for name in (*each.keys, each.at) if name and name not in kind.model_fields]
+        unknown = [name for name in (*each.keys, each.at.partition("[")[0]) if name and name not in kind.model_fields]
         if unknown:
             raise ElementError("rule", f"{kind.__name__}.{each.holds.__name__}", ", ".join(unknown))
 

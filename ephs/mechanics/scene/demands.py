@@ -28,11 +28,10 @@ class Demands:
 
 
 def demands_on_parts(scene: Scene, demands: Demands) -> Demands:
-    """Ports that the level above and this level's joints, springs and other elements need from its parts."""
-    pairs = [*scene.joints.values(), *scene.springs.values()]
-    bodies = {name for x in pairs for name in (x.body1, x.body2)} | _touching(scene)
-    bodies |= {body for tendon in scene.tendons.values() for body in tendon.bodies}
-    nodes = {x.heat for x in (*pairs, *scene.contacts.values(), *scene.tendons.values())}
+    """Ports that the level above and this level's joints and other elements need from its parts."""
+    joints = scene.joints.values()
+    bodies = {name for j in joints for name in (j.body1, j.body2)} | _touching(scene)
+    nodes = {x.heat for x in (*joints, *scene.contacts.values())}
     turned = {name for name, j in scene.joints.items() if j.armature}
     for path in built(scene).junctions:
         of = {"momenta": bodies, "entropies": nodes, "drives": turned}.get(path[0])

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ELEMENTS, IDENTITY_POSE, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.scene.registry import elements_from
+from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -65,12 +66,19 @@ def _array(value: Any) -> Any:
     return None if value is None else frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
 
 
+def _rows(array: dict[str, Any]) -> Any:
+    """An array of an older file."""
+    return np.reshape(array["values"], array["shape"]).tolist()
+
+
 def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
     if issubclass(cls, Element):
-        plain = {key: value["values"] if isinstance(value, dict) else value for key, value in data.items()}
+        plain = {key: _rows(value) if isinstance(value, dict) else value for key, value in data.items()}
         if cls is Actuator:  # older files have a place for their heat
             plain.pop("heat", None)
+        if cls is Spring and "body1" in plain:  # older files name each end
+            plain["bodies"] = [plain.pop("body1"), plain.pop("body2")]
         return cls.of_table(data["name"], plain)
 
     def made(key: str, value: Any) -> Any:

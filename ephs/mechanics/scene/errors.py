@@ -282,7 +282,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "motion number": ("{expected}", "correct the value"),
     "motion rate": ("{motion}, the prescribed initial rate", "remove rate, or make it equal to this"),
     "coordinate at": ("0 where at and axis are given", "give frame1 and frame2 to start at another coordinate"),
-    # beams and loads
+    # beams
     "section": (
         "either EA, GA, GJ, EI, rhoA, rhoI, or one of circle, tube, rectangle with E, nu, rho",
         "give all keys of one of the two forms",
@@ -307,10 +307,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "string damping": ("0 for a string, which has no bending stiffness", 'use rod = "kirchhoff"'),
     "up": ("a direction not parallel to any tangent of the beam", "choose another up"),
-    "load ground": ("a body", "choose a body; loads on the ground have no effect"),
-    "tendon points": ("{count} points, one for each body", "correct the number of points"),
-    "tendon bodies": ("a segment between two different bodies", "route it from one body to another"),
-    "slack damping": ("0 for a tendon with slack", "remove one of the two; joints may have friction"),
     "unknown tendon": ("a tendon of this file", "{hint}"),
     "same ends": ("two different points or nodes", "correct one of the two"),
     # assembly

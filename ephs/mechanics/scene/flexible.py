@@ -1,12 +1,9 @@
-"""Resolved beams, tendons and loads: elasticity of an element, nodes and elements of a rod, forces on bodies."""
+"""Resolved beams: elasticity of an element, nodes and elements of a rod."""
 
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
 from typing import Annotated, final
 
-import numpy as np
-
-from ephs.mechanics.scene.element import ENVIRONMENT, NON_NEGATIVE, Measured, Named, Number, SceneElement, frozen
+from ephs.mechanics.scene.element import Measured, Named, Number, SceneElement
 from ephs.semantics.bundles.bundle import Array
 
 
@@ -60,58 +57,3 @@ class Beam(SceneElement):
     def joints(self) -> list[str]:
         """The joints that are its elements."""
         return [f"{self.name}-{i}" for i in range(1, self.elements + 1)]
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Tendon(SceneElement):
-    """A tendon without mass, straight from point to point of bodies, through which it slides.
-
-    ``points`` (n, 3) in m are one in each body, in its centre-of-mass frame (ground: world).
-    """
-
-    name: str
-    bodies: Annotated[
-        tuple[str, ...],
-        Named("body"),
-        'what carries its points, in their order; the tension is the input "actuators.NAME", in N',
-    ]
-    points: Array
-    stiffness: Annotated[float, Number(energy=1, length=-2, least=NON_NEGATIVE), "N/m"] = 0.0
-    length: Annotated[float, Number(length=1, least=NON_NEGATIVE), "without force, m; default: as at the start"] = 0.0
-    damping: Annotated[float, Number(energy=1, time=1, length=-2, least=NON_NEGATIVE), "N s/m; 0 of one with slack"] = (
-        0.0
-    )
-    slack: Annotated[bool, "no elastic force where it is shorter than its length: a cable"] = False
-    heat: Annotated[str, Named("node"), "where the heat goes: a thermal name"] = ENVIRONMENT
-
-    @property
-    def segments(self) -> list[tuple[tuple[str, Array], tuple[str, Array]]]:
-        """The (body, point) at both ends of each segment between two different bodies."""
-        spots = list(zip(self.bodies, self.points, strict=True))
-        return [(one, two) for one, two in pairwise(spots) if one[0] != two[0]]
-
-    @property
-    def inside(self) -> float:
-        """Length of the segments within bodies, m."""
-        spots = zip(self.bodies, self.points, strict=True)
-        return sum(float(np.linalg.norm(q - p)) for (a, p), (b, q) in pairwise(spots) if a == b)
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Load(SceneElement):
-    """A force and a moment on a body's centre of mass."""
-
-    name: str
-    body: Annotated[str, Named("body"), "body; the load acts at its centre of mass"]
-    force: Annotated[Array, Number(energy=1, length=-1, count=3), "force in world axes, N"] = field(
-        default_factory=lambda: frozen([0.0, 0.0, 0.0])
-    )
-    moment: Annotated[Array, Number(energy=1, count=3), "moment in world axes, N m"] = field(
-        default_factory=lambda: frozen([0.0, 0.0, 0.0])
-    )
-    follower: Annotated[bool, "force and moment are given in body axes and turn with the body"] = False
-    ramp: Annotated[float, Number(time=1, least=NON_NEGATIVE), "time over which the load grows linearly from 0, s"] = (
-        0.0
-    )

@@ -6,8 +6,9 @@ from typing import Any, Self, final
 import numpy as np
 
 from ephs.mechanics.elements.gear import gear
-from ephs.mechanics.scene.custom import Element, key, rule
+from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import ENVIRONMENT
+from ephs.mechanics.scene.rules import rule
 from ephs.mechanics.scene.schema_numbers import Names, NonNegative, Number, Numbers, Text
 from ephs.mechanics.scene.site import Site
 from ephs.semantics.bundles.bundle import Array

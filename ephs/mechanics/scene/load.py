@@ -18,16 +18,14 @@ from ephs.mechanics.scene.entries import Document, read_document, shown
 from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told, warn_caller
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
-from ephs.mechanics.scene.moving import moved, spring_length
-from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements
+from ephs.mechanics.scene.moving import moved
+from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements, settled
 from ephs.mechanics.scene.state import Asked, adjusted
-from ephs.mechanics.scene.tendons import pulls, resolve_tendons
 from ephs.mechanics.scene.text import file_text, lost
 from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
 from ephs.operad.collector import paused_collector
-from ephs.semantics.spaces.rank import ASSEMBLY
 
 MODELS = (".urdf", ".xml", ".sdf")
 """Endings of files in other formats, which are imported."""
@@ -136,19 +134,13 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     mode = r.inertia or document.assembly.inertia
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
-    springs = {n: resolve.resolve_spring(n, t, names, faults) for n, t in sections["springs"].items()}
     thermal = resolve.resolve_plain("thermal", document, names, faults)
-    markers = resolve.resolve_plain("markers", document, names, faults)
     surfaces = resolve_surfaces(document, names, path.parent, faults)
-    loads = resolve.resolve_plain("loads", document, names, faults)
     elements = resolve_elements(document, parts, names, faults)
     if faults:
         return None
     drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
     placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
-    poses = {name: body.pose for name, body in placed.items()}
-    poses |= {f"{part}.{name}": body.pose for part, inner in parts.items() for name, body in inner.all_bodies()}
-    tendons = resolve_tendons(document, poses, names, faults)
     r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
     elements["conduction"] |= {name: x for rod in rods.values() for name, x in rod.conduction.items()}
     scene = Scene(
@@ -156,18 +148,13 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         world,
         placed,
         coupled,
-        springs,
-        thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
+        thermal=thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
         parts=parts,
         source=str(path),
-        markers=markers,
         surfaces=surfaces,
         beams={name: rod.beam for name, rod in rods.items()},
-        loads=loads,
-        tendons=tendons,
     )
-    elements["actuators"] |= pulls(document, elements["actuators"], tendons, faults)
-    scene = with_sections(scene, elements)
+    scene = settled(with_sections(scene, elements))
     contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
     if faults:
         return None
@@ -184,11 +171,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         scene, open_joints = adjusted(scene, r.asked)
     faults += open_joints
     if not faults:
-        faults += [
-            fault("same ends", f"springs.{name}", "both ends at the same point")
-            for name, spring in springs.items()
-            if spring_length(scene, spring) < ASSEMBLY * spring.length
-        ]
+        faults += placed_faults(scene, adjusted=True)
     return None if faults else scene
 
 

@@ -1,4 +1,4 @@
-"""Systems of a scene's bodies, joints and springs; equal bodies and joints are made once.
+"""Systems of a scene's bodies and joints; equal bodies and joints are made once.
 
 A rod has a thousand of them that differ by their names only.
 """
@@ -11,9 +11,9 @@ import numpy as np
 
 from ephs.mechanics.elements.beam import beam_stretch, elastic
 from ephs.mechanics.elements.bodies import rigid_body
-from ephs.mechanics.elements.joints import between_frames, joint, spring_damper, universal_joint
+from ephs.mechanics.elements.joints import between_frames, joint, universal_joint
 from ephs.mechanics.scene.flexible import Strain
-from ephs.mechanics.scene.model import ENVIRONMENT, Body, Joint, Spring
+from ephs.mechanics.scene.model import ENVIRONMENT, Body, Joint
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 
@@ -66,8 +66,3 @@ def _joint(j: Joint, *, driven: bool, expands: bool) -> System:
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
         limits=j.limits, stop=j.stop, dry=j.dry,
     )  # fmt: skip
-
-
-def spring_system(s: Spring) -> System:
-    """A spring-damper between two points."""
-    return spring_damper(s.at1, s.at2, s.stiffness, s.length, s.damping, heat=s.heat != ENVIRONMENT)

@@ -12,16 +12,20 @@ from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment
-from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, Marker, Spring, World, free_joint
+from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, World, free_joint
 from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.cylinders import Cylinder
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, SceneElement, frozen
-from ephs.mechanics.scene.flexible import Beam, Load, Tendon
+from ephs.mechanics.scene.flexible import Beam
 from ephs.mechanics.scene.gas_springs import GasSpring
 from ephs.mechanics.scene.gears import Gear
+from ephs.mechanics.scene.loads import Load
+from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.motors import Motor
+from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.scene.tendons import Tendon
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.kept import Kept
@@ -36,9 +40,7 @@ __all__ = [
     "IDENTITY_POSE",
     "Body",
     "Joint",
-    "Marker",
     "Scene",
-    "Spring",
     "World",
     "free_joint",
     "frozen",

@@ -11,7 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.build import drive_ports, element_inputs, scene_system, tension_port, wrench_port
+from ephs.mechanics.scene.build import drive_ports, element_signals, scene_system, wrench_port
 from ephs.mechanics.scene.element import Number
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
@@ -83,11 +83,10 @@ def in_own_units(problem: Problem) -> Problem:
     force = units.mass * units.length / units.time**2
     flows = {
         port: _unit(scene_system(scene).interface[port].quantity, units) / units.time / force
-        for ports in element_inputs(scene).values()
+        for ports in element_signals(scene).values()
         for port in ports
     }
-    tensions = {tension_port(name): np.ones(1) for name, _ in scene.all_tendons()}
-    forces = bodies | ports | flows | tensions
+    forces = bodies | ports | flows
     driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
     pushed = frozenset(name for name, _ in scene.all_bodies() if wrench_port(name) in problem.signals)
     system = scene_system(small, driven=driven, wrenches=pushed)

@@ -7,7 +7,6 @@ import numpy as np
 
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, SceneElement
-from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -28,8 +27,6 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case Element():
                 tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
                 return x.rescaled(*units, _firsts(tied, length))
-            case Tendon():
-                return replace(x.rescaled(*units), points=frozen(x.points * length))
             case Surface():
                 sizes = {kind: size and (np.asarray(size) * length).tolist() for kind, size in x.shape.items()}
                 return replace(x.rescaled(*units), shape=sizes)

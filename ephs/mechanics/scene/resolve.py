@@ -18,7 +18,7 @@ from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
-from ephs.mechanics.scene.model import ELEMENTS, ENVIRONMENT, GROUND, Joint, Spring, World, frozen
+from ephs.mechanics.scene.model import ELEMENTS, ENVIRONMENT, GROUND, Joint, World, frozen
 from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry
@@ -209,14 +209,6 @@ def _dry(entry: JointEntry, d: int, key: str, faults: list[Fault]) -> Dry | None
     return Dry(found.coulomb, found.static, found.stribeck, found.slip)
 
 
-def resolve_spring(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> Spring:
-    """A spring."""
-    entry, key = table.entry, f"springs.{name}"
-    _check_ends(table, key, names, faults)
-    names.check_all(Spring, table, key, faults)
-    return Spring(name=name, body1=entry.bodies[0], body2=entry.bodies[1], **attributes(Spring, entry))
-
-
 def attributes(kind: type[Measured], entry: Any) -> dict[str, Any]:
     """The attributes of an element that are keys of its table, as it has them."""
     given: dict[str, Any] = {}
@@ -236,8 +228,6 @@ def resolve_plain(section: str, document: Document, names: Names, faults: list[F
         key = f"{section}.{name}"
         names.check_all(kind, table, key, faults)
         found[name] = kind(name=name, **attributes(kind, table.entry))
-        if section == "loads" and table.sound("body") and table.entry.body == GROUND:
-            faults.append(fault("load ground", f"{key}.body", shown(GROUND)))
     return found
 
 

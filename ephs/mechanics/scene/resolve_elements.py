@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.custom import Element, number_of
 from ephs.mechanics.scene.element import AXIS, JOINTS, SINGLE
 from ephs.mechanics.scene.entries import Checked, Document, shown, validate
 from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
-from ephs.mechanics.scene.model import KINDS, Scene, elements_of
+from ephs.mechanics.scene.model import KINDS, Scene, elements_of, with_sections
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
@@ -35,7 +36,25 @@ def resolve_elements(
             faults += check_table(table, f"{section}.{name}", names, known)
             if not table.spoiled:
                 found[section][name] = table.entry.normalised().called(name)
+    found["actuators"] |= _pulls(document, found, faults)
     return found
+
+
+def _pulls(document: Document, found: Mapping[str, Mapping[str, Element]], faults: list[Fault]) -> dict[str, Element]:
+    """For each tendon an actuator of its name whose control is the tension."""
+    given = document.sections["actuators"]
+    for name, of in found["actuators"].items():
+        if name in found["tendons"] and of.named("tendon") != (name,):
+            faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
+    return {name: Actuator(tendon=name, ratio=[-1.0]).called(name) for name in found["tendons"] if name not in given}
+
+
+def settled(scene: Scene) -> Scene:
+    """The scene with the values of elements of its level, parts apart, that depend on where bodies are."""
+    own: dict[str, dict[str, Element]] = {}
+    for each in elements_of(scene):
+        own.setdefault(each.section, {})[each.name] = each.settled(Site(scene, each, Level()))
+    return with_sections(scene, own)
 
 
 def _inside(parts: Mapping[str, Scene], section: str) -> Iterator[str]:
@@ -66,17 +85,21 @@ def check_table(
     yield from broken(sound, key)
 
 
-def broken(table: Checked[Element], key: str, *site: Site) -> Iterator[Fault]:
+def broken(table: Checked[Element], key: str, *site: Site, adjusted: bool = False) -> Iterator[Fault]:
     """The faults of rules that do not hold: of those that are asked at a site, or of the others."""
     for each in type(table.entry).rules:
-        if each.placed == bool(site) and table.sound(*each.keys) and (texts := each.texts(table.entry, *site)):
-            found = texts[0] or shown(getattr(table.entry, each.at) if each.at else {})
-            yield Fault(*map(legible, (f"{key}.{each.at}".rstrip("."), found, *texts[1:])))
+        if (each.placed, each.adjusted) == (bool(site), adjusted) and table.sound(*each.keys):
+            for at, found, *texts in each.texts(table.entry, *site):
+                found = found or shown(getattr(table.entry, at) if at else {})
+                yield Fault(*map(legible, (f"{key}.{at}".rstrip("."), found, *texts)))
 
 
-def placed_faults(scene: Scene) -> list[Fault]:
+def placed_faults(scene: Scene, *, adjusted: bool = False) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
     own = list(elements_of(scene))
+    if adjusted:
+        sites = [(f"{x.section}.{x.name}", Checked(x), Site(scene, x, Level())) for x in own]
+        return [each for key, table, site in sites for each in broken(table, key, site, adjusted=True)]
     faults = [each for element in own for each in _placed(scene, element)]
     if not faults and any(scene.elements.values()):  # those that users wrote may not be built
         try:

@@ -5,12 +5,11 @@ depends on another key (a number, or one per degree of freedom) are taken as num
 by `resolve`.
 """
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
-from pydantic import Field, create_model
+from pydantic import create_model
 
-from ephs.mechanics.scene.bodies import Marker, Spring, World
-from ephs.mechanics.scene.flexible import Load, Tendon
+from ephs.mechanics.scene.bodies import World
 from ephs.mechanics.scene.model import ELEMENTS, KINDS
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
@@ -152,30 +151,13 @@ class PartEntry(Entry):
 
 
 WorldEntry: Any = table_of(World, "world")
-_LENGTH = key("without force, m; default: as at the start", None)
-_POINTS = key("one in each, in its centre-of-mass frame (ground: world), m")
 _TABLES: dict[str, tuple[type[Entry], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
-    "springs": (
-        table_of(Spring, "springs.NAME", bodies=(Pair, key("body 1 and body 2"))),
-        "springs and dampers between two points",
-    ),
     "surfaces": (SurfaceEntry, "surfaces of bodies for contact"),
     "contacts": (ContactEntry, "pairs of surfaces that can touch"),
     "beams": (BeamEntry, "rods that bend, twist and stretch"),
-    "tendons": (
-        table_of(
-            Tendon,
-            "tendons.NAME",
-            points=(Annotated[list[Vector], Field(min_length=2)], _POINTS),
-            length=(NonNegative | None, _LENGTH),
-        ),
-        "tendons through points of bodies",
-    ),
-    "loads": (table_of(Load, "loads.NAME"), "forces and moments on bodies"),
     "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
-    "markers": (table_of(Marker, "markers.NAME"), "points on bodies"),
 }
 _SECTIONS = {name: (KINDS[name], KINDS[name].said) if name in KINDS else _TABLES[name] for name in ELEMENTS}
 _SECTIONS["parts"] = PartEntry, "other scene files as subsystems"

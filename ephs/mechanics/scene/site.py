@@ -40,7 +40,7 @@ class Level:
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
     inputs: dict[Path, tuple[str, Signal]] = field(default_factory=dict)
-    """Outer ports -> the names of their inputs, and their values without these."""
+    """Outer ports -> the names of their inputs, empty where runs have none, and their values without these."""
 
 
 @final
@@ -59,6 +59,11 @@ class Site:
     scene: "Scene"
     element: "Element"
     _level: Level
+
+    @property
+    def _origin(self) -> Array:
+        """(7,) pose in the world of the ground on which the element's points are: those with a frame are placed."""
+        return IDENTITY_POSE if type(self.element).frames else self.scene.origin
 
     # ---- what it may read ----------------------------------------------------------------------------------------
 
@@ -82,7 +87,7 @@ class Site:
     def point(self, body: str, at: "ArrayLike") -> Array:
         """(3,) a point of a body in its frame, of the ground in the world, m: a part's own ground may be moved."""
         given = np.array(at, dtype=float)
-        return SE3.compose(self.scene.origin, translation(given))[4:] if body == GROUND else given
+        return SE3.compose(self._origin, translation(given))[4:] if body == GROUND else given
 
     def direction(self, along: "ArrayLike") -> Array:
         """(3,) in the world, of a direction in world axes of the element's file: a part may be turned."""
@@ -139,7 +144,14 @@ class Site:
         return str(path)
 
     def input(
-        self, of: Quantity, value: "ArrayLike" = 0.0, port: str = "", *, at: str = INPUTS, effort: bool = True
+        self,
+        of: Quantity,
+        value: "ArrayLike" = 0.0,
+        port: str = "",
+        *,
+        at: str = INPUTS,
+        effort: bool = True,
+        named: bool = True,
     ) -> str:
         """A junction that an input of runs drives, ``"SECTION.NAME"`` or with ``.PORT``.
 
@@ -149,12 +161,15 @@ class Site:
             The effort or flow where no input is given: a number, or one for each dimension.
         at
             Another first name of the outer port than ``inputs``; then ``"SECTION.NAME"`` drives all of them in a row.
+        named
+            Whether runs may drive it; else other elements act there.
         """
         section, *own = self._own(port)
         path = Path([at, section, *own] if at == INPUTS else [at, *own])
         self._level.junctions[path] = junction(of, exposed=True)
         given = np.broadcast_to(np.asarray(value, dtype=float), (of.space.dim,)).copy()
-        self._level.inputs[path] = str(self._own(port if at == INPUTS else "")), Signal(given, effort=effort)
+        name = str(self._own(port if at == INPUTS else "")) if named else ""
+        self._level.inputs[path] = name, Signal(given, effort=effort)
         return str(path)
 
     # ---- boxes ---------------------------------------------------------------------------------------------------

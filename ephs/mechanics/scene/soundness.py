@@ -13,7 +13,6 @@ import numpy as np
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
-from ephs.mechanics.scene.flexible import Tendon
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
 from ephs.mechanics.scene.surfaces import Contact, Surface
@@ -98,8 +97,6 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
                 yield name, each.values() | _surface(name, each)
             case Contact():
                 yield name, {key: (number, ()) for key, number in each.law.numbers}
-            case Tendon():
-                yield name, each.values() | {"points": (each.points, (len(each.bodies), 3))}
             case SceneElement():
                 yield name, each.values()
 

@@ -1,106 +1,113 @@
-"""Tendons of a scene file, checked and resolved; their systems, ports and states at the start."""
+"""Tendons through points of bodies."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Self, final
 
 import numpy as np
+from pydantic import Field
 
 from ephs.mechanics.elements.tendon import tendon
-from ephs.mechanics.scene.actuators import Actuator
-from ephs.mechanics.scene.entries import Checked, Document, shown
-from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.flexible import Tendon
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, frozen
-from ephs.mechanics.scene.resolve import Names
-from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.spaces import SE3, translation
+from ephs.mechanics.scene.custom import Element, key
+from ephs.mechanics.scene.element import ENVIRONMENT
+from ephs.mechanics.scene.rules import rule
+from ephs.mechanics.scene.schema_numbers import Flag, Names, NonNegative, Text, Vector
+from ephs.mechanics.scene.site import Site
+from ephs.operad import quantity
 from ephs.semantics.spaces.rank import ASSEMBLY
-from ephs.semantics.systems.system import System
+
+_Spot = tuple[str, Vector]
 
 
-def resolve_tendons(
-    document: Document, poses: Mapping[str, Array], names: Names, faults: list[Fault]
-) -> dict[str, Tendon]:
-    """The tendons of a file; ``poses`` (7,) of all bodies where they start."""
-    found: dict[str, Tendon] = {}
-    for name, table in document.sections["tendons"].items():
-        count = len(faults)
-        _check(name, table, names, faults)
-        if len(faults) == count and not table.spoiled:
-            found[name] = _resolved(name, table.entry, poses, faults)
-    return found
+@final
+class Tendon(Element, section="tendons", said="tendons through points of bodies"):
+    """A tendon without mass, straight from point to point of bodies, through which it slides."""
 
+    bodies: Names = key(
+        'what carries its points, in their order; the tension is the input "actuators.NAME", in N', names="body"
+    )
+    points: Annotated[list[Vector], Field(min_length=2)] = key(
+        "one in each, in its centre-of-mass frame (ground: world), m", frame="bodies"
+    )
+    stiffness: NonNegative = key("", 0.0, unit="N/m")
+    length: NonNegative | None = key("without force, {}; default: as at the start", None, unit="m")
+    damping: NonNegative = key("{}; 0 of one with slack", 0.0, unit="N s/m")
+    slack: Flag = key("no elastic force where it is shorter than its length: a cable", False)
+    heat: Text = key("where the heat goes: a thermal name", ENVIRONMENT, names="node")
 
-def _check(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
-    entry, key = table.entry, f"tendons.{name}"
-    names.check_all(Tendon, table, key, faults)
-    if table.sound("slack", "damping") and entry.slack and entry.damping:
-        faults.append(fault("slack damping", f"{key}.damping", entry.damping))
-    if not table.sound("bodies", "points"):
-        return
-    if len(entry.points) != len(entry.bodies):
-        faults.append(fault("tendon points", f"{key}.points", len(entry.points), count=len(entry.bodies)))
-    if all(one == two for one, two in pairwise(entry.bodies)):
-        faults.append(fault("tendon bodies", f"{key}.bodies", shown(entry.bodies)))
+    @rule(
+        "damping",
+        "slack",
+        expected="0 for a tendon with slack",
+        advice="remove one of the two; joints may have friction",
+    )
+    def taut(self) -> bool:
+        """Whether it has damping only where it is always taut."""
+        return not (self.slack and self.damping)
 
-
-def _resolved(name: str, entry: Any, poses: Mapping[str, Array], faults: list[Fault]) -> Tendon:
-    places = [_place(body, np.array(at), poses) for body, at in zip(entry.bodies, entry.points, strict=True)]
-    lengths = [float(np.linalg.norm(two - one)) for one, two in pairwise(places)]
-    whole = sum(lengths)
-    for i, length in enumerate(lengths):
-        if length <= ASSEMBLY * whole and entry.bodies[i] != entry.bodies[i + 1]:
-            faults.append(
-                fault("same ends", f"tendons.{name}.points[{i + 1}]", "where the point before is at the start")
-            )
-    return Tendon(
-        name, tuple(entry.bodies), frozen(entry.points), entry.stiffness,
-        whole if entry.length is None else entry.length, entry.damping, entry.slack, entry.heat,
+    @rule(
+        "points", "bodies", found="{found}", expected="{count} points, one for each body",
+        advice="correct the number of points",
     )  # fmt: skip
+    def counted(self) -> bool | Mapping[str, object]:
+        """Whether each of its bodies carries a point."""
+        found, count = len(self.points), len(self.bodies)
+        return found == count or {"found": found, "count": count}
 
+    @rule(
+        "bodies",
+        "points",
+        expected="a segment between two different bodies",
+        advice="route it from one body to another",
+    )
+    def between(self) -> bool:
+        """Whether it leads from one body to another."""
+        return any(one != two for one, two in pairwise(self.bodies))
 
-def _place(body: str, at: Array, poses: Mapping[str, Array]) -> Array:
-    return at if body == GROUND else SE3.compose(poses[body], translation(at))[4:]
+    @rule(
+        "points", "bodies", at="points[{second}]", placed=True, found="where the point before is at the start",
+        expected="two different points or nodes", advice="correct one of the two",
+    )  # fmt: skip
+    def apart(self, site: Site) -> list[Mapping[str, object]]:
+        """The segments between bodies that have no direction at the start."""
+        lengths = self._lengths(site)
+        short = [length <= ASSEMBLY * sum(lengths) for length in lengths]
+        return [{"second": k} for k, each in enumerate(short, 1) if each and self.bodies[k - 1] != self.bodies[k]]
 
+    def settled(self, site: Site) -> Self:
+        return self.changed(length=sum(self._lengths(site))) if self.length is None else self
 
-def pulls(
-    document: Document, actuators: Mapping[str, Any], tendons: Mapping[str, Tendon], faults: list[Fault]
-) -> dict[str, Actuator]:
-    """For each tendon an actuator of its name whose control is the tension."""
-    for name, of in actuators.items():
-        if name in tendons and of.tendon != name:
-            faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
-    own = [name for name in tendons if name not in document.sections["actuators"]]
-    return {name: Actuator(tendon=name, ratio=[-1.0]).called(name) for name in own}
+    def build(self, site: Site) -> None:
+        segments, warm = self.segments, site.heated(self.heat) if self.damping else {}
+        inside = sum(float(np.linalg.norm(np.subtract(q, p))) for (a, p), (b, q) in self._pieces() if a == b)
+        made = tendon(
+            [(one[1], two[1]) for one, two in segments], self.stiffness, (self.length or 0.0) - inside, self.damping,
+            slack=self.slack, heat=bool(warm),
+        )  # fmt: skip
+        start = {f"segment{k}.pe.q_r": site.between(*one, *two) for k, (one, two) in enumerate(segments, 1)}
+        if self.stiffness:
+            apart = ([site.in_world(*end) for end in ends] for ends in segments)
+            start["spring.q"] = np.array([sum(float(np.linalg.norm(two - one)) for one, two in apart)])
+        ports = {
+            f"{side}{k}": site.momentum(body)
+            for k, ends in enumerate(segments, 1)
+            for side, (body, _) in zip("ab", ends, strict=True)
+        }
+        pull = site.input(quantity.momentum, at="tensions", effort=False, named=False)
+        site.add(made, ports | {"p": pull} | warm, initial=start)
 
+    @property
+    def segments(self) -> list[tuple[_Spot, _Spot]]:
+        """The (body, point) at both ends of each segment between two different bodies."""
+        return [(one, two) for one, two in self._pieces() if one[0] != two[0]]
 
-# ---- systems -----------------------------------------------------------------------------------------------------
+    def _pieces(self) -> Iterator[tuple[_Spot, _Spot]]:
+        return pairwise(zip(self.bodies, self.points, strict=True))
 
+    def _lengths(self, site: Site) -> list[float]:
+        """Lengths of all pieces at the start, those within bodies too."""
+        places = [site.in_world(body, at) for body, at in zip(self.bodies, self.points, strict=True)]
+        return [float(np.linalg.norm(two - one)) for one, two in pairwise(places)]
 
-def tendon_system(of: Tendon) -> System:
-    """A tendon's system."""
-    points = [(one[1], two[1]) for one, two in of.segments]
-    heat = of.heat != ENVIRONMENT
-    return tendon(points, of.stiffness, of.length - of.inside, of.damping, slack=of.slack, heat=heat)
-
-
-def tendon_ports(of: Tendon) -> dict[str, str]:
-    """Port of a tendon's system -> the body whose momentum it carries."""
-    ends = [(one[0], two[0]) for one, two in of.segments]
-    return {f"{side}{k}": body for k, pair in enumerate(ends, 1) for side, body in zip("ab", pair, strict=True)}
-
-
-def tendon_starts(of: Tendon, poses: Mapping[str, Array]) -> dict[str, Array]:
-    """States of a tendon's system by their paths in it, of bodies at poses (7,), the ground among them."""
-    out: dict[str, Array] = {}
-    length = 0.0
-    for k, ends in enumerate(of.segments, 1):
-        one, two = (SE3.compose(poses[body], translation(at)) for body, at in ends)
-        out[f"segment{k}.pe.q_r"] = SE3.normalise(SE3.compose(SE3.inverse(one), two))
-        length += float(np.linalg.norm(two[4:] - one[4:]))
-    if of.stiffness:
-        out["spring.q"] = np.array([length])
-    if of.damping and of.heat == ENVIRONMENT:
-        out["env.s"] = np.zeros(1)
-    return out
+    def __str__(self) -> str:
+        return f"{' – '.join(self.bodies)}, {self.stiffness:g} N/m"

@@ -111,8 +111,7 @@ def mjcf(given: PeerScene, method: str, step: float) -> str:
     sites: dict[str, list[str]] = {}
     tendons: list[str] = []
     for number, spring in enumerate(given.springs):
-        ends = ((spring.body1, spring.at1), (spring.body2, spring.at2))
-        for end, (body, at) in enumerate(ends):
+        for end, (body, at) in enumerate(zip(spring.bodies, (spring.at1, spring.at2), strict=True)):
             sites.setdefault(body, []).append(f'<site name="s{number}.{end}" pos="{_text(at)}" size="0.001"/>')
         inside = "".join(f'<site site="s{number}.{end}"/>' for end in (0, 1))
         numbers = f'springlength="{spring.length!r}" stiffness="{spring.stiffness!r}" damping="{spring.damping!r}"'

@@ -6,7 +6,8 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.scene.model import GROUND, Joint, Scene, Spring
+from ephs.mechanics.scene.model import GROUND, Joint, Scene
+from ephs.mechanics.scene.springs import Spring
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, RunEnding, RunSetting

@@ -90,7 +90,9 @@ def power_labels(quantity: Quantity, *, effort: bool) -> Labels:
     if of.dimension == "pose":  # flows of poses are twists
         return Labels("twist", TWIST.names, WRENCH.units if effort else TWIST.units)
     units = tuple(OWN if unit == OWN else _power(unit)[effort] for unit in of.units)
-    return Labels(of.dimension or quantity.kind, of.names or (quantity.kind,), units)
+    whole = any(quantity.kind == kind for kind, _ in _WHOLE)  # one number beside those of bodies, as of tensions
+    scalar = f"{quantity.kind} 1" if whole else quantity.kind
+    return Labels(of.dimension or scalar, of.names or (quantity.kind,), units)
 
 
 def _power(unit: str) -> tuple[str, str]:

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import ephs
 from ephs.mechanics.elements.springs import point_stretch
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.scene.flexible import Tendon
+from ephs.mechanics.scene.tendons import Tendon
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
@@ -82,8 +82,9 @@ def tied(scene, rng):
     points = rng.uniform(-2.0, 2.0, (len(bodies), 3))
     numbers = rng.uniform(1.0, 9.0, 3)
     numbers[rng.random(3) < 0.3] = 0.0
-    made = Tendon("rope", tuple(bodies), points, *map(float, numbers), slack=False, heat="environment")
-    return replace(scene, tendons={"rope": made})
+    stiffness, length, damping = map(float, numbers)
+    made = Tendon(bodies=bodies, points=points.tolist(), stiffness=stiffness, length=length, damping=damping)
+    return replace(scene, tendons={"rope": made.called("rope")})
 
 
 @settings(max_examples=8, deadline=None)

@@ -15,6 +15,7 @@ from hypothesis import assume, given, settings
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_system
 from ephs.mechanics.scene.build import initial_state
+from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.parameters import varied
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.model import compile_model
@@ -193,9 +194,7 @@ def test_mujoco_differentiates_a_robot_alike():
 
 def test_forces_wrenches_and_markers_push_as_the_motion_says():
     scene = ephs.load("scenes/four-bar.toml")
-    scene = replace(
-        scene, markers={"tip": ephs.mechanics.scene.model.Marker("tip", "coupler", np.array([0.1, 0.2, 0.0]))}
-    )
+    scene = replace(scene, markers={"tip": Marker(body="coupler", at=[0.1, 0.2, 0.0]).called("tip")})
     found = ephs.linearize(scene, inputs=["joints.pivot", "joints.knee", "bodies.coupler", "markers.tip"])
     model = ephs.dynamics(scene)
     free = found.states[1].split(".")[1]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.element import OUTSIDE
-from ephs.mechanics.scene.flexible import Strain, Tendon
+from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ELEMENTS, KINDS, Joint, World
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import SECTIONS
@@ -19,7 +19,7 @@ from ephs.mechanics.scene.soundness import check_scene
 
 PLAIN = {section: kind for section, kind in ELEMENTS.items() if section not in KINDS}
 SCENES = sorted((Path(__file__).parents[3] / "scenes").glob("*.toml"))
-BESIDE = {Joint: {"coordinate", "limits"}, Tendon: {"points"}}
+BESIDE = {Joint: {"coordinate", "limits"}}
 EXPONENTS = st.tuples(*[st.integers(-30, 30)] * 3)
 
 

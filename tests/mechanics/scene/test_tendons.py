@@ -182,6 +182,14 @@ def test_documents_parts_and_units_keep_tendons(tmp_path):
     )
 
 
+def test_a_result_file_holds_tensions_beside_momenta_of_bodies(tmp_path):
+    sol = ephs.simulate(scene_of_text(ARM.format(0.3, 0.4, 0.0, 0.0) + CABLE), 0.1, step=0.05, method="rk54")
+    sol.save(tmp_path / "solution.nc")
+    again = ephs.load_solution(tmp_path / "solution.nc")
+    for path in ("bodies.arm.ke.p", "tendons.cable.spring.q"):
+        np.testing.assert_array_equal(again[path], sol[path])
+
+
 def test_a_tiny_mechanism_does_as_a_large_one():
     scene = loaded(CABLE)
     tiny = rescaled(scene, 1e-5, 1e-12, 1e-3)  # by whose actuators one control is as much
