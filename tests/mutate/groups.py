@@ -122,6 +122,8 @@ GROUPS = {
             "ephs/solve/methods/radau.py",
             "ephs/solve/methods/collocation.py",
             "ephs/solve/methods/integral.py",
+            "ephs/solve/methods/energies.py",
+            "ephs/solve/methods/conduction.py",
             "ephs/mechanics/methods/explicit.py",
             "ephs/mechanics/methods/tableaux.py",
             "ephs/mechanics/methods/radau.py",
@@ -130,6 +132,7 @@ GROUPS = {
         (
             *RUNS,
             "tests/solve/test_integral.py",
+            "tests/solve/test_energies.py",
             "tests/solve/test_ledgers.py",
             "tests/solve/test_journal.py",
             f"{MECHANICS}/rewrite/test_folding.py",

@@ -190,6 +190,26 @@ class Replay:
             rest.append({} if self._on.vanishes(less) else less)
         return vector, rest
 
+    def conductances(self) -> list[list[Term]] | None:
+        """(n, n) K of the powers θ ∘ f = K θ that a process between temperatures θ takes; None where K depends on θ.
+
+        As M θ = 0, f = M (θ − θ₀) / θ₀ is minus the sums of the rows of M.
+        """
+        on, matrix = self._on, self._matrix(self.rows)
+        symbols = [symbol for port in self.claim.seen for symbol in port.symbols]
+        if not all(self.claim.hot) or len(symbols) != self._n:
+            return None
+        theta, found = [self._given[symbol] for symbol in symbols], list[list[Term]]()
+        for own, row in zip(theta, matrix, strict=True):
+            power = scaled(on.times(own, on.add(*row)), -1)
+            slopes = [on.slope(power, symbol) for symbol in symbols]
+            rest = on.add(power, scaled(self._dot(slopes, theta), -1))
+            bent = [on.slope(slope, symbol) for slope in slopes for symbol in symbols]
+            if not all(map(on.vanishes, [rest, self._dot(row, theta), *bent])):
+                return None
+            found.append([on.term(slope) for slope in slopes])
+        return found
+
     def term(self, of: Expanded) -> Term:
         """A term that expands to the same."""
         return self._on.term(of)

@@ -22,7 +22,7 @@ from ephs.solve.model import Evaluation, Model, cancelled
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Matrices:
-    """Derivatives of the residual g(x, z), z = (rates, efforts, multipliers, outer flows).
+    """Derivatives of the residual g(x, z), z = (rates, efforts, multipliers, outer flows); sparse or dense.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class Matrices:
         (n, n) ∂g/∂x, left-trivialised, in the columns of the rates.
     """
 
-    unknowns: csc_array
-    states: csc_array
+    unknowns: Any
+    states: Any
 
 
 @final

@@ -174,6 +174,8 @@ class Integral:
     ----------
     place
         (efforts,) the rate of the storage at each effort, −1 where it is prescribed.
+    apart
+        Components that are left out.
 
     Attributes
     ----------
@@ -187,11 +189,12 @@ class Integral:
         {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.1, "options": {"SymmetricMode": True}}
     )
 
-    def __init__(self, model: Model, place: Index) -> None:
+    def __init__(self, model: Model, place: Index, apart: Index) -> None:
         t = model.tables
         self.model, self.unknowns, self._place = model, int(t.counts[0]), place
-        self._whole = Continuous(model)
-        constant = _constant(model)
+        constant, kept = _constant(model), np.ones(t.kind.size, dtype=bool)
+        kept[apart] = False
+        self._whole = Continuous(model.only(np.flatnonzero(kept)) if apart.size else model)
         linear = Continuous(model.only(np.flatnonzero(constant)))
         width = place.size
         zeros, none = np.zeros(model.descriptor.point_size), 0.0 * model.input_values()
@@ -207,7 +210,7 @@ class Integral:
         stored = np.flatnonzero(t.kind == STORING)
         self._owner[t.read_w[spans(t.read_w_at[stored], t.dims[stored, 2])]] = np.repeat(stored, t.dims[stored, 2])
         kinds = t.kind == STORING
-        self._calls = [np.flatnonzero(~constant & chosen) for chosen in (kinds, ~kinds)]
+        self._calls = [np.flatnonzero(kept & ~constant & chosen) for chosen in (kinds, ~kinds)]
         resting = replace(t, address=model.resting(np.concatenate(self._calls)))
         self._tables = parts_of(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
         self._bound: dict[int, Any] = {}
@@ -217,8 +220,8 @@ class Integral:
         )  # fmt: skip
 
     @staticmethod
-    def of(model: Model) -> "Integral | None":
-        """The equations, None where the model is not in integral causality."""
+    def of(model: Model, apart: Index | None = None) -> "Integral | None":
+        """The equations without some components, None where the model is not in integral causality."""
         t = model.tables
         place, owners = np.full(int(t.counts[1]), -1), np.zeros(int(t.counts[1]), dtype=np.int64)
         stored = np.flatnonzero(t.kind == STORING)
@@ -227,32 +230,28 @@ class Integral:
         np.add.at(owners, efforts, 1)
         for at, dim, prescribed, _ in t.outer:
             owners[at : at + dim] += prescribed
-        return Integral(model, place) if not t.counts[2] and (owners == 1).all() else None
+        if t.counts[2] or not (owners == 1).all():
+            return None
+        return Integral(model, place, np.zeros(0, dtype=np.int64) if apart is None else apart)
 
     def guess(self, x: Array) -> Array:
         """(unknowns,) none yet."""
         return np.zeros(x.size)
 
     def residuals(self, xs: Array, zs: Array, inputs: Array) -> Array:
-        """(stages, unknowns) w − F(x).
-
-        Raises
-        ------
-        SolveError
-            A component cannot be evaluated there.
-        """
-        return zs - self._rates(xs, inputs)
+        """(stages, unknowns) w − F(x)."""
+        return zs - self.rates(xs, inputs)
 
     def matrices(self, x: Array, z: Array, inputs: Array) -> Matrices:
         """The derivatives of w − F(x)."""
-        self._rates(x[None], inputs[None])
+        self.rates(x[None], inputs[None])
         slopes, flows, reads = self._parts(self._whole.matrices(x, self._z, inputs))
         balance = csr_array(flows @ slopes + reads)
         return Matrices(csc_array(eye_array(x.size)), csc_array(balance[self._effort - self.unknowns]))
 
     def instant(self, x: Array, z: Array, inputs: Array) -> Instant:
         """Powers and energies at x."""
-        self._rates(x[None], inputs[None])
+        self.rates(x[None], inputs[None])
         t, m = self.model.tables, self._memory
         energies = np.zeros(t.kind.size)
         np.add.at(energies, self._owner, 0.5 * x * self._z[self._effort])
@@ -270,7 +269,14 @@ class Integral:
         slopes = own @ (-states[by_rate, by_rate])
         return csr_array(slopes), csr_array(unknowns[balances, balances]), csr_array(states[balances, by_rate])
 
-    def _rates(self, xs: Array, inputs: Array) -> Array:
+    def rates(self, xs: Array, inputs: Array) -> Array:
+        """(stages, unknowns) F(x), in memory that the next call overwrites.
+
+        Raises
+        ------
+        SolveError
+            A component cannot be evaluated there.
+        """
         stages = xs.shape[0]
         if stages not in self._bound:
             arrays = [np.zeros((stages, width)) for width in (self.unknowns, inputs.shape[1], self.unknowns)]

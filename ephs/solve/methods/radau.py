@@ -14,12 +14,13 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.collocation import moments, radau, values
-from ephs.solve.methods.continuous import Continuous, Matrices
-from ephs.solve.methods.integral import Integral
+from ephs.solve.methods.continuous import Instant, Matrices
+from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.settling import PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solver, Solvers
+from ephs.solve.methods.stores import HeatStores
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.result.record import Record, record_of
@@ -45,8 +46,8 @@ class RadauState:
 
     Parameters
     ----------
-    x, z
-        The states, and the unknowns there: rates, efforts, multipliers, outer flows.
+    y, z
+        The numbers of `HeatStores`, and the unknowns there: rates, efforts, multipliers, outer flows.
     stages, h
         The unknowns at the stages of the step before, and its length in s: 0 where there is none.
     sums
@@ -56,7 +57,7 @@ class RadauState:
     """
 
     t: float
-    x: Array
+    y: Array
     z: Array
     sums: Array
     stages: Array
@@ -71,14 +72,18 @@ class Totals:
 
     Parameters
     ----------
+    numbers
+        (stages, states) at the stages.
     powers
         (stages, 4 + components) rates of the ledgers at the stages.
     passed
-        (1 + stages, 2, passages) heat in W and entropy in W/K that is passed at the start and the stages.
+        (1 + stages, 2, passages) heat in W and entropy in W/K that is passed at the start, which counts for friction
+        alone, and at the stages; none where all heat is conducted.
     """
 
+    numbers: Array
     powers: Array
-    passed: Array
+    passed: Array | None
 
 
 @final
@@ -91,10 +96,11 @@ class Radau:
     def __init__(self, problem: Problem, t0: float, control: Control) -> None:
         self.problem = problem
         self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
-        self.equations: Continuous | Integral = Integral.of(self.model) or Continuous(self.model)
+        self.stores = HeatStores(self.model)
+        self.equations = EnergyEquations(self.model, self.stores)
         self._given = self.model.input_values()
-        self._passages = Passages(self.model)
-        self._settling = Settling(self.model, self._passages.components)
+        self._passages = Passages(self.model, self.stores, self.equations.conduction)
+        self._settling = Settling(self.model, self.stores.components)
         self._chosen = control.step is None
         rtol = control.rtol.value
         self.scheme = radau(3 if not self._chosen or rtol > COARSE else 5 if rtol >= FINE else 7)
@@ -108,14 +114,14 @@ class Radau:
         self._family = Solvers(self.model.unknown_name, self.equations.pivots)
         self._solvers: tuple[float, list[Solver]] | None = None
         self._current: RadauState | None = None
-        self._last: tuple[RadauState, Array, Array] | None = None
+        self._last: tuple[RadauState, Instant] | None = None
 
-    def inputs(self, t: float, x: Array) -> Array:
+    def inputs(self, t: float, y: Array) -> Array:
         """Values at the outer ports, one after the other."""
         p = self.problem
         if p.constant:
             return self._given
-        given = p.inputs(t, NO_STATE if p.timed else p.descriptor.unpack(x))
+        given = p.inputs(t, NO_STATE if p.timed else p.descriptor.unpack(self.stores.entropies(y)))
         return np.concatenate([*(given[slot.path].value for slot in self.problem.descriptor.outer), np.zeros(1)])
 
     def start(self, t: float, h: float) -> RadauState:
@@ -127,15 +133,16 @@ class Radau:
             The states contradict the constraints: however short the step, they jump.
         """
         d = self.model.descriptor
-        x = d.pack(self.problem.initial)
-        z = self.equations.guess(x)
-        account = self._settling.opened(x) if self._settling.active else np.zeros(0)
+        y = self.stores.numbers(d.pack(self.problem.initial))
+        z = self.equations.guess(y)
+        account = self._settling.opened(y) if self._settling.active else np.zeros(0)
         sums, stages = np.zeros(4 + len(d.components)), np.zeros((self.scheme.nodes.size, z.size))
-        start = RadauState(t, x.copy(), z, sums, stages, 0.0, account)
+        start = RadauState(t, y.copy(), z, sums, stages, 0.0, account)
         first, second = (self._solved(start, PROBE * h * part)[1] for part in (1.0, 0.5))
-        jumps = [self._size(end - x, x) for end in (first, second)]
+        allowed = self._allowed(y)
+        jumps = [_size(end - y, allowed) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
-            entry = int(np.argmax(np.abs(second - x) / (self.atol + self.rtol * np.abs(x))))
+            entry = int(np.argmax(np.abs(second - y) / allowed))
             raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
         stages = self._solved(start, 0.5 * PROBE * h)[0]
         self._matrices = None
@@ -155,12 +162,12 @@ class Radau:
         SolveError
             The stages have no solution near by, or lie outside the domain of a component.
         """
-        stages, x, iterations = self._solved(state, h)
-        if not np.abs(x).max(initial=0.0) < LARGEST:
-            raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(x) < LARGEST))), "")
+        stages, y, iterations = self._solved(state, h)
+        if not np.abs(y).max(initial=0.0) < LARGEST:
+            raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(y) < LARGEST))), "")
         totals = self._totals(state, h, stages)
-        error = self._error(state, h, stages, x)
-        end, missed = self._end(state, h, 1.0, x, stages[-1].copy(), totals)
+        error = self._error(state, h, stages, y)
+        end, missed = self._end(state, h, 1.0, y, stages[-1].copy(), totals)
         end = replace(end, stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
         self.iterations += iterations
@@ -173,8 +180,8 @@ class Radau:
         stages, totals = attempt.detail
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
-        x = start.x + h * moments(self.scheme.nodes, theta) @ stages[:, : self._rates]
-        return self._end(start, h, theta, x, values(self.scheme.nodes, theta) @ stages, totals)[0]
+        y = start.y + h * moments(self.scheme.nodes, theta) @ stages[:, : self._rates]
+        return self._end(start, h, theta, y, values(self.scheme.nodes, theta) @ stages, totals)[0]
 
     def missed(self, attempt: Attempt[RadauState]) -> None:
         """None: the balance of energy shows it."""
@@ -196,7 +203,9 @@ class Radau:
 
     def row(self, state: RadauState) -> Row:
         """Record of a state."""
-        return Row(state.x, np.where(self._makers, state.sums[4:], self._known(state)[0]), state.sums[:4])
+        energies, stores = np.where(self._makers, state.sums[4:], self._known(state).energies), self.stores
+        energies[stores.components[stores.hot]] = state.y[stores.warm]
+        return Row(stores.entropies(state.y), energies, state.sums[:4])
 
     def stats(self) -> dict[str, Any]:
         """Counts, for the solution's statistics."""
@@ -241,27 +250,33 @@ class Radau:
                 raise
             self._refresh(state)
             stages, iterations = self._stages(state, h)
-        return stages, state.x + h * self.scheme.coefficients[-1] @ stages[:, : self._rates], iterations
+        return stages, state.y + h * self.scheme.coefficients[-1] @ stages[:, : self._rates], iterations
 
     def _totals(self, state: RadauState, h: float, stages: Array) -> Totals:
         """Entries of the ledgers at the stages, and the heat that is passed there and at the start."""
-        xs = state.x + h * self.scheme.coefficients @ stages[:, : self._rates]
-        powers, passed = list[Array](), list[Array]()
-        for x, z, c in zip(xs, stages, self.scheme.nodes, strict=True):
-            found = self.equations.instant(x, z, self.inputs(state.t + c * h, x))
-            powers.append(found.sums)
-            passed.append(self._passages.powers(found.flows, found.unknowns))
-        return Totals(np.array(powers), np.array([self._known(state)[1], *passed]))
+        ys = state.y + h * self.scheme.coefficients @ stages[:, : self._rates]
+        found = self.equations.instants(ys, stages, self._inputs(state.t + h * self.scheme.nodes, ys))
+        passed = None
+        if self._passages.called:
+            start = [self._known(state)] if self._passages.frictions else found[:1]
+            passed = np.array([self._passages.powers(each) for each in (*start, *found)])
+        return Totals(ys, np.array([each.sums for each in found]), passed)
 
-    def _known(self, state: RadauState) -> tuple[Array, Array]:
-        """(components,) stored energies, and heat and entropy transferred."""
+    def _known(self, state: RadauState) -> Instant:
+        """Powers and stored energies at a state."""
         if self._last is None or self._last[0] is not state:
-            found = self.equations.instant(state.x, state.z, self.inputs(state.t, state.x))
-            self._last = state, found.energies, self._passages.powers(found.flows, found.unknowns)
-        return self._last[1:]
+            self._last = state, self._instant(state.t, state.y, state.z)
+        return self._last[1]
+
+    def _instant(self, t: float, y: Array, z: Array) -> Instant:
+        return self.equations.instants(y[None], z[None], self.inputs(t, y)[None])[0]
+
+    def _inputs(self, times: Array, ys: Array) -> Array:
+        """(stages, values) at the outer ports."""
+        return np.array([self.inputs(t, y) for t, y in zip(times.tolist(), ys, strict=True)])
 
     def _end(
-        self, state: RadauState, h: float, theta: float, x: Array, z: Array, totals: Totals
+        self, state: RadauState, h: float, theta: float, y: Array, z: Array, totals: Totals
     ) -> tuple[RadauState, float]:
         """The state at a part of a step of h seconds, and what its error is by the energy that it missed.
 
@@ -269,34 +284,34 @@ class Radau:
         """
         t, weights, passages = state.t + theta * h, h * moments(self.scheme.nodes, theta), self._passages
         sums, heat, error, account = state.sums + weights @ totals.powers, 0.0, 0.0, state.account
-        changed = x - state.x
-        if passages.states.size:
-            x[passages.states] = state.x[passages.states]
-            energies = [self._known(state)[0], self.equations.instant(x, z, self.inputs(t, x)).energies]
-            missed = theta * h * (self.scheme.gamma * totals.passed[0, 0] + self.scheme.defect @ totals.passed[1:, 0])
+        changed, stored = y - state.y, self.stores.states
+        if stored.size:
+            y[stored] = state.y[stored]
+            passed, missed, energies = None, None, None
+            if totals.passed is not None:
+                passed = np.tensordot(weights, totals.passed[1:], 1)
+            if totals.passed is not None and passages.frictions:
+                energies = np.array([self._known(state).energies, self._instant(t, y, z).energies])
+                missed = self.scheme.gamma * totals.passed[0, 0] + self.scheme.defect @ totals.passed[1:, 0]
+                missed = theta * h * missed
             booked = passages.booked(
-                state.x,
-                np.tensordot(weights, totals.passed[1:], 1),
-                missed,
-                np.array(energies),
-                sums[1] - state.sums[1],
+                state.y, passed, (weights @ totals.numbers, theta * h), missed, energies, sums[1] - state.sums[1]
             )
-            x[passages.states] = booked.entropies
+            y[stored] = booked.numbers
             sums[0] += booked.heat
             sums[3] += booked.made.sum()
             sums[4:] += booked.made
             heat = booked.passed
         if account.size:
             rest = theta * h * z[: self._rates] - changed
-            allowed = self.atol + self.rtol * np.maximum(np.abs(state.x), np.abs(x))
-            x, account, error = self._settling.settled(
-                account, state.x, x, lambda: self._filtered(h, np.array([changed, rest])), allowed, float(sums[1]),
-                heat, chosen=self._chosen,
+            y, account, error = self._settling.settled(
+                account, state.y, y, lambda: self._filtered(h, np.array([changed, rest])),
+                self._allowed(state.y, y), float(sums[1]), heat, chosen=self._chosen,
             )  # fmt: skip
-        return RadauState(t, x, z, sums, state.stages, 0.0, account), error
+        return RadauState(t, y, z, sums, state.stages, 0.0, account), error
 
     def _refresh(self, state: RadauState) -> None:
-        self._matrices = self.equations.matrices(state.x, state.z, self.inputs(state.t, state.x))
+        self._matrices = self.equations.matrices(state.y, state.z, self.inputs(state.t, state.y))
         self._current = state
         self._solvers, self._slow = None, False
 
@@ -317,19 +332,20 @@ class Radau:
 
     def _stages(self, state: RadauState, h: float) -> tuple[Array, int]:
         solvers, scheme, stages, rates = self._solve(h), self.scheme, self._guess(state, h), self._rates
-        parts, before = np.zeros((1, rates)), np.inf
+        parts, before, allowed = np.zeros((1, rates)), np.inf, self._allowed(state.y)
         for iteration in range(1, ITERATIONS + 1):
-            xs = state.x + h * scheme.coefficients @ stages[:, :rates]
-            inputs = np.array([self.inputs(state.t + c * h, x) for x, c in zip(xs, scheme.nodes, strict=True)])
-            change = scheme.solved(self.equations.residuals(xs, stages, inputs), solvers)
+            ys = state.y + h * scheme.coefficients @ stages[:, :rates]
+            inputs = self._inputs(state.t + h * scheme.nodes, ys)
+            change = scheme.solved(self.equations.residuals(ys, stages, inputs), solvers)
             self.evaluations += len(stages)
             stages -= change
-            parts = np.abs(h * scheme.coefficients @ change[:, :rates]) / (self.atol + self.rtol * np.abs(state.x))
+            parts = np.abs(h * scheme.coefficients @ change[:, :rates]) / allowed
             moved = float(np.max(parts, initial=0.0))
             if not np.isfinite(moved):
                 break
             stalls = iteration > 2 and moved > 0.3 * before
-            if moved <= 1e-3 or (stalls and (moved <= 1e-1 or self._rounded(state, h, stages, change))):
+            solved = self.equations.linear or moved <= 1e-3
+            if solved or (stalls and (moved <= 1e-1 or self._rounded(state, h, stages, change))):
                 return stages, iteration
             if iteration > 2 and moved > 2.0 * before:
                 break
@@ -338,14 +354,15 @@ class Radau:
         raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
 
     def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
-        """Whether rounding, of the equations' terms and of the states' sums, alone changes the stages' rates so much.
+        """Whether rounding, of the equations' terms and of the numbers' sums, alone changes the stages' rates so much.
 
         A factor of 10 covers what the signs of the terms may cancel here.
         """
         m, real = self._matrices, self._solve(h)[0]
         assert m is not None
         rates, largest = self._rates, np.abs(stages).max(axis=0)
-        summed = np.abs(state.x) + abs(h) * np.abs(self.scheme.coefficients[-1]).sum() * largest[:rates]
+        summed = self.stores.terms(state.y)
+        summed += abs(h) * np.abs(self.scheme.coefficients[-1]).sum() * largest[:rates]
         terms = abs(m.unknowns) @ largest + abs(m.states)[:, :rates] @ summed
         allowed = ROUNDING * np.abs(real(terms)[:rates])
         return bool(np.all(np.abs(change[:, :rates]) <= allowed))
@@ -355,10 +372,10 @@ class Radau:
         states = self.model.descriptor.states
         return str(next(slot.path for slot in states if slot.point.start <= entry < slot.point.stop))
 
-    def _error(self, state: RadauState, h: float, stages: Array, x: Array) -> float:
+    def _error(self, state: RadauState, h: float, stages: Array, y: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
         raw = h * (self.scheme.gamma * state.z[: self._rates] + self.scheme.defect @ stages[:, : self._rates])
-        return self._size(self._filtered(h, raw), np.maximum(np.abs(state.x), np.abs(x)))
+        return _size(self._filtered(h, raw), self._allowed(state.y, y))
 
     def _filtered(self, h: float, changes: Array) -> Array:
         """Changes (…, states) with their stiff parts damped, so that what is algebraic allows them."""
@@ -368,6 +385,15 @@ class Radau:
         raw[..., : self._rates] = changes
         return changes + h * self.scheme.gamma * real(-(m.states @ raw.T)).T[..., : self._rates]
 
-    def _size(self, difference: Array, x: Array) -> float:
-        """Largest entry relative to its tolerance."""
-        return float(np.max(np.abs(difference) / (self.atol + self.rtol * np.abs(x)), initial=0.0))
+    def _allowed(self, *ys: Array) -> Array:
+        """(states,) what errors of numbers may be, by the largest of these; entropies count at stores of heat."""
+        stores, sizes = self.stores, np.abs(self.stores.entropies(ys[0]))
+        for y in ys[1:]:
+            sizes = np.maximum(sizes, np.abs(stores.entropies(y)))
+        allowed = self.atol + self.rtol * sizes
+        return stores.slopes(ys[0]) * allowed if stores.warm.size else allowed
+
+
+def _size(difference: Array, allowed: Array) -> float:
+    """Largest entry relative to what is allowed."""
+    return float(np.max(np.abs(difference) / allowed, initial=0.0))

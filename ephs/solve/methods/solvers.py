@@ -27,18 +27,28 @@ Solver: TypeAlias = Callable[[Array], Array]
 
 @final
 class _Band:
-    """Order of unknowns, and how many diagonals below and above the main one it leaves."""
+    """Order of unknowns, and how many diagonals below and above the main one it leaves.
 
-    __slots__ = ("_indices", "_starts", "above", "below", "order", "place")
+    Attributes
+    ----------
+    order
+        The unknowns in their order; None where they stand in it.
+    """
+
+    __slots__ = ("_cells", "_indices", "_starts", "above", "below", "order")
 
     def __init__(self, matrix: csc_array) -> None:
         self._starts, self._indices = matrix.indptr, matrix.indices
-        self.order: Index = reverse_cuthill_mckee(csr_array(matrix), symmetric_mode=False)
-        self.place = np.empty(self.order.size, dtype=np.int64)
-        self.place[self.order] = np.arange(self.order.size)
+        order: Index = reverse_cuthill_mckee(csr_array(matrix), symmetric_mode=False)
+        unmoved = np.arange(order.size)
+        place = np.empty(order.size, dtype=np.int64)
+        place[order] = unmoved
+        along = np.array_equal(order, unmoved) or np.array_equal(order[::-1], unmoved)
+        self.order, place = (None, unmoved) if along else (order, place)
         found = coo_array(matrix)
-        apart = self.place[found.row] - self.place[found.col]
-        self.below, self.above = int(apart.max(initial=0)), int(-apart.min(initial=0))
+        row, column = place[found.row], place[found.col]
+        self.below, self.above = int((row - column).max(initial=0)), int((column - row).max(initial=0))
+        self._cells = column * (2 * self.below + self.above + 1) + self.below + self.above + row - column
 
     @property
     def narrow(self) -> bool:
@@ -51,18 +61,20 @@ class _Band:
 
     def solver(self, matrix: csc_array, fail: Callable[[int], SolveError]) -> Solver:
         """The factorised matrix."""
-        found, below, above = coo_array(matrix), self.below, self.above
-        row, column = self.place[found.row], self.place[found.col]
-        band = np.zeros((2 * below + above + 1, self.order.size), dtype=matrix.dtype, order="F")
-        band[below + above + row - column, column] = found.data
+        below, above, order = self.below, self.above, self.order
+        band = np.zeros((matrix.indptr.size - 1, 2 * below + above + 1), dtype=matrix.dtype)
+        band.ravel()[self._cells] = matrix.data
         factorise, solve = get_lapack_funcs(("gbtrf", "gbtrs"), (band,))
-        factors, pivots, info = factorise(band, below, above, overwrite_ab=True)
+        factors, pivots, info = factorise(band.T, below, above, overwrite_ab=True)
         if info > 0 or not np.isfinite(factors).all():
-            raise fail(int(self.order[info - 1]) if info > 0 else -1)
+            at = info - 1 if order is None or info <= 0 else int(order[info - 1])
+            raise fail(at)
 
         def solved(right: Array) -> Array:
+            if order is None:
+                return solve(factors, below, above, right, pivots)[0]
             out = np.empty_like(right, dtype=band.dtype)
-            out[self.order] = solve(factors, below, above, right[self.order], pivots)[0]
+            out[order] = solve(factors, below, above, right[order], pivots)[0]
             return out
 
         return solved
@@ -86,7 +98,7 @@ class Solvers:
         self._name, self._pivots = name, pivots
         self._band: _Band | None = None
 
-    def of(self, matrix: csc_array) -> Solver:
+    def of(self, matrix: "csc_array | Array") -> Solver:
         """Solve with a matrix, factorised once.
 
         Raises
@@ -94,8 +106,9 @@ class Solvers:
         SolveError
             The matrix is singular, or holds numbers that are not finite.
         """
-        rows = matrix.indptr.size - 1
-        if rows <= DENSE:
+        if isinstance(matrix, np.ndarray):
+            return self._dense(matrix)
+        if matrix.indptr.size - 1 <= DENSE:
             return self._dense(matrix.toarray())
         if self._band is None or not self._band.orders(matrix):
             self._band = _Band(matrix)
