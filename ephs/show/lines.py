@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, final
 
+import numpy as np
+
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.model import elements_of
 from ephs.mechanics.scene.site import Level, Site
@@ -25,9 +27,12 @@ class BodyLine:
 
 def lines_of(scene: Any) -> dict[str, BodyLine]:
     """The springs of a scene, the segments NAME-1, NAME-2, … of its tendons, and lines of its elements."""
-    found = {name: BodyLine(*s.bodies, s.at1, s.at2, s.heat, coiled=True) for name, s in scene.all_springs()}
+    found = {
+        name: BodyLine(*s.bodies, np.array(s.at1), np.array(s.at2), s.heat, coiled=True)
+        for name, s in scene.all_springs()
+    }
     for name, tendon in scene.all_tendons():
-        ends = pairwise(zip(tendon.bodies, tendon.points, strict=True))
+        ends = pairwise(zip(tendon.bodies, map(np.array, tendon.points), strict=True))
         for k, ((one, here), (two, there)) in enumerate(ends, 1):
             found[f"{name}-{k}"] = BodyLine(one, two, here, there, tendon.heat, coiled=False)
     for path, level in scene.levels():

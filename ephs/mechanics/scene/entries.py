@@ -27,9 +27,6 @@ E = TypeVar("E", bound=Entry)
 _NEUTRAL: dict[str, Any] = {
     "type": "free",
     "bodies": ["ground", "ground"],
-    "points": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
-    "at1": [0.0, 0.0, 0.0],
-    "at2": [0.0, 0.0, 0.0],
     "capacity": 1.0,
     "temperature": 1.0,
     "use": "?",

@@ -308,7 +308,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     "string damping": ("0 for a string, which has no bending stiffness", 'use rod = "kirchhoff"'),
     "up": ("a direction not parallel to any tangent of the beam", "choose another up"),
     "unknown tendon": ("a tendon of this file", "{hint}"),
-    "same ends": ("two different points or nodes", "correct one of the two"),
     # assembly
     "gap": ("gaps below {limit}", "correct {who}, or set assembly.adjust = true"),
     "velocity": ("residuals below {limit}", "correct the velocities of {who}, or set assembly.adjust = true"),

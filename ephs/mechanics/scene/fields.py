@@ -109,10 +109,6 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
     return Field(get, put, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
 
 
-def _attributes(kind: str) -> dict[str, Field]:
-    return _registered(KINDS[kind]) if kind in KINDS else {key: _attribute(kind, key) for key in ELEMENTS[kind].numbers}
-
-
 def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
     """A number of the law of contacts that have it: hard ones have no stiffness, soft ones no restitution."""
 
@@ -348,9 +344,9 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "frame1.position": _frame("frame1"),
         "frame2.position": _frame("frame2"),
     },
-    **{section: _attributes(section) for section in ("springs", "tendons", *ATTACHED)},
+    **{section: _registered(KINDS[section]) for section in ("springs", "tendons", *ATTACHED)},
     "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
-    **{section: _attributes(section) for section in ("conduction", "markers")},
+    **{section: _registered(KINDS[section]) for section in ("conduction", "markers")},
     "contacts": {
         "stiffness": _law("stiffness", POSITIVE),
         "loss": _law("loss", NON_NEGATIVE),

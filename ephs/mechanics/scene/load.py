@@ -134,7 +134,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     mode = r.inertia or document.assembly.inertia
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
-    thermal = resolve.resolve_plain("thermal", document, names, faults)
+    thermal = resolve.resolve_thermal(document)
     surfaces = resolve_surfaces(document, names, path.parent, faults)
     elements = resolve_elements(document, parts, names, faults)
     if faults:

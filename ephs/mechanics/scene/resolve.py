@@ -11,18 +11,19 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.element import Measured, SceneElement
+from ephs.mechanics.scene.element import Measured
 from ephs.mechanics.scene.entries import Checked, Document, shown
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
-from ephs.mechanics.scene.model import ELEMENTS, ENVIRONMENT, GROUND, Joint, World, frozen
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, World, frozen
 from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry
 from ephs.mechanics.scene.text import MESHES
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.shapes.dry import Dry
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.motion_law import MotionLaw
@@ -85,16 +86,6 @@ class Names:
     thermal: Set[str]
     unknown_parts: Set[str]
 
-    def check_all(self, kind: type[SceneElement], table: Checked[Any], key: str, faults: list[Fault]) -> None:
-        """Append a fault for each unknown reference among the keys of an element's table."""
-        for part, of in kind.names.items():
-            if of in ("body", "node") and part in type(table.entry).model_fields and table.sound(part):
-                given, what = getattr(table.entry, part), "body" if of == "body" else "thermal"
-                several = [(given, f"{key}.{part}")] if isinstance(given, str) else []
-                several = several or [(name, f"{key}.{part}[{i}]") for i, name in enumerate(given or ())]
-                for name, place in several:
-                    self.check(name, place, what, faults)
-
     def check(self, name: str, key: str, what: str, faults: list[Fault]) -> None:
         """Append a fault where a reference is unknown; ``what`` is body or thermal."""
         fixed, known = (GROUND, self.bodies) if what == "body" else (ENVIRONMENT, self.thermal)
@@ -141,7 +132,8 @@ def resolve_joint(name: str, table: Checked[JointEntry], names: Names, faults: l
     """A joint with everything checked but its closure; None where its type or place is not usable."""
     entry, key = table.entry, f"joints.{name}"
     _check_ends(table, key, names, faults)
-    names.check_all(Joint, table, key, faults)
+    if table.sound("heat"):
+        names.check(entry.heat, f"{key}.heat", "thermal", faults)
     if not table.sound("type"):
         return None
     if entry.type not in joint_types():
@@ -220,15 +212,10 @@ def attributes(kind: type[Measured], entry: Any) -> dict[str, Any]:
     return given
 
 
-def resolve_plain(section: str, document: Document, names: Names, faults: list[Fault]) -> dict[str, Any]:
-    """The elements of a section whose tables have their attributes for keys, what they name checked."""
-    kind: Any = ELEMENTS[section]
-    found: dict[str, Any] = {}
-    for name, table in document.sections[section].items():
-        key = f"{section}.{name}"
-        names.check_all(kind, table, key, faults)
-        found[name] = kind(name=name, **attributes(kind, table.entry))
-    return found
+def resolve_thermal(document: Document) -> dict[str, ThermalNode]:
+    """The thermal nodes of a file."""
+    tables = document.sections["thermal"]
+    return {name: ThermalNode(name=name, **attributes(ThermalNode, table.entry)) for name, table in tables.items()}
 
 
 def _check_ends(table: Checked[Any], key: str, names: Names, faults: list[Fault]) -> None:

@@ -1,5 +1,6 @@
 """A scene in words, and as tables for notebooks."""
 
+from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -38,13 +39,17 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
     return [
         *(("body", name, f"{body.mass:g} kg") for name, body in scene.all_bodies()),
         *(("joint", name, f"{j.kind}, {j.body1} – {j.body2}") for name, j in scene.all_joints()),
-        *(("spring", name, str(spring)) for name, spring in scene.all_springs()),
+        *_told(scene, "springs"),
         *(("contact", name, " – ".join(c.surfaces)) for name, c in scene.all_contacts()),
         *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
-        *(("tendon", name, str(tendon)) for name, tendon in scene.all_tendons()),
-        *(("load", name, str(load)) for name, load in scene.all_loads()),
+        *_told(scene, "tendons", "loads"),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
-        *(("conduction", name, str(each)) for name, each in scene.all_conduction()),
+        *_told(scene, "conduction"),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_elements()),
     ]
+
+
+def _told(scene: "Scene", *sections: str) -> Iterator[tuple[str, str, str]]:
+    """The same of elements that say it themselves."""
+    return ((section.removesuffix("s"), name, str(x)) for section in sections for name, x in scene.every(section))
