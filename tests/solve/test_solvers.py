@@ -42,6 +42,27 @@ def test_all_shapes_solve_as_a_dense_solver(dense, seed):
         assert np.all(np.abs(part @ x - right) <= 8 * (2 * NARROW + 1) * np.finfo(float).eps * scale.max())
 
 
+@given(matrices(), matrices(), st.booleans(), st.integers(0, 2**32 - 1))
+@settings(max_examples=50)
+def test_sums_are_solved_as_the_sum(one, other, turning, seed):
+    """Also one after the other of two patterns, with zeros that the sum leaves."""
+    n, rng, family = min(len(one), len(other)), np.random.default_rng(seed), made()
+    a, b = np.real(one)[:n, :n] + 9.0 * np.eye(n), np.where(rng.random((n, n)) < 0.1, np.real(other)[:n, :n], 0.0)
+    weight = 0.01 + 0.02j if turning else 0.01
+    for left, right in (
+        (a, b),
+        (a, b.T),
+        (2.0 * a, b.T),
+        (a - weight.real * np.diag(b.diagonal()), np.diag(b.diagonal())),
+    ):
+        whole = left + weight * right
+        wanted = rng.standard_normal(n).astype(whole.dtype)
+        x = family.of_sum(csc_array(left), weight, csc_array(right))(wanted)
+        scale = np.abs(whole) @ np.abs(x) + np.abs(wanted)
+        growth = np.abs(np.linalg.inv(whole)).sum(axis=1).max() * np.abs(whole).sum(axis=1).max()
+        assert np.all(np.abs(whole @ x - wanted) <= 8 * n * growth * np.finfo(float).eps * scale.max())
+
+
 def chain(n, open_at=None):
     """A chain of conductances in a drawn order, singular where an unknown is in no equation."""
     dense = np.diag(np.full(n, 3.0)) - np.eye(n, k=1) - np.eye(n, k=-1)

@@ -320,7 +320,7 @@ class Radau:
         if self._solvers is None or self._solvers[0] != h:
             m, (real, *pairs) = self._matrices, self.scheme.values
             assert m is not None
-            self._solvers = h, [self._family.of(m.unknowns + h * mu * m.states) for mu in (real.real, *pairs)]
+            self._solvers = h, [self._family.of_sum(m.unknowns, h * mu, m.states) for mu in (real.real, *pairs)]
             self.factorisations += 1
         return self._solvers[1]
 

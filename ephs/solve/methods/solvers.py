@@ -35,10 +35,10 @@ class _Band:
         The unknowns in their order; None where they stand in it.
     """
 
-    __slots__ = ("_cells", "_indices", "_starts", "above", "below", "order")
+    __slots__ = ("_cells", "_pattern", "above", "below", "order")
 
     def __init__(self, matrix: csc_array) -> None:
-        self._starts, self._indices = matrix.indptr, matrix.indices
+        self._pattern = matrix
         order: Index = reverse_cuthill_mckee(csr_array(matrix), symmetric_mode=False)
         unmoved = np.arange(order.size)
         place = np.empty(order.size, dtype=np.int64)
@@ -57,7 +57,7 @@ class _Band:
 
     def orders(self, matrix: csc_array) -> bool:
         """Whether a matrix has the pattern that the order was made for."""
-        return np.array_equal(self._starts, matrix.indptr) and np.array_equal(self._indices, matrix.indices)
+        return _alike(self._pattern, matrix)
 
     def solver(self, matrix: csc_array, fail: Callable[[int], SolveError]) -> Solver:
         """The factorised matrix."""
@@ -81,6 +81,41 @@ class _Band:
 
 
 @final
+class _Sums:
+    """Sums a + w b of sparse matrices of two patterns, whose common pattern is found once."""
+
+    __slots__ = ("_of", "_pattern", "_places")
+
+    def __init__(self, a: csc_array, b: csc_array) -> None:
+        self._of = a, b
+        n = a.indptr.size - 1
+        keys = [n * np.repeat(np.arange(n), np.diff(each.indptr)) + each.indices for each in (a, b)]
+        joined = np.unique(np.concatenate(keys))
+        self._places = [np.searchsorted(joined, each) for each in keys]
+        counts = np.bincount(joined // n, minlength=n)
+        self._pattern = joined % n, np.append(0, np.cumsum(counts))
+
+    def fits(self, a: csc_array, b: csc_array) -> bool:
+        """Whether two matrices have these patterns."""
+        return all(_alike(one, other) for one, other in zip(self._of, (a, b), strict=True))
+
+    def of(self, a: csc_array, weight: complex, b: csc_array) -> csc_array:
+        """The sum."""
+        rows, starts = self._pattern
+        data = np.zeros(rows.size, dtype=np.result_type(a.dtype, type(weight)))
+        data[self._places[0]] = a.data
+        data[self._places[1]] += weight * b.data
+        return csc_array((data, rows, starts), shape=a.shape)
+
+
+def _alike(one: csc_array, other: csc_array) -> bool:
+    """Whether two matrices have one pattern."""
+    if one.indices is other.indices and one.indptr is other.indptr:
+        return True
+    return np.array_equal(one.indptr, other.indptr) and np.array_equal(one.indices, other.indices)
+
+
+@final
 class Solvers:
     """Solvers of one family of matrices; the order of a band is found once for each pattern.
 
@@ -92,11 +127,20 @@ class Solvers:
         How SuperLU is to choose pivots, options of `scipy.sparse.linalg.splu`.
     """
 
-    __slots__ = ("_band", "_name", "_pivots")
+    __slots__ = ("_band", "_name", "_pivots", "_sums")
 
     def __init__(self, name: Callable[[int], str], pivots: Mapping[str, Any]) -> None:
         self._name, self._pivots = name, pivots
         self._band: _Band | None = None
+        self._sums: _Sums | None = None
+
+    def of_sum(self, a: "csc_array | Array", weight: complex, b: "csc_array | Array") -> Solver:
+        """Solve with a + weight b, factorised once, as `of`; both are sparse without repeated entries, or dense."""
+        if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+            return self.of(a + weight * b)
+        if self._sums is None or not self._sums.fits(a, b):
+            self._sums = _Sums(a, b)
+        return self.of(self._sums.of(a, weight, b))
 
     def of(self, matrix: "csc_array | Array") -> Solver:
         """Solve with a matrix, factorised once.
