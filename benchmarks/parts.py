@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import cells
+from benchmarks.condensed import solved_by_parts
 from benchmarks.report import Report, table_of
 from ephs import Pattern, Reference, System, junction
 from ephs import library as lib
@@ -19,7 +20,6 @@ from ephs.mechanics import joint, rigid_body
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Input, descriptor_of
-from ephs.solve.methods.condensed import solved_by_parts
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model, compile_model
 
@@ -109,7 +109,7 @@ def measure(family: str, copies: int) -> dict[str, Any]:
 
 def _stepped(model: Model, x: Array) -> Array:
     method = Natural(model)
-    return method.step(method.init(x), STEP).z
+    return method.step(method.init(x), STEP).z[0]
 
 
 def report() -> Report:

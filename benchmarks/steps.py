@@ -12,7 +12,6 @@ from ephs.mechanics.rewrite.folded import folded_problem
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.solve.methods.natural import Natural
-from ephs.solve.methods.natural4 import Natural4
 from ephs.solve.model import Evaluation, compile_model
 
 __all__ = ["report"]
@@ -39,7 +38,7 @@ def _row(case: Case) -> dict[str, Any]:
     problem = folded_problem(problem_of_scene(case.scene()))
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     x, row = problem.descriptor.pack(problem.initial), dict[str, Any](scene=case.name, unknowns=model.unknowns)
-    for method in (Natural(model), Natural4(model)):
+    for method in (Natural(model), Natural(model, 3)):
         state, _ = method.advance(method.init(x), STEP, STEPS)  # past changes of the order of elimination
         row[method.name] = _least(lambda method=method, state=state: method.advance(state, STEP, STEPS)) / STEPS
     row["elimination"] = _least(_elimination(model, x)) / STEPS
@@ -52,10 +51,11 @@ def _elimination(model: Any, x: Any) -> Callable[[], object]:
     method = Natural(model)
     state, _ = method.advance(method.init(x), STEP, 1)
     method.prepare(state, STEP)
-    assert method.analysis is not None
+    o = method.elimination
+    assert o is not None
     evaluation = Evaluation(model)
-    evaluation.at(state.x, state.z, STEP)
-    o, memory, factors = method.analysis.order, evaluation.memory, np.zeros(method.analysis.fill)
+    evaluation.at(state.x, state.z[0], STEP)
+    memory, factors = evaluation.memory, np.zeros(o.entry.size)
     memory.data[-model.unknowns :] = o.dropped
     pattern = (o.start, o.entry, o.diagonal)
     calls = sparse_lu().compiled()

@@ -26,10 +26,10 @@ SHIPPED: Final = (
     "ephs.mechanics.tree.engine.residuals:point_program",
     "ephs.mechanics.tree.sweeps.balances:network_program",
     "ephs.mechanics.sensitivity.implicit:tangent_program",
-    "ephs.solve.methods.newton:natural_program",
+    "ephs.solve.methods.residuals:evaluation_program",
+    "ephs.solve.methods.newton:natural_programs",
     "ephs.solve.methods.integral:integral_program",
     "ephs.solve.methods.settling:settling_program",
-    "ephs.solve.methods.gauss:gauss_program",
     "ephs.exporting.outputs:outputs_program",
 )
 """Module and name of each program, or of a function that returns one or several. To ship a program, list it here."""

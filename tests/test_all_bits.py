@@ -54,8 +54,12 @@ def circuit():
 CASES = {
     "loops": ("scenes/slider-crank.toml", {"method": "rk87", "until": 0.002}, {"motion_of_loops", "element", "states"}),
     "network": ("scenes/motor-four-bar.toml", {"method": "rk54", "until": 0.002}, {"network", "resting"}),
-    "natural": ("scenes/four-bar.toml", {"method": "natural", "until": 0.01, "step": 0.01}, {"natural"}),
-    "natural4": ("scenes/body.toml", {"method": "natural4", "until": 0.01, "step": 0.01}, {"gauss"}),
+    "natural": ("scenes/four-bar.toml", {"method": "natural", "until": 0.01, "step": 0.01}, {"evaluation", "natural"}),
+    "natural4": (
+        "scenes/body.toml",
+        {"method": "natural4", "until": 0.01, "step": 0.01},
+        {"natural_of_3_stages", "evaluation"},
+    ),
     "radau": ("scenes/chain.toml", {"method": "radau", "until": 0.002}, {"stiff_steps_of_trees"}),
     "contact": (SOFT, {"method": "rk87", "until": 1e-4}, {"motion_of_trees", "resting"}),
     "stiff contact": (SOFT, {"method": "radau", "until": 1e-4}, {"stiff_steps_of_trees"}),

@@ -17,9 +17,8 @@ from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.kept import once
 from ephs.solve.layout import entry_of, laid_out
-from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, TablesOf, parts_of
-from ephs.solve.methods.residuals import FAULTS
+from ephs.solve.methods.residuals import FAULTS, evaluation_program
 from ephs.solve.sparse import Index
 
 
@@ -314,7 +313,7 @@ class Evaluation:
         d, inputs = model.descriptor, model.input_values()
         self._x, self._z = np.zeros(d.point_size), np.zeros(model.unknowns)
         self._scal, self._inputs, self._sums = model.scal(0.0), inputs, np.zeros(4 + model.tables.kind.size)
-        calls, t, m = natural_program().compiled(), parts_of(model.tables), parts_of(self.memory)
+        calls, t, m = evaluation_program().compiled(), parts_of(model.tables), parts_of(self.memory)
         self._evaluate = calls["evaluate"].bind(t, self._x, self._z, self._scal, self._inputs, m, 0.0)
         self._calls, self._parts = calls, (t, m)
 

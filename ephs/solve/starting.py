@@ -30,7 +30,7 @@ def _jump(method: Natural, problem: Problem, x: Array, instant: float) -> tuple[
     after, chunk = method.advance(method.init(x), instant, 1)
     if chunk.failure is not None:
         return None
-    moved = instant * after.z[: d.rate_size]
+    moved = instant * after.z[0, : d.rate_size]
     sizes = np.array([np.abs(moved[slot.rates]).max(initial=0.0) for slot in d.states])
     return sizes, d.advance(x, 0.5 * moved)
 

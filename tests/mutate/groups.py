@@ -118,7 +118,7 @@ GROUPS = {
     "integrators": Group(
         (
             "ephs/solve/methods/natural.py",
-            "ephs/solve/methods/natural4.py",
+            "ephs/solve/methods/spread.py",
             "ephs/solve/methods/radau.py",
             "ephs/solve/methods/collocation.py",
             "ephs/solve/methods/integral.py",
@@ -147,7 +147,8 @@ GROUPS = {
     "kernels": Group(
         (
             "ephs/solve/methods/corrections.py",
-            "ephs/solve/methods/gauss.py",
+            "ephs/solve/methods/guesses.py",
+            "ephs/solve/methods/moves.py",
             "ephs/solve/methods/newton.py",
             "ephs/solve/methods/residuals.py",
             "ephs/solve/methods/scales.py",

@@ -1,5 +1,6 @@
 """The programs of the natural methods: floats and machine code give the same bits, whatever a step meets."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,13 +14,9 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.differentials import DIMENSIONS, differentials
 from ephs.semantics.stage import Program
-from ephs.solve.methods.analysis import analyse
-from ephs.solve.methods.gauss import gauss_program
 from ephs.solve.methods.natural import Natural
-from ephs.solve.methods.natural4 import Natural4
-from ephs.solve.methods.newton import BEFORE, natural_program
+from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import DONE, parts_of
-from ephs.solve.methods.scheme import STAGES
 from ephs.solve.model import Model, compile_model
 
 pytestmark = pytest.mark.optimised
@@ -56,16 +53,13 @@ def same(program: Program, name: str, given) -> list:
     return runs[0]
 
 
-def step(model: Model, x, seed, stages):
-    """The arguments of one step from unknowns that are off by something."""
+def disturbed(model: Model, x, seed, stages):
+    """A step, the method, and a state whose unknowns are off by something."""
     rng = np.random.default_rng(seed)
-    h = 10.0 ** rng.uniform(-4.0, -2.0)
-    shape = (stages, model.unknowns) if stages else model.unknowns
-    method = (Natural4 if stages else Natural)(model)
-    z = method.init(x).z + 1e-3 * rng.choice([0.0, 1.0]) * rng.standard_normal(shape)
-    rows = [np.zeros((1, width)) for width in (x.size, model.tables.kind.size, 5)]
-    ends = [np.zeros(4 + model.tables.kind.size), *rows, np.zeros(4, dtype=np.int64), 1]
-    return h, method, z, ends
+    method = Natural(model, stages)
+    state = method.init(x)
+    z = state.z + 1e-3 * rng.choice([0.0, 1.0]) * rng.standard_normal(state.z.shape)
+    return 10.0 ** rng.uniform(-4.0, -2.0), method, replace(state, z=z)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -73,20 +67,21 @@ def step(model: Model, x, seed, stages):
 @given(seed=seeds)
 def test_a_step_of_order_2(name, seed):
     made, x = model_of(name)
-    h, method, z, ends = step(made, x, seed, 0)
-    order = analyse(made, x, method.init(x).z, h)
-    memory = made.memory(order.fill)
+    h, method, state = disturbed(made, x, seed, 1)
+    method.prepare(state, h)
+    rows = [np.zeros((1, width)) for width in (x.size, made.tables.kind.size, 5)]
 
     def given():
-        own = [array.copy() if isinstance(array, np.ndarray) else array for array in ends]
+        tables = made.tables, method._groups, method.elimination
         return [
-            parts_of(made.tables), parts_of(order.order), copied(memory), x.copy(), z.copy(),
-            np.tile(z, (BEFORE, 1)), made.scal(h), made.input_values(), *own,
+            *map(parts_of, tables), copied(method._memory), copied(method._scratch), x.copy(), state.z.copy(),
+            state.previous.copy(), made.scal(h), made.scal(0.0), made.input_values()[None], state.sums.copy(),
+            *[row.copy() for row in rows], np.zeros(4, dtype=np.int64), 1,
         ]  # fmt: skip
 
-    found = same(natural_program(), "advance", given)
+    found = same(natural_program(1), "advance", given)
     assert found[-3][2] == (found[-3][0] == DONE)
-    assert np.array_equal(found[3], x) != (found[-3][0] == DONE)
+    assert np.array_equal(found[5], x) != (found[-3][0] == DONE)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -94,17 +89,17 @@ def test_a_step_of_order_2(name, seed):
 @given(seed=seeds)
 def test_the_stages_of_order_4(name, seed):
     made, x = model_of(name)
-    h, method, z, _ = step(made, x, seed, STAGES)
-    inputs = np.tile(made.input_values(), (STAGES, 1))
+    h, method, state = disturbed(made, x, seed, 3)
+    inputs = np.tile(made.input_values(), (3, 1))
 
     def given():
         return [
             parts_of(made.tables), parts_of(method._groups), np.zeros(made.unknowns, dtype=np.int64), x.copy(),
-            z.copy(), made.scal(h), made.scal(0.0), inputs,
+            state.z.copy(), made.scal(h), made.scal(0.0), inputs,
             copied(made.memory()), copied(method._scratch), 1,
         ]  # fmt: skip
 
-    found = same(gauss_program(), "linearise", given)
+    found = same(natural_program(3), "linearise", given)
     assert found[-1] == 0
     assert found[-3]["slope"].any()
 

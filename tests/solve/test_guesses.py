@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs.semantics.stage import PLAIN
-from ephs.solve.methods.newton import BEFORE, RULES, extrapolated
+from ephs.solve.methods.guesses import BEFORE, RULES, extrapolated
 
 DEGREES = [(1, -1), (3, -1), (5, -1), (2, 0), (4, 0), (3, 1)]
 """Degrees of the polynomial and of the factor of (−1)ᵏ for which rules are exact; −1: none."""

@@ -1,14 +1,18 @@
-"""Steps of order 4: energy, closed joints, the angular momentum about the vertical, and the power of their error."""
+"""Natural steps of several stages: energy, closed joints, angular momentum about the vertical, and their order."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ephs
+from ephs import library
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.semantics.spaces import SE3
-from ephs.solve.methods.natural4 import Natural4
+from ephs.solve.methods.natural import Natural
 from ephs.solve.model import compile_model
 
+ROOT = Path(__file__).resolve().parents[2]
 TOP = """format = 1
 name = "top"
 
@@ -37,10 +41,10 @@ def top(tmp_path_factory):
     return problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
 
 
-def end(top, h, steps):
+def end(top, h, steps, stages=3):
     """Pose, momentum and energy after some steps, and the number of iterations."""
     problem, model = top
-    method = Natural4(model)
+    method = Natural(model, stages)
     state, chunk = method.advance(method.init(problem.descriptor.pack(problem.initial)), h, steps)
     assert chunk.failure is None and chunk.steps == steps
     found = problem.descriptor.unpack(state.x)
@@ -52,7 +56,7 @@ def test_a_step_keeps_energy_and_the_tip_where_it_is(top):
     problem, model = top
     begin = problem.descriptor.unpack(problem.descriptor.pack(problem.initial))
     first = begin[ephs.Path.of("bodies.top.pe.q")]
-    energy = float(Natural4(model).energies(problem.descriptor.pack(problem.initial)).sum())
+    energy = float(Natural(model, 3).energies(problem.descriptor.pack(problem.initial)).sum())
     tip = SE3.inverse(first)[4:]  # the origin, as the body sees it
     for h in (0.1, -0.1):
         pose, _, after, iterations = end(top, h, 1)
@@ -80,3 +84,50 @@ def test_momentum_about_the_vertical_is_kept_to_the_order(top):
     missed = [abs(vertical(*end(top, h, 1)[:2]) - start) for h in (0.1, 0.05)]
     assert missed[0] < 1e-4 * abs(start)
     assert missed[1] <= missed[0] / 14.0 or missed[0] <= 1e-12 * abs(start)
+
+
+@pytest.fixture(scope="module")
+def chain():
+    problem = problem_of_scene(ephs.load(ROOT / "benchmarks/scenes/spherical-chain-2.toml"))
+    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    return problem, model, moved(problem, model, 3, 320)
+
+
+def moved(problem, model, stages, steps):
+    """Poses and momenta after 0.4 s."""
+    method = Natural(model, stages)
+    state, chunk = method.advance(method.init(problem.descriptor.pack(problem.initial)), 0.4 / steps, steps)
+    assert chunk.failure is None
+    found = problem.descriptor.unpack(state.x)
+    return [np.concatenate([found[path] for path in found if str(path).endswith(end)]) for end in ("pe.q", "ke.p")]
+
+
+@pytest.mark.parametrize("stages", [1, 2, 3])
+def test_poses_have_twice_the_order_of_stages_and_momenta_what_the_method_says(chain, stages):
+    """What momenta have across the constraints adds up from step to step where the number of stages is even."""
+    problem, model, exact = chain
+    order = Natural(model, stages).order
+    assert order == {1: 2, 2: 2, 3: 4}[stages]
+    ends = [moved(problem, model, stages, steps) for steps in (10, 20)]
+    coarse, fine = ([np.linalg.norm(one - other) for one, other in zip(end, exact, strict=True)] for end in ends)
+    assert np.log2(np.array(coarse) / fine) == pytest.approx([2.0 * stages, order], abs=0.1)
+
+
+@pytest.mark.parametrize("stages", [1, 2, 3])
+def test_energy_is_kept_and_entropy_made_by_any_number_of_stages(stages):
+    pattern = ephs.Pattern.from_text(
+        "q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); cap(s)"
+    )
+    system = pattern(
+        pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: 0.25 * q**4), ke=library.point_mass(m=1.0),
+        pkc=library.pkc(), mf=library.friction(d=0.1), cap=library.thermal_capacity(c1=293.15, c2=1.0),
+    )  # fmt: skip
+    descriptor = system.descriptor()
+    method = Natural(compile_model(descriptor, ephs.Reference(), {}), stages)
+    start = method.init(descriptor.pack(system.state({"pe.q": 1.0})))
+    energy = method.energies(start.x).sum()
+    for h in (0.1, 1.0):
+        state, chunk = method.advance(start, h, 10)
+        assert chunk.failure is None
+        assert abs(method.energies(state.x).sum() - energy) <= 10 * 8 * 5 * np.finfo(float).eps * energy
+        assert chunk.ledgers[:, 4].min() > 0.0

@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.solve.methods.newton import natural_program
+from ephs.semantics.stage import Entry, Program, vector
+from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of
+from ephs.solve.methods.residuals import evaluation_program
 from ephs.solve.methods.scales import SPREAD, TAKES_PART
 from ephs.solve.model import compile_model
 
-CALLS = natural_program().compiled()
+CALLS = evaluation_program().compiled()
 ROOT = Path(__file__).resolve().parents[2]
 seeds = st.integers(0, 2**32 - 1)
 
@@ -104,5 +106,5 @@ def test_quaternions_that_are_off_by_rounding_come_back(seed):
     q = np.random.default_rng(seed).standard_normal(4)
     unit = q / np.linalg.norm(q)
     off = unit * (1.0 + 1e-6)
-    CALLS["tighten"](off)
+    Program("tight", tighten=Entry(tighten, q=vector(4))).plain()["tighten"](off)
     assert np.abs(off - unit).max() <= 1e-11

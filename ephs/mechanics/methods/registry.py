@@ -13,7 +13,6 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.control import Control, Policy, Proportional, Symmetric
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.methods import own
-from ephs.solve.methods.driven import ComponentMethod
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model
 from ephs.solve.problem import Problem
@@ -90,7 +89,7 @@ class MethodEntry:
     options: tuple[str, ...] = ()
     forms: tuple[str, ...] = ()
     lawful: bool = False
-    undamped: Callable[[Model], ComponentMethod] | None = None
+    undamped: Callable[[Model], Natural] | None = None
     impacts: bool = False
     posed: bool = False
 
@@ -181,7 +180,7 @@ def _auto(equations: Any, control: Control) -> Any:
 
 
 def _component_wise(
-    make: Callable[[Model], ComponentMethod],
+    make: Callable[[Model], Natural],
 ) -> Callable[[Setting], tuple[Stepper[Any], Policy | None]]:
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
         from ephs.solve.methods.paced import Paced
@@ -192,13 +191,12 @@ def _component_wise(
     return made
 
 
-def _of_order_4(model: Model) -> ComponentMethod:
-    from ephs.solve.methods.natural4 import Natural4
+def _natural4(model: Model) -> Natural:
     from ephs.solve.methods.records import WORKING
 
     if (model.tables.kind == WORKING).any():
         raise OptionError("method", "natural4", "natural: at stages of a step stabilised joints close nothing")
-    return Natural4(model)
+    return Natural(model, 3)
 
 
 def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
@@ -260,10 +258,10 @@ for _method in (
         True,
         True,
         "the same of order 4",
-        _component_wise(_of_order_4),
+        _component_wise(_natural4),
         forms=("paper", "folded"),
         lawful=True,
-        undamped=_of_order_4,
+        undamped=_natural4,
     ),
     MethodEntry(
         "variational",

@@ -21,8 +21,8 @@ from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, vector
 from ephs.solve.errors import OptionError, SolveError
+from ephs.solve.methods.moves import settle
 from ephs.solve.methods.natural import Natural, NaturalState
-from ephs.solve.methods.newton import settle
 from ephs.solve.methods.records import MEMORY, TABLES, Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.methods.stored import stored_energies
@@ -165,7 +165,7 @@ class NaturalTangent:
     def step(self, point: Point, h: float) -> Point:
         """One step of h seconds."""
         after = self.natural.step(point.state, h)
-        x0, z, model = point.state.x, after.z, self.side.model
+        x0, z, model = point.state.x, after.z[0], self.side.model
         self._sound(*self._evaluation.at(x0, z, h))
         matrix = np.zeros((z.size, z.size))
         np.add.at(matrix, (model.tables.row, model.tables.column), self._evaluation.memory.data)

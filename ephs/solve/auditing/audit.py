@@ -22,7 +22,7 @@ from ephs.solve.auditing.rounding import exchanged, isolated, rounded, trembling
 from ephs.solve.breakpoints import MOST_FOUND
 from ephs.solve.control import Control
 from ephs.solve.errors import Other, or_take, serves_not
-from ephs.solve.methods.driven import ComponentMethod
+from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Bounds:
     accuracy: float
     ledger: float
     step: float | None = None
-    undamped: Callable[[Model], ComponentMethod] | None = None
+    undamped: Callable[[Model], Natural] | None = None
     order: int = 1
     again: Again | None = None
     tolerance: float = 0.0
@@ -94,7 +94,7 @@ class Bounds:
         step: float | None,
         *,
         lawful: bool,
-        undamped: Callable[[Model], ComponentMethod] | None = None,
+        undamped: Callable[[Model], Natural] | None = None,
         order: int = 1,
         again: Again | None = None,
         repeatable: bool = False,

@@ -32,7 +32,8 @@ from ephs.solve.auditing.growth import Again, apart
 from ephs.solve.auditing.retaken import Retaken
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import SLIVER
-from ephs.solve.methods.driven import ComponentMethod, advance_driven
+from ephs.solve.methods.driven import advance_driven
+from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.paced import Paced
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
@@ -195,9 +196,9 @@ def _clear(t: float, h: float, until: float, jumps: Sequence[float]) -> bool:
 
 def natural_trials(
     solution: "Solution",
-    make: Callable[[Model], ComponentMethod],
+    make: Callable[[Model], Natural],
     h: float,
-    own: ComponentMethod | None = None,
+    own: Natural | None = None,
     jumps: Sequence[float] = (),
 ) -> Trials | None:
     """Steps of h s by a natural method from states of a solution; None where there are none.
@@ -230,7 +231,7 @@ def natural_trials(
     return Trials(problem, method.order, tuple(float(t[i]) for i in instants), tried)
 
 
-def _after(problem: Problem, method: ComponentMethod, x: Array, t: float, h: float, count: int) -> Tried:
+def _after(problem: Problem, method: Natural, x: Array, t: float, h: float, count: int) -> Tried:
     """States, (components,) energies, and the entropy made since, after h seconds in so many steps.
 
     Raises
@@ -285,7 +286,7 @@ class Samples(Generic[S]):
 
 def trials_of(
     solution: "Solution",
-    make: Callable[[Model], ComponentMethod] | None,
+    make: Callable[[Model], Natural] | None,
     problem: Problem,
     stepper: Stepper[Any],
     order: int,

@@ -6,10 +6,8 @@ from typing import Final
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 from ephs.solve.methods.places import add_to, raise_to
 from ephs.solve.methods.records import STORING, Columns, Dims, row_of
-from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
+from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
 
-_A: Final[list[list[float]]] = SCHEME.tolist()
-_B: Final[list[float]] = WEIGHTS.tolist()
 _NONE: Final = 1e-280
 """Squares up to which there is nothing to correct along."""
 
@@ -37,7 +35,7 @@ def rest(on: Evaluator, t: Columns, h: Real, slope: Vector, scale: Vector) -> No
     on.loop(t.kind.size, component)
 
 
-def bend(on: Evaluator, g: GroupColumns, h: Real, z: Matrix, s: StageScratch) -> None:
+def bend(on: Evaluator, scheme: Scheme, g: GroupColumns, h: Real, z: Matrix, s: StageScratch) -> None:
     """Derivatives of the factors α of storages of entropy by the rates: their energies bend too much to leave them out.
 
     A small capacity warms by orders of magnitude in a step; of other storages α is of the quadrature's order.
@@ -46,31 +44,31 @@ def bend(on: Evaluator, g: GroupColumns, h: Real, z: Matrix, s: StageScratch) ->
     def node(k: Integer) -> None:
         row = row_of(Node, g.node, k)
         rate, effort = row.rate, row.effort
-        rates = [z[i, rate] for i in range(STAGES)]
+        rates = [z[i, rate] for i in range(scheme.stages)]
         defect, square = s.gradient[rate] * s.whole[rate] / h, 0.0
-        for i in range(STAGES):
-            defect = defect - _B[i] * (z[i, effort] - s.residual[i, rate]) * rates[i]
-            square = square + _B[i] * rates[i] * rates[i]
+        for i in range(scheme.stages):
+            defect = defect - scheme.b[i] * (z[i, effort] - s.residual[i, rate]) * rates[i]
+            square = square + scheme.b[i] * rates[i] * rates[i]
         s.factor[k] = 0.0
-        for j in range(STAGES):
+        for j in range(scheme.stages):
             s.share[k, j] = 0.0
 
         def bent() -> None:
             factor = defect / square
             s.factor[k] = factor
-            slopes = [s.slope[i, row.slope] for i in range(STAGES)]
-            for j in range(STAGES):
-                by = _B[j] * (s.end[k] - z[j, effort] + s.residual[j, rate])
-                for i in range(STAGES):
-                    by = by + h * _B[i] * _A[i][j] * rates[i] * slopes[i]
-                s.share[k, j] = (by - 2.0 * factor * _B[j] * rates[j]) / square
+            slopes = [s.slope[i, row.slope] for i in range(scheme.stages)]
+            for j in range(scheme.stages):
+                by = scheme.b[j] * (s.end[k] - z[j, effort] + s.residual[j, rate])
+                for i in range(scheme.stages):
+                    by = by + h * scheme.b[i] * scheme.a[i][j] * rates[i] * slopes[i]
+                s.share[k, j] = (by - 2.0 * factor * scheme.b[j] * rates[j]) / square
 
         on.when(square > _NONE, bent)
 
     on.loop(g.node.size // Node.integer_width, node)
 
 
-def correct_storages(on: Evaluator, t: Columns, h: Real, z: Matrix, s: StageScratch) -> None:
+def correct_storages(on: Evaluator, scheme: Scheme, t: Columns, h: Real, z: Matrix, s: StageScratch) -> None:
     """Put the one-term corrections of the storages into the residuals of the stages."""
     n_rate = t.counts[0]
 
@@ -83,14 +81,14 @@ def correct_storages(on: Evaluator, t: Columns, h: Real, z: Matrix, s: StageScra
             def port(j: Integer) -> None:
                 rate, effort = t.read_w[w_at + j], n_rate + t.e_index[e_at + j]
                 lost, moved = defect.value + s.gradient[rate] * s.whole[rate] / h, square.value
-                for i in range(STAGES):
-                    lost = lost - _B[i] * (z[i, effort] - s.residual[i, rate]) * z[i, rate]
-                    moved = moved + _B[i] * z[i, rate] * z[i, rate]
+                for i in range(scheme.stages):
+                    lost = lost - scheme.b[i] * (z[i, effort] - s.residual[i, rate]) * z[i, rate]
+                    moved = moved + scheme.b[i] * z[i, rate] * z[i, rate]
                 defect.value, square.value = lost, moved
 
             def share(j: Integer) -> None:
                 rate = t.read_w[w_at + j]
-                for i in range(STAGES):
+                for i in range(scheme.stages):
                     s.residual[i, rate] = s.residual[i, rate] - defect.value / square.value * z[i, rate]
 
             on.loop(n, port)
@@ -101,7 +99,9 @@ def correct_storages(on: Evaluator, t: Columns, h: Real, z: Matrix, s: StageScra
     on.loop(t.kind.size, component)
 
 
-def correct_joints(on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers, z: Matrix, s: StageScratch) -> None:
+def correct_joints(
+    on: Evaluator, scheme: Scheme, t: Columns, g: GroupColumns, dropped: Integers, z: Matrix, s: StageScratch
+) -> None:
     """Put the one-term corrections of the joints into the residuals of the stages.
 
     Stages are off the positions of joints by the order of the quadrature. An equation that follows from the others
@@ -135,8 +135,8 @@ def correct_joints(on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers
         def squared(j: Integer, q: Integer, weight: Real) -> None:
             def sum_up() -> None:
                 found = square.value
-                for i in range(STAGES):
-                    found = found + _B[i] * z[i, j] * weight * z[i, q]
+                for i in range(scheme.stages):
+                    found = found + scheme.b[i] * z[i, j] * weight * z[i, q]
                 square.value = found
 
             on.when(on.absolute(weight) > 0.0, sum_up)
@@ -155,19 +155,19 @@ def correct_joints(on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers
         def condition(j: Integer) -> None:
             row = first + j
             delta, force = s.gap[row], 0.0
-            for i in range(STAGES):
-                delta = delta - _B[i] * s.residual[i, row]
-                force = force + _B[i] * z[i, row]
+            for i in range(scheme.stages):
+                delta = delta - scheme.b[i] * s.residual[i, row]
+                force = force + scheme.b[i] * z[i, row]
             power.value = power.value + delta * force
             closing = on.same(dropped[row], 1)
-            for i in range(STAGES):
+            for i in range(scheme.stages):
                 s.residual[i, row] = on.select(closing, s.gap[row], s.residual[i, row] + delta)
 
         def shared(j: Integer, q: Integer, weight: Real) -> None:
             share = power.value / square.value * weight
 
             def give() -> None:
-                for i in range(STAGES):
+                for i in range(scheme.stages):
                     add_to(s.residual.row(i), j, share * z[i, q])
 
             on.when(on.absolute(share) > 0.0, give)

@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import LARGEST, Outcome, SolveError
-from ephs.solve.methods.natural import Chunk, NaturalState
+from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.problem import NO_STATE, Problem, State
-from ephs.solve.snapshot import Snapshot
 
 ROUNDED_INPUTS = 1e-13
 """Part of inputs that read the state by which they may change once more: rounding, times a condition of hundreds."""
@@ -22,62 +21,17 @@ _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
 _DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN, Outcome.DEPTH)
 
 
-class ComponentMethod(Protocol):
-    """A method that discretises component by component: `Natural`, `Natural4`."""
-
-    model: Model
-    name: str
-    order: int
-    nodes: tuple[float, ...]
-    changes: int
-
-    @property
-    def redundant(self) -> tuple[str, ...]:
-        """The omitted equations, in words."""
-        ...
-
-    def init(self, x: Array) -> NaturalState:
-        """The state of the method at the states x."""
-        ...
-
-    def energies(self, x: Array) -> Array:
-        """(components,): energy of each storage at the states x."""
-        ...
-
-    def prepare(self, state: NaturalState, h: float) -> None:
-        """Compile programs that are not in the cache, before timing starts."""
-        ...
-
-    def advance(
-        self, state: NaturalState, h: float, steps: int, inputs: Array | None = None
-    ) -> tuple[NaturalState, Chunk]:
-        """Up to so many steps of h seconds."""
-        ...
-
-    def snapshot(self) -> Snapshot:
-        """Memory from step to step besides the state."""
-        ...
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot."""
-        ...
-
-    def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
-        """The states at the nodes of a step of h seconds from x, by the rates that ``state`` holds."""
-        ...
-
-    def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
-        """The states at the nodes of the step from x that led to ``state``."""
-        ...
+ComponentMethod: TypeAlias = Natural
+"""A method that discretises component by component."""
 
 
-def started(method: ComponentMethod, x: Array, sums: Array) -> NaturalState:
+def started(method: Natural, x: Array, sums: Array) -> NaturalState:
     """State of a method that starts at the states x, with the former counts."""
     return replace(method.init(x), sums=sums)
 
 
 def advance_whole(
-    method: ComponentMethod, state: NaturalState, h: float, steps: int, inputs: Array | None = None, cuts: int = CUTS
+    method: Natural, state: NaturalState, h: float, steps: int, inputs: Array | None = None, cuts: int = CUTS
 ) -> tuple[NaturalState, Chunk]:
     """Up to so many steps of h seconds; one that has no solution is taken in halves, and these so on ``cuts`` times.
 
@@ -142,7 +96,7 @@ def _finite(model: Model, chunk: Chunk) -> Chunk:
 
 
 def advance_driven(
-    problem: Problem, method: ComponentMethod, state: NaturalState, t: float, h: float
+    problem: Problem, method: Natural, state: NaturalState, t: float, h: float
 ) -> tuple[NaturalState, Chunk]:
     """One step with inputs at the method's nodes; of the state they are taken at the step's own, by iteration."""
     if problem.constant:

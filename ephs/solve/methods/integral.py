@@ -33,7 +33,6 @@ from ephs.semantics.stage import (
 from ephs.solve.errors import SolveError
 from ephs.solve.layout import LINEAR
 from ephs.solve.methods.continuous import Continuous, Instant, Matrices
-from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.places import Part, add_to
 from ephs.solve.methods.records import (
     COMPONENT,
@@ -47,7 +46,7 @@ from ephs.solve.methods.records import (
     parts_of,
     row_of,
 )
-from ephs.solve.methods.residuals import FAULTS, called
+from ephs.solve.methods.residuals import FAULTS, called, evaluation_program
 from ephs.solve.model import Model
 from ephs.solve.sparse import Index
 
@@ -215,7 +214,7 @@ class Integral:
         self._tables = parts_of(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
         self._bound: dict[int, Any] = {}
         self._sums, self._given = np.zeros(4 + t.kind.size), model.input_values()
-        self._account = natural_program().compiled()["account"].bind(
+        self._account = evaluation_program().compiled()["account"].bind(
             parts_of(t), self._z, 1.0, self._given, parts_of(self._memory), self._sums
         )  # fmt: skip
 

@@ -1,9 +1,12 @@
-"""The natural method: every component discretised on its own, order 2, energy and holonomic relations exact.
+"""The natural method: every component discretised on its own; energy and holonomic relations exact, friction included.
+
+It has Gauss stages. With one, of order 2, a component's relation over a step is all there is; with several, what the
+stages miss of it is put in as one term a component (see `stages`), so that discretising commutes with composing for any
+number. A composition of steps of order 2 would have to step backwards through dissipation.
 
 The state of the method is a value; advancing it is compiled, and gives one row of results a step.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -11,19 +14,35 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.kernel_table import RAISED
+from ephs.semantics.linear.sparse import sparse_lu
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.methods.analysis import AS_BEFORE, AT_START, WITHIN, Analysis, Decided, analyse
+from ephs.solve.methods.analysis import (
+    AS_BEFORE,
+    AT_START,
+    DEFECT,
+    SHRUNK,
+    WITHIN,
+    Decided,
+    analyse,
+    dependent_rows,
+    entries_at,
+)
 from ephs.solve.methods.blame import Blame
-from ephs.solve.methods.newton import BEFORE, natural_program
-from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, PIVOT, Memory, Order, parts_of
+from ephs.solve.methods.collocation import moments
+from ephs.solve.methods.guesses import BEFORE
+from ephs.solve.methods.newton import natural_program
+from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order, OrderOf, parts_of
+from ephs.solve.methods.residuals import FAULTS
+from ephs.solve.methods.scheme import gauss
+from ephs.solve.methods.spread import closing_of, groups_of, memory_of
 from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Model
 from ephs.solve.snapshot import Snapshot, parts
-from ephs.solve.sparse import Index
+from ephs.solve.sparse import Index, order
 
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""
-_OUTCOMES = {DIVERGED: Outcome.DIVERGED, PIVOT: Outcome.SINGULAR, INCONSISTENT: Outcome.CONTRADICTION}
 
 
 @final
@@ -36,10 +55,10 @@ class NaturalState:
     x
         (point_size,) the states.
     z
-        (unknowns,) the unknowns of the last step; of `Natural4` (stages, unknowns).
+        (stages, unknowns) the unknowns of the last step.
     previous
-        (`BEFORE`, unknowns) those of the steps before, latest first, from which the next are guessed; of `Natural4`
-        (`BEFORE` · stages, unknowns), stage after stage.
+        (`BEFORE` · stages, unknowns) those of the steps before, latest first, stage after stage, from which the next
+        are guessed.
     sums
         (4 + components,): heat, energy supplied, exergy supplied, entropy made; entropy made by each component.
     """
@@ -81,46 +100,27 @@ class Chunk:
 
 
 @final
-class Loop:
-    """The compiled loop over steps, bound to arrays of its own.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Loop:
+    """The compiled loop over steps, bound to arrays of its own: a state, (h, θ₀, π₀), inputs, and rows of results."""
 
-    Parameters
-    ----------
-    bind
-        Called with the memory of a state (x, z, previous, sums), of (h, θ₀, π₀), of inputs, and of results.
-    stages
-        Shape of what there is for each stage of a step: none at order 2.
+    order: Order
+    state: tuple[Array, ...]
+    scal: Array
+    inputs: Array
+    rows: tuple[Array, Array, Array]
+    outcome: Index
+    call: Any
 
-    Attributes
-    ----------
-    order, room
-        The order of elimination, and how many steps there is room for.
-    rows
-        States, energies and ledgers, a row for each step that was taken last.
-    """
-
-    def __init__(
-        self, model: Model, order: Order, room: int, bind: Callable[..., Any], stages: tuple[int, ...] = ()
-    ) -> None:
-        components, n = model.tables.kind.size, model.unknowns
-        self.order, self.room, self._scal = order, room, model.scal(0.0)
-        self._inputs = np.tile(model.input_values(), (*stages, 1))
-        size, before = model.descriptor.point_size, BEFORE * max((1, *stages))
-        self._state = [np.zeros(shape) for shape in (size, (*stages, n), (before, n), 4 + components)]
-        self.rows = [np.zeros((room, width)) for width in (size, components, 5)]
-        self._outcome = np.zeros(4, dtype=np.int64)
-        self._call = bind(self._state, self._scal, self._inputs, (*self.rows, self._outcome, 0))
-
-    def run(self, state: Sequence[Array], h: float, inputs: Array, steps: int) -> tuple[int, int, int, int]:
+    def run(self, state: tuple[Array, ...], h: float, inputs: Array, steps: int) -> list[int]:
         """Take steps in place of a state (x, z, previous, sums): status, component, steps done, iterations."""
-        self._scal[0], self._inputs[..., : inputs.shape[-1]] = h, inputs
-        for own, given in zip(self._state, state, strict=True):
+        self.scal[0], self.inputs[:, : inputs.shape[1]] = h, inputs
+        for own, given in zip(self.state, state, strict=True):
             own[:] = given
-        self._call(steps)
-        for own, given in zip(self._state, state, strict=True):
+        self.call(steps)
+        for own, given in zip(self.state, state, strict=True):
             given[:] = own
-        status, component, done, iterations = self._outcome.tolist()
-        return status, component, done, iterations
+        return self.outcome.tolist()
 
 
 @final
@@ -131,35 +131,45 @@ class Natural:
     ----------
     model
         The compiled model. The method keeps scratch memory: use one for each thread.
+    stages
+        Number of Gauss stages.
 
     Attributes
     ----------
-    analysis
+    order
+        In the length of a step: of momenta across constraints, which is the least. Without constraints it is twice the
+        number of stages.
+    elimination
         The present order of elimination, None before the first step.
     changes
-        How often the order was decided anew.
+        How often it was decided anew.
+    redundant
+        The equations that it leaves out, in words.
     nodes
         Where in a step inputs are wanted.
     """
 
-    name = "natural"
-    order = 2
-    nodes = (0.5,)
-
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        self.analysis: Analysis | None = None
+    def __init__(self, model: Model, stages: int = 1) -> None:
+        self.model, self.stages, self._scheme = model, stages, gauss(stages)
+        self.order, self.nodes = stages + stages % 2, self._scheme.nodes
+        self.name = "natural" if stages == 1 else f"natural{self.order}"
+        self.elimination: Order | None = None
         self.changes = 0
+        self.redundant: tuple[str, ...] = ()
         self._memory: Memory = model.memory()
+        self._groups = groups_of(model, stages)
+        self._scratch = memory_of(model, self._groups, stages)
+        self._closing = None if stages == 1 else closing_of(model, self._groups)
         self._unsettled = 0
         self._dropped: Index | None = None
         self._decided: Decided | None = None
-        self._bound: Loop | None = None
+        self._inputs = self._given(None)
+        self._bound: _Loop | None = None
         self._stored = Stored(model)
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""
-        z = self._stored.efforts(x)
+        z = np.tile(self._stored.efforts(x), (self.stages, 1))
         return NaturalState(x.copy(), z, np.tile(z, (BEFORE, 1)), np.zeros(4 + len(self.model.descriptor.components)))
 
     def energies(self, x: Array) -> Array:
@@ -168,7 +178,7 @@ class Natural:
 
     def prepare(self, state: NaturalState, h: float) -> None:
         """Decide the order of elimination and compile programs that are not in the cache, before timing starts."""
-        self._loop(self._order(state.x, state.z, h).order, 1)
+        self._loop(self._order(state.x, state.z, h, self._given(None), AT_START), 1)
 
     def step(self, state: NaturalState, h: float, inputs: Array | None = None) -> NaturalState:
         """One step of h seconds.
@@ -191,57 +201,47 @@ class Natural:
         Parameters
         ----------
         inputs
-            (1, …) values at the outer ports during these steps, the model's own where None.
+            (stages, …) values at the outer ports at the nodes of these steps, the model's own where None.
         """
-        model = self.model
-        given = model.input_values() if inputs is None else inputs[0]
-        x, z, previous, sums = (a.copy() for a in (state.x, state.z, state.previous, state.sums))
-        rows = np.empty((steps, x.size))
-        energies, ledgers = np.empty((steps, model.tables.kind.size)), np.empty((steps, 5))
+        model, given = self.model, self._given(inputs)
+        x, z, previous, sums = (array.copy() for array in (state.x, state.z, state.previous, state.sums))
+        rows = [np.empty((steps, width)) for width in (state.x.size, model.tables.kind.size, 5)]
         done = iterations = 0
         failure: SolveError | None = None
         tried = AS_BEFORE
         while done < steps and failure is None:
             try:
-                analysis = self._order(x, z, h, max(tried, AT_START))
+                o = self._order(x, z, h, given, max(tried, AT_START))
             except SolveError as error:
                 failure = error
                 break
-            order = analysis.order
             wanted = steps - done
             if tried:  # no better pivots exist: take this one step with the present ones
-                order, wanted = replace(order, floor=np.zeros_like(order.floor)), 1
+                o, wanted = replace(o, floor=np.zeros_like(o.floor)), 1
             elif self._unsettled:
                 wanted = min(wanted, self._unsettled)
-            loop = self._loop(order, wanted)
+            loop = self._loop(o, wanted)
             status, component, taken, spent = loop.run((x, z, previous, sums), h, given, wanted)
-            for out, found in zip((rows, energies, ledgers), loop.rows, strict=True):
+            for out, found in zip(rows, loop.rows, strict=True):
                 out[done : done + taken] = found[:taken]
             done, iterations = done + taken, iterations + spent
             if status == DONE:
                 tried = AS_BEFORE
                 self._settle(taken)
-            elif status >= COMPONENT and (tried == WITHIN or not has_choice(order.dropped, status)):
+            elif status >= COMPONENT and (tried == WITHIN or not has_choice(o.dropped, status)):
                 failure = SolveError.of_component(status, model, component)
             elif tried == WITHIN:
-                blame = Blame(model, order.dropped)
-                failure = blame.contradicted(x, z, h) if status == INCONSISTENT else of_status(status)
-                if status == DIVERGED:
-                    failure = blame.diverged(self._memory.residual, self._memory.scale)
-            else:
-                self.analysis, tried, self._unsettled = None, tried + 1, SETTLING
-        after = NaturalState(x, z, previous, sums)
-        return after, Chunk(rows[:done], energies[:done], ledgers[:done], int(iterations), failure)
-
-    @property
-    def redundant(self) -> tuple[str, ...]:
-        """The omitted equations, in words."""
-        return self.analysis.redundant if self.analysis is not None else ()
+                failure = self._failure(status, o, x, z, h)
+            else:  # another order, at these values
+                self.elimination, tried, self._unsettled = None, tried + 1, SETTLING
+        states, energies, ledgers = (found[:done] for found in rows)
+        return NaturalState(x, z, previous, sums), Chunk(states, energies, ledgers, int(iterations), failure)
 
     def snapshot(self) -> Snapshot:
         """Origin of the present order of elimination, and the equations left out before."""
         return {
-            "decided": parts(self._decided) if self.analysis is not None else None,
+            "decided": parts(self._decided) if self.elimination is not None else None,
+            "inputs": self._inputs,
             "dropped": self._dropped,
             "unsettled": self._unsettled,
             "changes": self.changes,
@@ -249,56 +249,121 @@ class Natural:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Decide the order as it was decided."""
-        self.analysis, found = None, snapshot["decided"]
+        self.elimination, found = None, snapshot["decided"]
         if found is not None:
             self._dropped = found["before"]
-            self._order(found["x"], found["z"], found["h"], found["tried"])
+            self._order(found["x"], found["z"], found["h"], snapshot["inputs"], found["tried"])
         self._dropped, self._unsettled = snapshot["dropped"], snapshot["unsettled"]
         self.changes = snapshot["changes"]
 
     def points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
-        """The state in the middle of a step from x, by the rates that ``state`` holds."""
-        return self.stage_points(state, h, x)
+        """The states at the nodes of a step from x, by the rates that ``state`` holds, continued."""
+        d, nodes = self.model.descriptor, np.array(self.nodes)
+        ahead = moments(nodes, 1.0 + nodes) - self._scheme.b
+        return [d.advance(x, h * (weights @ state.z[:, : d.rate_size])) for weights in ahead]
 
     def stage_points(self, state: NaturalState, h: float, x: Array) -> list[Array]:
-        """The state in the middle of the step from x that led to ``state``."""
-        d = self.model.descriptor
-        return [d.advance(x, 0.5 * h * state.z[: d.rate_size])]
+        """The states at the nodes of the step from x that led to ``state``, which was solved last."""
+        return self.points(state, h, x) if self.stages == 1 else list(self._scratch.x.copy())
 
-    def _order(self, x: Array, z: Array, h: float, tried: int = AT_START) -> Analysis:
-        if self.analysis is None:
-            self._decided = Decided(x.copy(), z.copy(), float(h), self._dropped, tried)
-            self.analysis = analyse(self.model, x, z, h, self._dropped, tried)
-            self._dropped = self.analysis.dropped
-            self.changes += 1
-            self._memory = replace(self._memory, factors=np.zeros(self.analysis.fill))
-        return self.analysis
+    def _given(self, inputs: Array | None) -> Array:
+        return np.tile(self.model.input_values(), (self.stages, 1)) if inputs is None else np.ascontiguousarray(inputs)
 
-    def _loop(self, order: Order, steps: int) -> Loop:
+    def _loop(self, o: Order, steps: int) -> _Loop:
         """The compiled loop in an order, with room for so many steps."""
-        if self._bound is None or self._bound.order is not order or self._bound.room < steps:
-            parts = parts_of(self.model.tables), parts_of(order), parts_of(self._memory)
-
-            def bind(state: Sequence[Array], scal: Array, inputs: Array, results: Sequence[Any]) -> Any:
-                x, z, previous, sums = state
-                advance = natural_program().compiled()["advance"]
-                return advance.bind(*parts, x, z, previous, scal, inputs, sums, *results)
-
-            self._bound = Loop(self.model, order, steps, bind)
+        if self._bound is None or self._bound.order is not o or len(self._bound.rows[0]) < steps:
+            model = self.model
+            size, components, stages, n = (
+                model.descriptor.point_size,
+                model.tables.kind.size,
+                self.stages,
+                model.unknowns,
+            )
+            shapes = (size,), (stages, n), (BEFORE * stages, n), (4 + components,)
+            x, z, previous, sums = state = tuple(np.zeros(shape) for shape in shapes)
+            scal, inputs, outcome = model.scal(0.0), self._given(None), np.zeros(4, dtype=np.int64)
+            rows = np.zeros((steps, size)), np.zeros((steps, components)), np.zeros((steps, 5))
+            call = natural_program(self.stages).compiled()["advance"].bind(
+                parts_of(model.tables), parts_of(self._groups), parts_of(o), parts_of(self._memory),
+                parts_of(self._scratch), x, z, previous, scal, model.scal(0.0), inputs, sums, *rows, outcome, 0,
+            )  # fmt: skip
+            self._bound = _Loop(o, state, scal, inputs, rows, outcome, call)
         return self._bound
 
     def _settle(self, taken: int) -> None:
         if self._unsettled:
             self._unsettled = max(0, self._unsettled - taken)
             if not self._unsettled:
-                self.analysis = None
+                self.elimination = None
+
+    def _failure(self, status: int, o: Order, x: Array, z: Array, h: float) -> SolveError:
+        """Why a step has no solution, by the compiled loop's status."""
+        blame = Blame(self.model, o.dropped[: self.model.unknowns])
+        if status == INCONSISTENT:
+            return blame.contradicted(x, z[-1], h)
+        if status == DIVERGED:
+            held = self._memory if self.stages == 1 else self._scratch
+            return blame.diverged(held.residual, held.scale)
+        return SolveError(Outcome.SINGULAR, "", "")
+
+    def _order(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> Order:
+        """Rank of the constraints, and an order of elimination for all stages, at these values unless there is one."""
+        if self.elimination is not None:
+            return self.elimination
+        model, t, stages, size = self.model, self.model.tables, self.stages, self.stages * self.model.unknowns
+        self._decided, self._inputs = Decided(x.copy(), z.copy(), float(h), self._dropped, tried), inputs.copy()
+        values, ranked = entries_at(model, x, z[0], h, tried)
+        dropped = self._dropped = dependent_rows(model, x, ranked, self._dropped, self._closing)
+        s, scheme = self._scratch, self._scheme
+        if stages == 1:
+            s.data[0] = values
+        else:
+            fault = natural_program(stages).compiled()["linearise"](
+                parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), inputs,
+                parts_of(self._memory), parts_of(s), 1,
+            )  # fmt: skip
+            if fault:
+                raise SolveError.of_component(fault % FAULTS, model, fault // FAULTS)
+        i, j, source = self._groups.where.T
+        inside = source >= 0
+        row, column = (np.where(inside, of[source], -source - 1) for of in (t.row, t.column))
+        data = np.where(inside & (i == j), s.data[i, source], 0.0)
+        data += np.where(inside & (column < t.counts[0]), h * np.array(scheme.a)[i, j] * s.slope[i, source], 0.0)
+        data[~inside] = 1.0
+        active = inside != (dropped[row] == 1)
+        chosen = np.flatnonzero(active)
+        entries = np.where(data[chosen] == 0.0, TINY, data[chosen])  # a place that is zero now may fill later
+        n = model.unknowns
+        try:
+            found = order(size, (row + i * n)[chosen], (column + j * n)[chosen], entries)
+        except RuntimeError as error:
+            raise self._singular(self._decided) from error
+        place = np.full(active.size, -1, dtype=np.int64)
+        place[chosen] = found.place
+        made = OrderOf(
+            found.rows, found.columns, found.start, found.column, found.diagonal, place, np.tile(dropped, stages),
+            np.zeros(size), np.array([DEFECT]),
+        )  # fmt: skip
+        self._memory, ratio = replace(self._memory, factors=np.zeros(found.fill)), np.zeros(size)
+        if not sparse_lu().compiled()["factorise"](
+            place, made.start, made.entry, made.diagonal, np.where(active, data, 0.0), self._memory.factors, s.dense,
+            made.floor, ratio,
+        ):  # fmt: skip
+            raise self._singular(self._decided)
+        self.elimination = replace(made, floor=SHRUNK * ratio)
+        self.redundant = tuple(model.row_name(int(number)) for number in np.flatnonzero(dropped))
+        self.changes += 1
+        return self.elimination
+
+    def _singular(self, decided: Decided) -> SolveError:
+        """Why there is no order of elimination: an unknown without equation, or only these values."""
+        try:
+            analyse(self.model, decided.x, decided.z[0], decided.h, decided.before, decided.tried)
+        except SolveError as error:
+            return error
+        return SolveError(Outcome.SINGULAR, "", "")
 
 
 def has_choice(dropped: Index, status: int) -> bool:
     """Whether leaving out other equations may keep a step within the domain of the component that gave this status."""
     return bool(dropped.any()) and status != COMPONENT + RAISED
-
-
-def of_status(status: int) -> SolveError:
-    """Outcome of a step as a whole by the compiled loop's status."""
-    return SolveError(_OUTCOMES[status], "", "")

@@ -1,12 +1,12 @@
 """Steps of the natural method as staged functions: Newton's method, and the loop over steps."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import cache
-from typing import Final
+from itertools import chain
+from typing import Any, Final
 
 from ephs.semantics.linear.sparse import factorise, solve
-from ephs.semantics.spaces import codes
-from ephs.semantics.spaces.staged_groups import STAGED
+from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -14,17 +14,16 @@ from ephs.semantics.stage import (
     Integers,
     Matrix,
     Program,
-    Real,
     Truth,
     Vector,
     indices,
     integer,
     matrix,
-    real,
-    staged,
     vector,
 )
-from ephs.solve.methods.places import copy
+from ephs.solve.methods.guesses import BEFORE, extrapolated, restrain
+from ephs.solve.methods.moves import settle
+from ephs.solve.methods.places import add_to, copy
 from ephs.solve.methods.records import (
     COMPONENT,
     DIVERGED,
@@ -36,221 +35,171 @@ from ephs.solve.methods.records import (
     STORING,
     TABLES,
     Columns,
-    Dims,
     Elimination,
     Scratch,
-    State,
     row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, account, balance, evaluated
-from ephs.solve.methods.scales import COMMON, FAR, measure, reach, weigh
+from ephs.solve.methods.scales import COMMON, FAR, measure
+from ephs.solve.methods.scheme import (
+    GROUPS,
+    STAGE_MEMORY,
+    GroupColumns,
+    Node,
+    Place,
+    Scheme,
+    StageScratch,
+    gauss,
+)
+from ephs.solve.methods.stages import linearise
 
 RUNNING: Final = -1
 """The status of a step that is not at its end."""
 MOST: Final = 80
 """Iterations of Newton's method."""
-RULES: Final = (
-    (2.0, -1.0),
-    (4.0, -6.0, 4.0, -1.0),
-    (6.0, -15.0, 20.0, -15.0, 6.0, -1.0),
-    (2.0, 0.0, -2.0, 1.0),
-    (4.0, -5.0, 0.0, 5.0, -4.0, 1.0),
-    (2.0, 1.0, -4.0, 1.0, 2.0, -1.0),
-)
-"""Weights of the last values in a guess of the next, exact for polynomials of degree 1, 3 and 5, and of degree 2, 4 and
-3 with an alternating part of degree 0, 0 and 1: multipliers of joints alternate from step to step."""
-BEFORE: Final = max(map(len, RULES))
-"""Number of steps before the last whose unknowns are kept to choose among the rules."""
+PATIENCE: Final = 12, 25
+"""Iterations after which the residual has to fall: with a matrix for each, and with matrices used again."""
 SOLVED: Final = 4e-16
 STALLED: Final = 1e-11
 """Relative residuals that are small enough at once, and once they do not fall."""
 
 
-def restrain(on: Evaluator, t: Columns, z: Matrix, step: Matrix) -> Real:
-    """Shorten a Newton step z − step (stages, unknowns) storage by storage; the least part taken of efforts and rates.
-
-    Absolute temperatures fall by half or rise fourfold at most: small heat capacities warm by orders of magnitude in
-    one step of the method, where whole Newton steps would leave what is positive. All stages take the same part, as the
-    states at each depend on the rates at all.
-    """
-    least, part, n_rate = on.variable(1.0), on.variable(1.0), t.counts[0]
-
-    def component(i: Integer) -> None:
-        n, e_at, w_at = row_of(Dims, t.dims, i).efforts, t.e_at[i], t.read_w_at[i]
-
-        def effort(j: Integer) -> None:
-            at = t.e_index[e_at + j]
-
-            def stage(k: Integer) -> None:
-                warmth, fall = z[k, n_rate + at] + t.intensive[at], step[k, n_rate + at]
-
-                def limit(bound: Real) -> None:
-                    part.value = on.minimum(part.value, bound / fall)
-
-                def cool() -> None:
-                    limit(0.5 * warmth)
-
-                def heat() -> None:
-                    on.when(fall < -3.0 * warmth, lambda: limit(-3.0 * warmth))
-
-                on.when(warmth > 0.0, lambda: on.when(fall > 0.5 * warmth, cool, heat))
-
-            on.when(t.entropy[at] > 0.0, lambda: on.loop(z.rows, stage))
-
-        def shorten() -> None:
-            least.value = on.minimum(least.value, part.value)
-
-            def port(j: Integer) -> None:
-                effort, rate = n_rate + t.e_index[e_at + j], t.read_w[w_at + j]
-
-                def stage(k: Integer) -> None:
-                    step[k, effort] = step[k, effort] * part.value
-                    step[k, rate] = step[k, rate] * part.value
-
-                on.loop(z.rows, stage)
-
-            on.loop(n, port)
-
-        def storing() -> None:
-            part.value = 1.0
-            on.loop(n, effort)
-            on.when(part.value < 1.0, shorten)
-
-        on.when(on.same(t.kind[i], STORING), storing)
-
-    on.loop(t.kind.size, component)
-    return least.value
+def _known(on: Evaluator, values: Iterable[float]) -> Vector:
+    """Numbers that are known while staging, where places are not."""
+    entries = list(values)
+    made = on.scratch(len(entries))
+    for place, entry in enumerate(entries):
+        made[place] = entry
+    return made
 
 
-def tighten(on: Evaluator, q: Vector) -> None:
-    """Bring a quaternion that is off by rounding back to unit length."""
-    entries = [q[i] for i in range(4)]
-    a, b, c, d = entries
-    factor = 1.5 - 0.5 * (a * a + b * b + c * c + d * d)
-    for i, entry in enumerate(entries):
-        q[i] = entry * factor
-
-
-def somewhere(on: Evaluator, vector: Vector) -> Vector:
-    """The same memory, at a place that is not known while staging: functions of their own are emitted once for all."""
-    return Vector(vector.cells, vector.start + on.counter(0).value, vector.size)
-
-
-@staged
-def retract(on: Evaluator, code: Integer, x: Vector, v: Vector, out: Vector) -> None:
-    """x·exp(v) of a group, which may be x's own place."""
-
-    def vectors() -> None:
-        def one(i: Integer) -> None:
-            out[i] = x[i] + v[i]
-
-        on.loop(v.size, one)
-
-    def group(number: int, size: int, dim: int) -> None:
-        def point() -> None:
-            found = STAGED[number].retract(on, [x[i] for i in range(size)], [v[i] for i in range(dim)])
-            for i, entry in enumerate(found):
-                out[i] = entry
-
-        on.when(on.same(code, number), point)
-
-    on.when(on.same(code, codes.VECTOR), vectors)
-    for number, size, dim in ((codes.SO3, 4, 3), (codes.SE2, 3, 3), (codes.SE3, 7, 6), (codes.SO3xR3, 7, 6)):
-        group(number, size, dim)
-
-
-def settle(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v: Vector) -> None:
-    """Move all states, in place, by h times their rates; v is scratch for one of them."""
-
-    def state(k: Integer) -> None:
-        row = row_of(State, t.states, k)
-        point = x.part(row.at, row.size)
-
-        def increment(j: Integer) -> None:
-            v[j] = h * rates[row.rate + j]
-
-        on.loop(row.dim, increment)
-        retract(on, row.code, point, somewhere(on, v).part(0, row.dim), point)
-        flat = on.either(on.same(row.code, codes.VECTOR), on.same(row.code, codes.SE2))
-        on.when(on.negate(flat), lambda: tighten(on, point))
-
-    on.loop(t.states.size // State.integer_width, state)
-
-
-def pivots_of(on: Evaluator, o: Elimination, data: Vector, m: Scratch, dense: Vector, pivot: Vector) -> Truth:
-    """Factors of the matrix in the order o; false where a pivot is below its floor."""
-    return factorise(on, o.place, o.start, o.entry, o.diagonal, data, m.factors, dense, o.floor, pivot)
-
-
-def extrapolated(on: Evaluator, values: Sequence[Real], others: Sequence[tuple[Real, Real]] = ()) -> Real:
-    """Guess of the value after these, latest first, by the rule whose guess of the latest one had the least error.
-
-    Parameters
-    ----------
-    others
-        Error and guess of other rules.
-    """
-    latest, guess, least = values[0], on.variable(values[0]), on.variable(FAR)
-    found = [(on.absolute(latest - _combined(rule, values[1:])), _combined(rule, values)) for rule in RULES]
-    for error, ahead in (*others, *found):
-        closer = error < least.value
-        guess.value = on.select(closer, ahead, guess.value)
-        least.value = on.select(closer, error, least.value)
-    return guess.value
-
-
-def _combined(rule: Sequence[float], values: Sequence[Real]) -> Real:
-    terms = [coefficient * value for coefficient, value in zip(rule, values, strict=False) if coefficient]
-    return sum(terms[1:], start=terms[0])
-
-
-def newton(
-    on: Evaluator, t: Columns, o: Elimination, x: Vector, z: Vector, scal: Vector, inputs: Vector, m: Scratch,
-    outcome: Integers,
-) -> None:  # fmt: skip
-    """Solve one step in place of z, run to stagnation; outcome = status, component, and iterations added.
-
-    A matrix whose pivots have shrunk below the order's floor asks for another order.
-    """
-    before, part, iteration, n = on.variable(FAR), on.variable(1.0), on.counter(0), z.size
-    one = Matrix(z.cells, z.start, 1, n)
-    outcome[0], outcome[1] = RUNNING, 0
-    m.defect[1] = COMMON
+def _assemble(
+    on: Evaluator, scheme: Scheme, t: Columns, g: GroupColumns, o: Elimination, scal: Vector, z: Matrix, m: Scratch,
+    s: StageScratch,
+) -> Vector:  # fmt: skip
+    """The matrix of all stages from the stages' derivatives."""
+    stages, a, h = scheme.stages, _known(on, chain(*scheme.a)), scal[0]
 
     def pin(i: Integer) -> None:
         def leave() -> None:
-            m.data[m.data.size - n + i] = 1.0
+            m.data[m.data.size - z.columns + i] = 1.0
 
         on.when(on.same(o.dropped[i], 1), leave)
 
-    def subtract(i: Integer) -> None:
-        z[i] = z[i] - m.step[i]
+    def entry(k: Integer) -> None:
+        place = row_of(Place, g.where, k)
+        i, j, source = place.row, place.column, place.source
 
-    def move() -> None:
-        solve(on, o.rows, o.columns, o.start, o.entry, o.diagonal, m.factors, m.residual, m.step, m.dense)
-        part.value = restrain(on, t, one, Matrix(m.step.cells, m.step.start, 1, n))
-        on.loop(n, subtract)
+        def hold() -> None:
+            s.matrix[k] = on.select(on.same(o.dropped[-1 - source], 1), 1.0, 0.0)
+
+        def take() -> None:
+            found = on.variable(0.0)
+
+            def own() -> None:
+                found.value = s.data[i, source]
+
+            def rates() -> None:
+                found.value = found.value + h * a[stages * i + j] * s.slope[i, source]
+
+            on.when(on.same(i, j), own)
+            on.when(t.column[source] < t.counts[0], rates)
+            s.matrix[k] = found.value
+
+        on.when(source < 0, hold, take)
+
+    def node(k: Integer) -> None:
+        rate = row_of(Node, g.node, k).rate
+        for i in range(stages):
+            first = stages * (stages * k + i)
+            for j in range(stages):
+                add_to(s.matrix, g.entry[first + j], -(z[i, rate] * s.share[k, j]))
+            add_to(s.matrix, g.entry[first + i], -s.factor[k])
+
+    if scheme.single:
+        on.loop(z.columns, pin)
+        return m.data
+    on.loop(s.matrix.size, entry)
+    on.loop(g.node.size // Node.integer_width, node)
+    return s.matrix
+
+
+def newton(
+    on: Evaluator, scheme: Scheme, t: Columns, g: GroupColumns, o: Elimination, x: Vector, z: Matrix, scal: Vector,
+    still: Vector, inputs: Matrix, m: Scratch, s: StageScratch, outcome: Integers,
+) -> None:  # fmt: skip
+    """Solve one step in place of z, run to stagnation; outcome = status, component, and iterations added.
+
+    A matrix whose pivots have shrunk below the order's floor asks for another order. That of one stage comes with its
+    residual; that of several is used again while the residual falls fast.
+    """
+    before, part, iteration, fresh = on.variable(FAR), on.variable(1.0), on.counter(0), on.counter(1)
+    n, single, ratio, defect = z.columns, scheme.single, on.variable(0.0), on.variable(0.0)
+    right, change, dense, pivot = (
+        (m.residual, m.step, m.dense, m.pivot) if single
+        else (Vector(s.residual.cells, s.residual.start, scheme.stages * n), s.change, s.dense, s.pivot)
+    )  # fmt: skip
+    outcome[0], outcome[1] = RUNNING, 0
+    m.defect[1] = COMMON
+
+    def residual() -> Integer:
+        if single:
+            return evaluated(on, t, x, z.row(0), scal, inputs.row(0), m, scal[0])
+        return linearise(on, scheme, t, g, o.dropped, x, z, scal, still, inputs, m, s, fresh.value)
+
+    def stage(i: Integer) -> None:
+        copy(on, s.residual.row(i), m.residual)
+        copy(on, s.scale.row(i), m.scale)
+        found = measure(on, t, z.row(i), o.dropped.part(0, n), m)
+        number = on.both(found <= found, ratio.value <= ratio.value)
+        ratio.value = on.select(number, on.maximum(ratio.value, found), ratio.value + found)
+        defect.value = on.maximum(defect.value, m.defect[0])
+        copy(on, m.residual, s.residual.row(i))
+
+    def size() -> None:
+        ratio.value, defect.value = 0.0, 0.0
+        if single:
+            ratio.value, defect.value = measure(on, t, z.row(0), o.dropped, m), m.defect[0]
+        else:
+            on.loop(scheme.stages, stage)
+
+    def subtract(i: Integer) -> None:
+        def entry(j: Integer) -> None:
+            z[i, j] = z[i, j] - change[i * n + j]
+
+        on.loop(n, entry)
 
     def refuse() -> None:
         outcome[0] = PIVOT
 
+    def factors() -> None:
+        data = _assemble(on, scheme, t, g, o, scal, z, m, s)
+        good = factorise(on, o.place, o.start, o.entry, o.diagonal, data, m.factors, dense, o.floor, pivot)
+        on.when(on.negate(good), refuse)
+
+    def move() -> None:
+        solve(on, o.rows, o.columns, o.start, o.entry, o.diagonal, m.factors, right, change, dense)
+        part.value = restrain(on, t, z, Matrix(change.cells, change.start, scheme.stages, n))
+        on.loop(scheme.stages, subtract)
+        if not single:
+            slow = on.either(part.value < 1.0, ratio.value > 0.1 * before.value)
+            fresh.value = on.select(on.either(on.same(iteration.value, 0), slow), 1, 0)
+        before.value = ratio.value
+
     def judge() -> None:
-        ratio = measure(on, t, z, o.dropped, m)
-        solved = on.either(ratio <= SOLVED, on.both(ratio < STALLED, ratio > 0.7 * before.value))
-        stuck = on.both(iteration.value > 12, on.both(ratio > 0.9 * before.value, part.value >= 1.0))
-        stuck = on.either(stuck, on.negate(ratio <= ratio))
-        closed = on.select(m.defect[0] > o.tolerance[0], INCONSISTENT, DONE)
+        size()
+        found = ratio.value
+        solved = on.either(found <= SOLVED, on.both(found < STALLED, found > 0.7 * before.value))
+        late = iteration.value > PATIENCE[not single]
+        stuck = on.both(late, on.both(found > 0.9 * before.value, part.value >= 1.0))
+        stuck = on.either(stuck, on.negate(found <= found))
+        closed = on.select(defect.value > o.tolerance[0], INCONSISTENT, DONE)
         outcome[0] = on.select(solved, closed, on.select(stuck, DIVERGED, RUNNING))
-
-        def step() -> None:
-            before.value = ratio
-            on.loop(n, pin)
-            on.when(pivots_of(on, o, m.data, m, m.dense, m.pivot), move, refuse)
-
-        on.when(on.same(outcome[0], RUNNING), step)
+        on.when(on.both(on.same(outcome[0], RUNNING), on.same(fresh.value, 1)), factors)
+        on.when(on.same(outcome[0], RUNNING), move)
 
     def iterate() -> Truth:
-        fault = evaluated(on, t, x, z, scal, inputs, m, scal[0])
+        fault = residual()
 
         def fail() -> None:
             outcome[0], outcome[1] = fault % FAULTS, fault // FAULTS
@@ -267,53 +216,81 @@ def newton(
 
 
 def advance(
-    on: Evaluator, t: Columns, o: Elimination, m: Scratch, x: Vector, z: Vector, previous: Matrix, scal: Vector,
-    inputs: Vector, sums: Vector, states: Matrix, energies: Matrix, ledgers: Matrix, outcome: Integers, steps: Integer,
+    on: Evaluator, scheme: Scheme, t: Columns, g: GroupColumns, o: Elimination, m: Scratch, s: StageScratch, x: Vector,
+    z: Matrix, previous: Matrix, scal: Vector, still: Vector, inputs: Matrix, sums: Vector, states: Matrix,
+    energies: Matrix, ledgers: Matrix, outcome: Integers, steps: Integer,
 ) -> None:  # fmt: skip
     """Take ``steps`` steps of h = scal[0]; fill one row a step; outcome = status, component, steps done, iterations.
 
     x, z, previous and sums are the state of the method; a step that fails leaves x and sums as they were, and z as the
     next guess. A row of energies holds the energy of each storage, the entropy made so far of each irreversible
     component; a row of ledgers the heat, energy, exergy supplied, the entropy made, and the step's least production.
+    ``still`` is scal for an instant.
     """
-    n, guess, tries, last = z.size, m.step, on.counter(0), previous.row(0)
+    n, tries, least, count, single = z.columns, on.counter(0), on.variable(0.0), scheme.stages, scheme.single
+    guess = Matrix(*((m.step.cells, m.step.start) if single else (s.change.cells, s.change.start)), count, n)
+    last = Matrix(previous.cells, previous.start, count, n)
+    # of one stage the step's increment is h times its rates
+    energy, whole, unit = (m.energy, z.row(0), scal[0]) if single else (s.energy, s.whole, 1.0)
+    weights = _known(on, scheme.b)
     outcome[0], outcome[1], outcome[2], outcome[3] = DONE, 0, 0, 0
 
-    def forward(i: Integer) -> None:
-        values = [z[i], *(previous[k, i] for k in range(BEFORE))]
-        z[i] = extrapolated(on, values)
-        for k in range(BEFORE):
-            previous[k, i] = values[k]
-        guess[i] = values[0] - z[i]
+    def forward(j: Integer) -> None:
+        values = [[z[i, j], *(previous[count * k + i, j] for k in range(BEFORE))] for i in range(count)]
+        latest, past = ([each[k] for each in values] for k in range(2))
+        for i, each in enumerate(values):
+            others = []
+            if not single:  # the polynomial through the stages, continued
+                others.append((on.absolute(each[0] - dot(scheme.ahead[i], past)), dot(scheme.ahead[i], latest)))
+            z[i, j] = extrapolated(on, each, others)
+            for k in range(BEFORE):
+                previous[count * k + i, j] = each[k]
+            guess[i, j] = each[0] - z[i, j]
+
+    def stages(source: Matrix, out: Matrix) -> None:
+        on.loop(count, lambda i: copy(on, source.row(i), out.row(i)))
 
     def again() -> Truth:
-        newton(on, t, o, x, z, scal, inputs, m, outcome)
+        newton(on, scheme, t, g, o, x, z, scal, still, inputs, m, s, outcome)
         tries.value = tries.value + 1
-        failed = on.either(outcome[0] >= COMPONENT, on.same(outcome[0], DIVERGED))
+        failed = on.negate(on.same(outcome[0], DONE))
+        if single:  # other pivots and other equations to leave out ask for another order at once
+            failed = on.either(outcome[0] >= COMPONENT, on.same(outcome[0], DIVERGED))
         once = on.both(failed, tries.value < 2)
-        on.when(once, lambda: copy(on, last, z))  # once more from the last values, a safe guess
+        # once more from a safe guess: the last values at all stages
+        on.when(once, lambda: on.loop(count, lambda i: copy(on, last.row(count - 1), z.row(i))))
         return on.negate(once)
+
+    def book(i: Integer) -> None:
+        part = scal[0] * weights[i]
+        if not single:
+            evaluated(on, t, s.x.row(i), z.row(i), still, inputs.row(i), m, still[0])
+        balance(on, t, z.row(i), part, m, whole, part / unit, energy)
+        least.value = least.value + account(on, t, z.row(i), part, inputs.row(i), m, sums)
 
     def keep() -> None:
         row = outcome[2]
-        balance(on, t, z, scal[0], m, z, 1.0, m.energy)
-        settle(on, t, x, scal[0], z, m.v)
-        least = account(on, t, z, scal[0], inputs, m, sums)
+        least.value = 0.0
+        on.loop(count, book)
+        settle(on, t, x, unit, whole, m.v)
         copy(on, x, states.row(row))
-        copy(on, m.energy, energies.row(row))
+
+        def kept(i: Integer) -> None:
+            energies[row, i] = on.select(on.same(t.kind[i], STORING), energy[i], m.energy[i])
+
+        on.loop(t.kind.size, kept)
         for i in range(4):
             ledgers[row, i] = sums[i]
-        ledgers[row, 4] = least
+        ledgers[row, 4] = least.value
         outcome[2] = row + 1
 
     def leave() -> None:
         # the rank at the start of the step changes within it
-        on.when(on.same(outcome[0], INCONSISTENT), lambda: copy(on, z, last), lambda: copy(on, last, z))
+        on.when(on.same(outcome[0], INCONSISTENT), lambda: stages(z, last), lambda: stages(last, z))
 
     def step() -> Truth:
         on.loop(n, forward)
-        taken = restrain(on, t, Matrix(last.cells, last.start, 1, n), Matrix(guess.cells, guess.start, 1, n))
-        on.when(taken < 1.0, lambda: copy(on, last, z))
+        on.when(restrain(on, t, last, guess) < 1.0, lambda: stages(last, z))
         tries.value = 0
         on.repeat(again)
         on.when(on.same(outcome[0], DONE), keep, leave)
@@ -323,20 +300,26 @@ def advance(
 
 
 @cache
-def natural_program() -> Program:
-    """Return the programs of the natural method and of single evaluations."""
-    point = {"x": vector(), "z": vector(), "scal": vector(3), "inputs": vector()}
-    return Program(
-        "natural",
-        advance=Entry(
-            advance, t=TABLES, o=ORDER, m=MEMORY, x=vector(), z=vector(), previous=matrix(), scal=vector(3),
-            inputs=vector(), sums=vector(), states=matrix(), energies=matrix(), ledgers=matrix(5), outcome=indices(4),
-            steps=integer(),
-        ),
-        evaluate=Entry(evaluated, t=TABLES, **point, m=MEMORY, weight=real()),
-        measure=Entry(measure, t=TABLES, z=vector(), dropped=indices(), m=MEMORY),
-        account=Entry(account, t=TABLES, z=vector(), h=real(), inputs=vector(), m=MEMORY, sums=vector()),
-        reach=Entry(reach, t=TABLES, m=MEMORY),
-        weigh=Entry(weigh, t=TABLES, m=MEMORY),
-        tighten=Entry(tighten, q=vector(4)),
-    )  # fmt: skip
+def natural_program(stages: int) -> Program:
+    """Return the program of steps with a number of stages."""
+    scheme = gauss(stages)
+    known: tuple[tuple[str, ...], Any] = (), lambda: scheme
+    step = {"scal": vector(3), "still": vector(3), "inputs": matrix()}
+    kinds = {
+        "t": TABLES, "g": GROUPS, "o": ORDER, "m": MEMORY, "s": STAGE_MEMORY, "x": vector(), "z": matrix(),
+        "previous": matrix(), **step, "sums": vector(), "states": matrix(), "energies": matrix(),
+        "ledgers": matrix(5), "outcome": indices(4), "steps": integer(),
+    }  # fmt: skip
+    entries = {"advance": Entry.bundled(advance, kinds, known)}
+    if not scheme.single:
+        kinds = {
+            "t": TABLES, "g": GROUPS, "dropped": indices(), "x": vector(), "z": matrix(), **step, "m": MEMORY,
+            "s": STAGE_MEMORY, "fresh": integer(),
+        }  # fmt: skip
+        entries["linearise"] = Entry.bundled(linearise, kinds, known)
+    return Program("natural" if scheme.single else f"natural_of_{stages}_stages", **entries)
+
+
+def natural_programs() -> tuple[Program, ...]:
+    """Return the programs of the methods `natural` and `natural4`."""
+    return natural_program(1), natural_program(3)

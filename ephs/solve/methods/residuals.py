@@ -1,13 +1,38 @@
 """Residual, scale and matrix of a model's equations over a step, and ledgers, as staged functions."""
 
+from functools import cache
 from typing import Final
 
 from ephs.semantics.descriptor.kernel_table import SIGNATURE
-from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector, staged
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Integers,
+    Program,
+    Real,
+    Vector,
+    indices,
+    real,
+    staged,
+    vector,
+)
 from ephs.semantics.stage.reaching import Reached
 from ephs.solve.methods.places import Part, add_to, copy, fill
-from ephs.solve.methods.records import COMPONENT, IRREVERSIBLE, STORING, WORKING, Columns, Dims, Outer, Scratch, row_of
-from ephs.solve.methods.scales import FAR, reach, still, weigh
+from ephs.solve.methods.records import (
+    COMPONENT,
+    IRREVERSIBLE,
+    MEMORY,
+    STORING,
+    TABLES,
+    WORKING,
+    Columns,
+    Dims,
+    Outer,
+    Scratch,
+    row_of,
+)
+from ephs.solve.methods.scales import FAR, measure, reach, still, weigh
 
 FAULTS: Final = 64
 """A fault is a component's number times this, and a status; 0 is none."""
@@ -292,3 +317,17 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
     on.loop(t.kind.size, component)
     on.loop(t.input_at.size, port)
     return on.select(least.value < FAR, least.value, 0.0)
+
+
+@cache
+def evaluation_program() -> Program:
+    """Return the program of single evaluations."""
+    point = {"x": vector(), "z": vector(), "scal": vector(3), "inputs": vector()}
+    return Program(
+        "evaluation",
+        evaluate=Entry(evaluated, t=TABLES, **point, m=MEMORY, weight=real()),
+        measure=Entry(measure, t=TABLES, z=vector(), dropped=indices(), m=MEMORY),
+        account=Entry(account, t=TABLES, z=vector(), h=real(), inputs=vector(), m=MEMORY, sums=vector()),
+        reach=Entry(reach, t=TABLES, m=MEMORY),
+        weigh=Entry(weigh, t=TABLES, m=MEMORY),
+    )

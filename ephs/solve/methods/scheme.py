@@ -1,6 +1,7 @@
-"""The collocation method of order 4: its coefficients, and tables and memory of its stages."""
+"""Gauss collocation: its coefficients, and tables and memory of its stages."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final, Generic, TypeAlias, TypeVar, final
 
 import numpy as np
@@ -12,16 +13,54 @@ from ephs.semantics.stage.kinds import group
 from ephs.solve.methods.collocation import moments, values
 from ephs.solve.methods.records import flat
 
-STAGES: Final = 3
-NODES: Final = 0.5 * (1.0 + np.polynomial.legendre.leggauss(STAGES)[0])
-SCHEME: Final = np.array([moments(NODES, c) for c in NODES])
-WEIGHTS: Final = moments(NODES, 1.0)
-AHEAD: Final = np.array([values(NODES, 1.0 + c) for c in NODES])
-"""A polynomial through the stages, continued into the next step."""
-
 Whole = TypeVar("Whole")
 Numbers = TypeVar("Numbers")
 Rows = TypeVar("Rows")
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """Coefficients of a number of stages, as programs are written with them.
+
+    Attributes
+    ----------
+    nodes, b
+        (stages,): times of the stages in parts of a step, and their weights.
+    a
+        (stages, stages): weights of the rates for the increments to the stages.
+    ahead
+        (stages, stages): a polynomial through the stages, continued into the next step.
+    """
+
+    nodes: tuple[float, ...]
+    a: tuple[tuple[float, ...], ...]
+    b: tuple[float, ...]
+    ahead: tuple[tuple[float, ...], ...]
+
+    @property
+    def stages(self) -> int:
+        """Number of stages."""
+        return len(self.b)
+
+    @property
+    def single(self) -> bool:
+        """Whether there is one stage only: then the relations over the step are all there are."""
+        return len(self.b) == 1
+
+
+@cache
+def gauss(stages: int) -> Scheme:
+    """Gauss collocation with a number of stages."""
+    nodes = 0.5 * (1.0 + np.polynomial.legendre.leggauss(stages)[0])
+
+    def rows(weights: Array) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(row) for row in weights.tolist())
+
+    return Scheme(
+        tuple(nodes.tolist()), rows(np.array([moments(nodes, c) for c in nodes])), tuple(moments(nodes, 1.0).tolist()),
+        rows(np.array([values(nodes, 1.0 + c) for c in nodes])),
+    )  # fmt: skip
 
 
 @final
@@ -59,7 +98,7 @@ class Place(Record):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsOf(Generic[Whole, Numbers]):
-    """Data of the model that the corrections use.
+    """Data of the model that several stages use; of one stage all but ``where`` is empty.
 
     Attributes
     ----------
@@ -67,7 +106,7 @@ class GroupsOf(Generic[Whole, Numbers]):
         (groups, 4): `Velocity`; (groups, 36): in which its component measures it, the identity but where its frame is
         another.
     node, entry
-        (nodes, 4): `Node`; (nodes, 9): its places in the system of all stages.
+        (nodes, 4): `Node`; (nodes, stages²): its places in the system of all stages.
     where
         (entries, 3): `Place`.
     """
@@ -82,7 +121,7 @@ class GroupsOf(Generic[Whole, Numbers]):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class StagesOf(Generic[Numbers, Rows]):
-    """Scratch memory of the stages, and of the step as a whole.
+    """Scratch memory of several stages, and of the step as a whole; of one stage all but data and slope is empty.
 
     Attributes
     ----------

@@ -1,8 +1,9 @@
-"""Steps of the natural method of order 4 as staged functions: Gauss stages, corrected component by component.
+"""What the unknowns of a natural step satisfy, as staged functions: Gauss stages, corrected component by component.
 
-At the stages every component has its continuous relation. Over the step the stages' increments of each state make one
-increment V; the relations of order 2, evaluated at V, say by how much a storage's energy changes and whether a joint
-closes. What the stages miss of that is of high order and is put in as one term a component:
+With one stage these are the relations over the step. With several, every component has its continuous relation at
+each. Over the step the stages' increments of each state make one increment V; the relations over the step, evaluated
+at V, say by how much a storage's energy changes and whether a joint closes. What the stages miss of that is of high
+order and is put in as one term a component:
 
     e_i = dH(x_i) + α f_i                 with Σ b_i ⟨e_i|h f_i⟩ = H(x¹) − H(x⁰)
     0 = C_i e_i + δ,  f_i = C_i*λ_i + e_i ⟨δ|Σ b_j λ_j⟩/Σ b_j ⟨e_j|e_j⟩     with δ = F − Σ b_j C_j e_j
@@ -10,57 +11,47 @@ closes. What the stages miss of that is of high order and is put in as one term 
 so that storages store what flows into them, joints make no power and stay closed, and dissipation, which is left as it
 is, takes place at the stages with positive weights.
 
-There are three stages: with an even number what momenta have across the constraints would add up from step to step and
-the order fall to 2 (Hairer, Lubich and Roche, *Lecture Notes in Mathematics* 1409, table 2.3: with three it is 4).
+With joints their number is odd: with an even one what momenta have across the constraints would add up from step to
+step and the order fall to 2 (Hairer, Lubich and Roche, *Lecture Notes in Mathematics* 1409, table 2.3: with three
+stages it is 4).
 """
 
-from collections.abc import Callable
 from typing import Final
 
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.staged_groups import STAGED
-from ephs.semantics.spaces.vectors import apply
+from ephs.semantics.spaces.vectors import apply, dot
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
 from ephs.solve.methods.corrections import bend, correct_joints, correct_storages, rest
-from ephs.solve.methods.newton import retract, somewhere
+from ephs.solve.methods.moves import retract, somewhere
 from ephs.solve.methods.places import copy
 from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, row_of
 from ephs.solve.methods.residuals import evaluated
-from ephs.solve.methods.scheme import SCHEME, STAGES, WEIGHTS, GroupColumns, Node, StageScratch, Velocity
+from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
 
 LAST = 2e-16
 """Relative change at the level of the last digit."""
 
-_A: Final[list[list[float]]] = SCHEME.tolist()
-_B: Final[list[float]] = WEIGHTS.tolist()
 _FIXED: Final = 30
 """Rounds of the iteration for the exponents on a group."""
 
 
-def _over_stages(entry: Callable[[int], Real]) -> Real:
-    """Σ of an entry of each stage."""
-    found: Real = 0.0
-    for i in range(STAGES):
-        found = found + entry(i)
-    return found
-
-
 @staged
 def exponents(
-    on: Evaluator, code: Integer, h: Real, z: Matrix, first: Integer, dim: Integer, v: Matrix, at: Integer,
-    whole: Vector, turn: Matrix,
+    on: Evaluator, scheme: Scheme, code: Integer, h: Real, z: Matrix, first: Integer, dim: Integer, v: Matrix,
+    at: Integer, whole: Vector, turn: Matrix,
 ) -> None:  # fmt: skip
     """Increments to the stages, v_i = h Σ a_ij D(v_j) w_j with D = dexp⁻¹, and over the step; velocities w are in z."""
     change, size = on.variable(0.0), on.variable(0.0)
 
     def begin(j: Integer) -> None:
-        for i in range(STAGES):
+        for i in range(scheme.stages):
             turn[i, j] = z[i, first + j]
 
     def increments(j: Integer) -> None:
-        turns = [turn[m, j] for m in range(STAGES)]
-        for i in range(STAGES):
-            entry = _over_stages(lambda m, i=i: h * _A[i][m] * turns[m])
+        turns = [turn[i, j] for i in range(scheme.stages)]
+        for i in range(scheme.stages):
+            entry = dot([h * weight for weight in scheme.a[i]], turns)
             change.value = on.maximum(change.value, on.absolute(entry - v[i, at + j]))
             size.value = on.maximum(size.value, on.absolute(entry))
             v[i, at + j] = entry
@@ -77,14 +68,14 @@ def exponents(
             change.value, size.value = 0.0, 0.0
             on.loop(dims, increments)
             done = on.both(rounds.value > 0, change.value <= LAST * size.value)
-            on.when(on.negate(done), lambda: on.loop(STAGES, turned))
+            on.when(on.negate(done), lambda: on.loop(scheme.stages, turned))
             rounds.value = rounds.value + 1
             return on.either(done, rounds.value >= _FIXED)
 
         on.when(on.same(code, number), lambda: on.repeat(once))
 
     def sum_up(j: Integer) -> None:
-        whole[j] = _over_stages(lambda i: h * _B[i] * turn[i, j])
+        whole[j] = dot([h * weight for weight in scheme.b], [turn[i, j] for i in range(scheme.stages)])
 
     on.loop(dim, begin)
     on.when(on.same(code, codes.VECTOR), lambda: on.loop(dim, increments))
@@ -95,8 +86,8 @@ def exponents(
 
 @staged
 def linearise(
-    on: Evaluator, t: Columns, g: GroupColumns, dropped: Integers, x: Vector, z: Matrix, scal: Vector, still: Vector,
-    inputs: Matrix, m: Scratch, s: StageScratch, fresh: Integer,
+    on: Evaluator, scheme: Scheme, t: Columns, g: GroupColumns, dropped: Integers, x: Vector, z: Matrix, scal: Vector,
+    still: Vector, inputs: Matrix, m: Scratch, s: StageScratch, fresh: Integer,
 ) -> Integer:  # fmt: skip
     """Residuals of the stages with their corrections, and where fresh their matrices; 0 or a fault of `evaluated`."""
     n_rate, n, h = t.counts[0], z.columns, scal[0]
@@ -105,27 +96,27 @@ def linearise(
     def state(k: Integer) -> None:
         row = row_of(State, t.states, k)
         rate, dim = row.rate, row.dim
-        exponents(on, row.code, h, z, rate, dim, s.v, rate, s.whole.part(rate, dim), s.turn)
+        exponents(on, scheme, row.code, h, z, rate, dim, s.v, rate, s.whole.part(rate, dim), s.turn)
 
         def stage(i: Integer) -> None:
             retract(
                 on, row.code, x.part(row.at, row.size), s.v.row(i).part(rate, dim), s.x.row(i).part(row.at, row.size)
             )
 
-        on.loop(STAGES, stage)
+        on.loop(scheme.stages, stage)
 
     def mean_rate(j: Integer) -> None:
         s.mean[j] = s.whole[j] / h
 
     def mean(j: Integer) -> None:
-        s.mean[j] = _over_stages(lambda i: _B[i] * z[i, j])
+        s.mean[j] = dot(scheme.b, [z[i, j] for i in range(scheme.stages)])
 
     def velocity(k: Integer) -> None:
         row = row_of(Velocity, g.velocity, k)
         first = n_rate + row.effort
 
         def exponent() -> None:
-            exponents(on, row.code, h, z, first, row.dim, s.outer, zero, somewhere(on, s.one), s.turn)
+            exponents(on, scheme, row.code, h, z, first, row.dim, s.outer, zero, somewhere(on, s.one), s.turn)
 
             def write(j: Integer) -> None:
                 s.mean[first + j] = s.one[j] / h
@@ -165,12 +156,12 @@ def linearise(
 
     def over_the_step() -> None:
         _over_the_step(on, t, g, h, n, m, s)
-        on.loop(STAGES, stage)
+        on.loop(scheme.stages, stage)
 
     def correct() -> None:
-        on.when(on.same(fresh, 1), lambda: bend(on, g, h, z, s))
-        correct_storages(on, t, h, z, s)
-        correct_joints(on, t, g, dropped, z, s)
+        on.when(on.same(fresh, 1), lambda: bend(on, scheme, g, h, z, s))
+        correct_storages(on, scheme, t, h, z, s)
+        correct_joints(on, scheme, t, g, dropped, z, s)
 
     on.when(on.same(fault.value, 0), over_the_step)
     on.when(on.same(fault.value, 0), correct)

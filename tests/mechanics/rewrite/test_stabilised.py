@@ -62,7 +62,7 @@ def stepped(name, make, h):
     stored = np.array([slot.primitive.kind == "storage" for slot in d.components])
     changes = (chunk.energies - method.energies(x))[:, stored]
     return Run(
-        d.unpack(after.x), float(np.abs(after.z[at]).max(initial=0.0)), float(changes[-1].sum()),
+        d.unpack(after.x), float(np.abs(after.z[0, at]).max(initial=0.0)), float(changes[-1].sum()),
         float(np.abs(changes).sum(axis=1).max()), after.sums, workers,
     )  # fmt: skip
 

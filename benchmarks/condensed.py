@@ -12,8 +12,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.copies import copies_of
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.copies import copies_of
 from ephs.semantics.descriptor.numbering import Index, starts
 from ephs.semantics.spaces.decompositions import least_squares, singular_values
 from ephs.semantics.spaces.rank import IMPLICIT

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from benchmarks.copies import copies_of
 from ephs import AssemblyError, Pattern, System, junction
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.semantics import Storage
-from ephs.semantics.descriptor.copies import copies_of
 from ephs.semantics.descriptor.descriptor import descriptor_of
 from ephs.testing import fillings, nestings, systems
 
