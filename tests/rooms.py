@@ -35,7 +35,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
             ],
         ),
         ([".solve", ".solve.march", ".solve.methods", ".solve.result", ".solve.auditing", ".solve.exchange"],),
-        ([".mechanics.shapes"], [".modelica"]),
+        ([".mechanics.shapes"], [".mechanics.road"], [".modelica"]),
         ([".mechanics.elements"],),
         ([".mechanics.scene", ".mechanics.imports"], [".mechanics.tree", ".mechanics.tree.sweeps"]),
         ([".mechanics.constraints"],),

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks import families
+from ephs.mechanics.road.loops import ARGUMENTS as LOOPS
+from ephs.mechanics.road.programs import ARGUMENTS as SWEEPS
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.mechanics.tree.sweeps.loops import ARGUMENTS as LOOPS
-from ephs.mechanics.tree.sweeps.programs import ARGUMENTS as SWEEPS
 from ephs.semantics.spaces.differentials import DIMENSIONS
 from ephs.semantics.stage import llvm
 from ephs.semantics.stage.calling import Call
@@ -142,10 +142,10 @@ def drawn(eq: Equations, seed: int) -> dict[str, Any]:
     out = {name: array.copy() for name, array in given.items() if isinstance(array, np.ndarray)}
     out |= {name: rng.standard_normal(array.shape) for name, array in eq.engine.work.items() if name != "fault"}
     n, links = eq.n, given["own"][0].links
-    out |= {"size": links, "memory": out["work"], "wrench": out["pushed"], "places": out["place"], "worst": np.zeros(1)}
+    out |= {"size": links, "memory": out["work"], "wrench": out["pushed"], "worst": np.zeros(1)}
     out |= {"motions": out["relative"], "numbers": out["cut_numbers"], "chart": given["chart"].arrays[0].copy()}
     out |= {"base": eq._paper.initial()[0], "v": rng.standard_normal(eq.nv), "out": np.zeros(eq.nv)}
-    out |= {"target": out["kept"], "columns": np.zeros((n, 6))}
+    out |= {"target": out["kept"], "columns": np.zeros((n, 6)), "places": out["work"].reshape(links + 1, -1)}
     return out | {"q": out["base"].copy(), "r": np.ones(n), "x": np.ones(n), "rate": np.zeros(n)}
 
 

@@ -28,7 +28,7 @@ OWN = ("accelerations", "move", "rows", "poses", "fit", "gaps", "fold", "depende
        "power", "relative_rates", "across", "advance", "velocities", "displace")  # fmt: skip
 """Functions that the equations call by address, in an order in which memory is what they expect."""
 ALIASES = {
-    "size": "links", "memory": "work", "numbers": "cut_numbers", "places": "place", "motions": "relative",
+    "size": "links", "memory": "work", "numbers": "cut_numbers", "motions": "relative",
     "wrench": "pushed", "worst": "answer",
 }  # fmt: skip
 
@@ -121,6 +121,7 @@ def test_what_the_equations_call(name, seed):
         "out": np.zeros(eq.size),
         "rate": np.zeros(eq.n),
     }
+    known["places"] = known["work"].reshape(known["links"] + 1, -1)
     charts = engine.tables["chart"].arrays[0]
     for own in (field for field in OWN if field in engine.reached):
         program, entry = engine.reached[own]

@@ -49,9 +49,9 @@ RUNS = (
 LONG = Pace(each=10.0, file=90.0, budget=40.0)
 """For what shows itself over many steps."""
 DERIVATIVES = (
-    "ephs/mechanics/tree/sweeps/closures.py",
+    "ephs/mechanics/road/closures.py",
     "ephs/mechanics/tree/sweeps/expanding.py",
-    "ephs/mechanics/tree/sweeps/inverse.py",
+    "ephs/mechanics/road/inverse.py",
     "ephs/mechanics/tree/engine/tangents.py",
     "ephs/mechanics/tree/equations/slopes.py",
     "ephs/mechanics/sensitivity/explicit.py",
@@ -165,11 +165,9 @@ GROUPS = {
     ),
     "sweeps": Group(
         (
-            "ephs/mechanics/tree/sweeps/accelerations.py",
-            "ephs/mechanics/tree/sweeps/inward.py",
-            "ephs/mechanics/tree/sweeps/joints.py",
-            "ephs/mechanics/tree/sweeps/outward.py",
-            "ephs/mechanics/tree/sweeps/pack.py",
+            "ephs/mechanics/road/linear.py",
+            "ephs/mechanics/road/pack.py",
+            "ephs/mechanics/road/tree.py",
             "ephs/mechanics/tree/engine/links.py",
             "ephs/mechanics/tree/engine/near.py",
             "ephs/mechanics/tree/engine/forces.py",
@@ -203,7 +201,7 @@ GROUPS = {
             "ephs/mechanics/rewrite/*.py",
             "ephs/mechanics/constraints/subgroup.py",
             "ephs/mechanics/tree/engine/build.py",
-            "ephs/mechanics/tree/engine/closing.py",
+            "ephs/mechanics/road/elimination.py",
             "ephs/mechanics/tree/engine/tables.py",
             "ephs/mechanics/tree/finding/mechanism.py",
             "ephs/mechanics/tree/finding/spanning.py",

@@ -28,13 +28,11 @@ BREAKS = {
         "parts.balances[writer.junction(path, port)] -= expression",
     ),
     "dense, axes that turn": Break(
-        "ephs/mechanics/tree/sweeps/inverse.py",
+        "ephs/mechanics/road/inverse.py",
         "+ dot(load, bracket(twist, axis))",
         "- dot(load, bracket(twist, axis))",
     ),
-    "dense, multipliers": Break(
-        "ephs/mechanics/tree/sweeps/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"
-    ),
+    "dense, multipliers": Break("ephs/mechanics/road/closures.py", "scale(-multiplier[row]", "scale(multiplier[row]"),
     "dense, components": Break(
         "ephs/mechanics/tree/sweeps/expanding.py", "value[j] + (by_effort", "value[j] - (by_effort"
     ),

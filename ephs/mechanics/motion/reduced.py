@@ -18,7 +18,7 @@ from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.transmitted import Transmission
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.mechanics.tree.equations.impulses import TWIST, Impulses
+from ephs.mechanics.tree.equations.impulses import Impulses
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
 from ephs.operad import Path
@@ -53,7 +53,7 @@ class ReducedMotion:
         self._impulses = Impulses(equations, self._transmission.inertia)
         self._states = self._on_loops()
         self._r = np.array([state.r for state in self._states])
-        twists = np.array([self._impulses.outward(s.q, s.r)[:, TWIST] for s in self._states])
+        twists = np.array([self._impulses.twists(s.q, s.r) for s in self._states])
         own = np.einsum("lij,nlj->nli", into, twists)
         self.twists = {link.path: own[:, i] for i, link in enumerate(reduced.places) if link.path is not None}
 
@@ -112,7 +112,8 @@ class ReducedMotion:
         work, touching = self._eq.engine.work, Touching(self._eq)
         for k in range(len(self._states)):
             rates = self._rates(k)
-            given = work["place"][:-1], rates.copy(), work["pushed"].copy(), work["force"].copy(), work["pulled"].copy()
+            places = work["work"].reshape(self._eq.reduced.links + 1, -1)[:-1]
+            given = places, rates.copy(), work["pushed"].copy(), work["force"].copy(), work["pulled"].copy()
             if len(touching):
                 self._press(touching, k, *given)
             places, accelerations, *forces = given
@@ -129,9 +130,7 @@ class ReducedMotion:
         rates += found.rates
         for i, axis, one in zip(found.which.tolist(), found.axes.tolist(), found.forces, strict=True):
             for body, push, moment in touching.acting(i, axis, one):
-                turn = places[body, :9].reshape(3, 3)
-                about = moment - np.cross(places[body, 9:12], push)
-                pushed[body] += np.concatenate([turn.T @ about, turn.T @ push])
+                pushed[body] += np.concatenate([moment - np.cross(places[body, 9:12], push), push])
             if (stop := touching.pulling(i)) is not None:
                 edge = self._number[Path.of(tuple(stop[0])[:-1])]
                 (force if t.kind[edge] == TREE else pulled)[int(t.r_at[edge])] += stop[1] * one[0]

@@ -24,7 +24,8 @@ from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 TURN, PLACE, TWIST, BIAS = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 24)
-"""Columns of a link's place: frame in the world, twist, acceleration where no rate changes, gravity in it."""
+"""Columns of a link's place: frame in the world; in world axes about its origin, twist, and acceleration where no rate
+changes, gravity in it."""
 
 
 @final
@@ -65,8 +66,15 @@ class Transmission:
                 if t.kind[i] == TREE:
                     self._ratios[int(t.r_at[i]) + freedom, number] += ratio
 
+    def carried(self, places: Array, twists: Array) -> Array:
+        """(links, 6) momenta of the links with twists (links, 6), as those of their places."""
+        turn = places[:, TURN].reshape(-1, 1, 3, 3)
+        inside = np.einsum("lhij,lhi->lhj", turn, twists.reshape(-1, 2, 3)).reshape(-1, 6)
+        own = np.einsum("lij,lj->li", self.inertia, inside).reshape(-1, 2, 3)
+        return np.einsum("lhij,lhj->lhi", turn, own).reshape(-1, 6)
+
     def slip(self, i: int, places: Array) -> Array:
-        """(d,) the rate of a cut joint by the links' places (links, 24)."""
+        """(d,) the rate of a cut joint by the links' places (links, …)."""
         t = self._reduced.tables
         turn, at = self._second(i, places)
         one, two = (_twist_outward(places[k]) if k >= 0 else np.zeros(6) for k in (int(t.first[i]), int(t.second[i])))
@@ -80,11 +88,11 @@ class Transmission:
         Parameters
         ----------
         places
-            (links, 24).
+            (links, …), as `ephs.mechanics.road.records.Place`.
         accelerations, force
             (n,) of the tree's degrees of freedom, and forces on them.
         pushed
-            (links, 6) wrenches on the links in their frames, of all but the constraints.
+            (links, 6) wrenches on the links, in world axes about their frames' origins, of all but the constraints.
         pulled
             Forces on the degrees of freedom of all joints.
         """
@@ -152,23 +160,22 @@ class Transmission:
     def _needed(self, places: Array, accelerations: Array, freedoms: Array, pushed: Array) -> Array:
         """(links, 6) wrench about the world's origin on each link and its descendants."""
         t = self._reduced.tables
-        turn, at = places[:, TURN].reshape(-1, 3, 3), places[:, PLACE]
+        at = places[:, PLACE]
         grown = np.zeros((self._reduced.links, 6))
         np.add.at(grown, self._link, freedoms * accelerations[:, None])
         for i in range(self._reduced.links):
             if t.parent[i] >= 0:
                 grown[i] += grown[int(t.parent[i])]
         changed = places[:, BIAS].copy()
-        changed[:, :3] += np.einsum("lji,lj->li", turn, grown[:, :3])
-        changed[:, 3:] += np.einsum("lji,lj->li", turn, grown[:, 3:] - np.cross(at, grown[:, :3]))
+        changed[:, :3] += grown[:, :3]
+        changed[:, 3:] += grown[:, 3:] - np.cross(at, grown[:, :3])
         twist = places[:, TWIST]
-        momentum = np.einsum("lij,lj->li", self.inertia, twist)
-        own = np.einsum("lij,lj->li", self.inertia, changed) - pushed
+        momentum = self.carried(places, twist)
+        own = self.carried(places, changed) - pushed
         own[:, :3] += np.cross(twist[:, :3], momentum[:, :3]) + np.cross(twist[:, 3:], momentum[:, 3:])
         own[:, 3:] += np.cross(twist[:, :3], momentum[:, 3:])
-        out = np.zeros_like(own)
-        out[:, 3:] = np.einsum("lij,lj->li", turn, own[:, 3:])
-        out[:, :3] = np.einsum("lij,lj->li", turn, own[:, :3]) + np.cross(at, out[:, 3:])
+        own[:, :3] += np.cross(at, own[:, 3:])
+        out = own
         for i in range(self._reduced.links - 1, -1, -1):
             if t.parent[i] >= 0:
                 out[int(t.parent[i])] += out[i]
@@ -188,9 +195,8 @@ class Transmission:
 
 def _twist_outward(place: Array) -> Array:
     """(6,) the twist of a link about the world's origin."""
-    turn = place[TURN].reshape(3, 3)
-    angular = turn @ place[TWIST][:3]
-    return np.concatenate([angular, turn @ place[TWIST][3:] + np.cross(place[PLACE], angular)])
+    angular, linear = np.split(place[TWIST], 2)
+    return np.concatenate([angular, linear + np.cross(place[PLACE], angular)])
 
 
 def _wrench_outward(turn: Array, at: Array, wrenches: Array) -> Array:

@@ -12,14 +12,14 @@ from typing import Any, Final, Never, final
 import numpy as np
 
 from ephs.mechanics.methods.explicit import Tableau
+from ephs.mechanics.road.charts import TIE
+from ephs.mechanics.road.cuts import Cut
+from ephs.mechanics.road.records import Link
 from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, Family, Stencil, difference, relation_of, same_shape
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
-from ephs.mechanics.tree.sweeps.charts import TIE
-from ephs.mechanics.tree.sweeps.cuts import Cut
-from ephs.mechanics.tree.sweeps.records import Link
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse

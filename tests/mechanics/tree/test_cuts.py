@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ephs.mechanics.tree.sweeps.cuts import Place, Relative
-from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
+from ephs.mechanics.road.cuts import Relative
+from ephs.mechanics.road.loops import kinds_of, loop_program
+from ephs.mechanics.road.records import Place
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
 
@@ -57,7 +58,7 @@ class Loop:
         )
         self.places = np.zeros((3, Place.real_width))
         for row, (turn, at) in zip(self.places, (near, far), strict=False):
-            row[:9], row[9:12], row[12:] = turn.ravel(), at, rng.standard_normal(12)
+            row[:9], row[9:12], row[12:24] = turn.ravel(), at, rng.standard_normal(12)
         self.motions, self.value = np.zeros((1, Relative.real_width)), np.zeros((len(self.normal), 4))
         self.covector = np.zeros((2 * len(self.normal), 6))
         self.end = np.arange(2 * len(self.normal))
@@ -73,21 +74,21 @@ class Loop:
 
     def found(self, run):
         run["rows"](self.cut, self.numbers, self.places, self.motions, self.end, self.value, self.covector)
-        run["poses"](self.cut, self.numbers, self.motions)
+        run["poses"](self.cut, self.numbers, self.places, self.motions)
         return self
 
     def moved(self, h):
-        """A copy after h seconds at the links' twists, which change by their biases."""
+        """A copy after h seconds at the links' twists, which change in the links' axes by their biases."""
         other = object.__new__(Loop)
         other.__dict__ = {key: x.copy() if isinstance(x, np.ndarray) else x for key, x in self.__dict__.items()}
         other.covector[:] = 0.0
         for row in other.places[:2]:
-            twist = row[12:18] + 0.5 * h * row[18:24]
-            pose = np.array(se3.exp(PLAIN, list(h * twist)), dtype=float)
+            own, change = turned(row[:9].reshape(3, 3).T, row[12:18]), turned(row[:9].reshape(3, 3).T, row[18:24])
+            pose = np.array(se3.exp(PLAIN, list(h * (own + 0.5 * h * change))), dtype=float)
             turn, at = compose(
                 (row[:9].reshape(3, 3), row[9:12]), (np.array(so3.matrix(pose[:4]), dtype=float), pose[4:])
             )
-            row[:9], row[9:12], row[12:18] = turn.ravel(), at, row[12:18] + h * row[18:24]
+            row[:9], row[9:12], row[12:18] = turn.ravel(), at, turned(turn, own + h * change)
         return other
 
 
@@ -96,6 +97,10 @@ def compose(*frames):
     for other, place in frames:
         turn, at = turn @ other, at + turn @ place
     return turn, at
+
+
+def turned(turn, twist):
+    return np.concatenate([turn @ twist[:3], turn @ twist[3:]])
 
 
 def inverse(frame):
@@ -192,9 +197,9 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
         loop, worst = Loop(name, seed, opened=1e-3).found(run), np.zeros(1)
         run["gaps"](loop.cut, loop.numbers, loop.motions, loop.element, loop.value, worst)
         run["fit"](loop.cut, loop.numbers, loop.motions, loop.element)
-        change = np.random.default_rng(seed).standard_normal((2, 6))
+        loop.places[:2, 24:] = np.random.default_rng(seed).standard_normal((2, 6))
         values = loop.value.copy()
-        run["across"](loop.cut, loop.numbers, loop.motions, change, values)
+        run["across"](loop.cut, loop.numbers, loop.places, loop.motions, values)
         parts = (loop.motions, loop.value, loop.covector, loop.element, worst, values)
         found.append([part.tobytes() for part in parts])
     assert found[0] == found[1]

@@ -1,16 +1,17 @@
-"""Rates and forces of joints on their way into the sweeps: Ad of the pose, its inverse, and equal power."""
+"""Joints that are walked backward: frames, twists of their rates, rates of twists, by the poses of their elements."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ephs.mechanics.tree.sweeps.joints import force_inside, force_outside, frame, rate_inside, rate_outside
-from ephs.mechanics.tree.sweeps.pack import STANDARD
-from ephs.mechanics.tree.sweeps.records import Link
+from ephs.mechanics.road.pack import STANDARD
+from ephs.mechanics.road.records import Link, State, Tree
+from ephs.mechanics.road.tree import axes_of, moved_by, outward, rates_of
 from ephs.semantics.spaces import SE3, pair
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.stage import PLAIN
+from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
+from ephs.semantics.stage import PLAIN, Vector
+from ephs.semantics.stage.memory import ArrayReals
 
 EPS = np.finfo(float).eps
 BACKWARD = {"planar": 7, "spherical": 8, "free": 9}
@@ -18,29 +19,40 @@ BACKWARD = {"planar": 7, "spherical": 8, "free": 9}
 numbers = st.lists(st.floats(-2.0, 2.0), min_size=6, max_size=6).map(np.array)
 
 
-def link():
-    """One link whose frame is its parent's."""
-    one = Link.table(1)[0]
-    one.sense, one.rotation = 1.0, np.eye(3).tolist()
-    return one
+class Only:
+    """The constants of one link on the ground, at a pose there."""
+
+    def __init__(self, pose):
+        self.link = Link.table(1)[0]
+        self.link.sense, self.link.parent, self.link.kind = 1.0, 1, 0
+        self.link.rotation, self.link.place = quaternion_to_matrix(pose[:4]).tolist(), pose[4:].tolist()
+        self.link.mass, self.link.inertia = 1.0, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]
+
+    def of(self, i, kind):
+        return self.link
 
 
 @pytest.mark.parametrize(("name", "place"), BACKWARD.items())
 @given(numbers, numbers, numbers)
-def test_a_joint_that_is_walked_backward(name, place, coordinates, r, force):
-    of, joint, one = pair(name), STANDARD[place], link()
+def test_a_joint_that_is_walked_backward(name, place, coordinates, r, way):
+    of, joint = pair(name), STANDARD[place]
     assert joint.backward and (joint.code, joint.size) == (of.code, of.size)
-    x = of.element(coordinates[: of.dim])
-    r, force, pose = r[: of.dim], force[: of.dim], of.include(x)
+    there, x, r = SE3.exp(way), of.element(coordinates[: of.dim]), r[: of.dim]
+    only, states = Only(there), State.table(2)
+    tree = Tree((joint,), 1, only, states, [0.0, 0.0, 0.0], planar=False)
+    outward(PLAIN, tree, Vector(ArrayReals(x), 0, x.size), Vector(ArrayReals(r), 0, r.size))
+    state, ground = states[0], states[1]
+    pose = SE3.compose(there, SE3.inverse(of.include(x)))
     near = 64.0 * EPS * (1.0 + np.abs(pose[4:]).max()) ** 2 * 10.0
-    rho = rate_inside(PLAIN, joint, one, x, r.tolist())
-    expected = -SE3.adjoint(pose) @ (of.basis @ r)
-    assert np.abs(of.basis @ np.array(rho) - expected).max() <= near
-    assert np.abs(np.array(rate_outside(PLAIN, joint, one, x, rho)) - r).max() <= near
-    inside = force_inside(PLAIN, joint, one, x, force.tolist())
-    assert abs(np.dot(inside, rho) - force @ r) <= 10.0 * near
-    assert np.abs(np.array(force_outside(PLAIN, joint, one, x, inside)) - force).max() <= near
-    rotation, at = frame(PLAIN, joint, one, x)
-    undone = SE3.inverse(pose)
-    assert np.abs(np.array(rotation) - quaternion_to_matrix(undone[:4])).max() <= near
-    assert np.abs(np.array(at) - undone[4:]).max() <= near
+    turn = quaternion_to_matrix(pose[:4])
+    assert np.abs(np.array(state.turn) - turn).max() <= near and np.abs(np.array(state.at) - pose[4:]).max() <= near
+    # The link has the joint's first frame, in whose own axes it moves by -Ad B r; here in those of the world.
+    own = -SE3.adjoint(of.include(x)) @ (of.basis @ r)
+    expected = np.concatenate([turn @ own[:3], turn @ own[3:]])
+    for found in (state.twist, moved_by(joint, only.link, state, r.tolist())):
+        assert np.abs(np.array(found) - expected).max() <= near * (1.0 + np.abs(r).max())
+    axes = np.array(axes_of(joint, only.link, state))
+    assert np.abs(r @ axes - expected).max() <= near * (1.0 + np.abs(r).max())
+    back = rates_of(joint, only.link, state, ground, expected.tolist())
+    assert np.abs(np.array(back) - r).max() <= near * (1.0 + np.abs(r).max())
+    assert np.abs(matrix_to_quaternion(turn) @ pose[:4]) >= 1.0 - near

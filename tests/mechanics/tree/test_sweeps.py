@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks import families
+from ephs.mechanics.road.programs import sweeps
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.mechanics.tree.sweeps.programs import sweeps
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program
 from ephs.testing import mechanisms

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ephs.mechanics.tree.sweeps.pack import TURN, Class
-from ephs.mechanics.tree.sweeps.programs import Sweeps
+from ephs.mechanics.road.pack import TURN, Class
+from ephs.mechanics.road.programs import Sweeps
 from ephs.semantics.stage import Entry, Program, known, programs, store, vector
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.elementary import cos, sin

@@ -5,7 +5,7 @@ and with prescribed motions as they are: rates alone, r + α n with n their free
 prescribed motions; where they are no more than what the step changed them by, positions too, along −h² M⁻¹∇V.
 
 Where momenta are kept, too, islands are first moved rigidly to those that they had, see
-`ephs.mechanics.tree.sweeps.rigid`; n is then without the rigid motions, and positions are also moved along these, as
+`ephs.mechanics.road.rigid`; n is then without the rigid motions, and positions are also moved along these, as
 the momenta turn them by themselves.
 
 What is then still missing is left to what is attached, see `ephs.mechanics.tree.engine.storing`.
@@ -50,11 +50,7 @@ def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector
     own, w, status = motion.tables.own[0], motion.work, on.counter(0)
     on.reach(own.energy, *motion.swept, q, r, w.momenta, w.spin, out)
 
-    def place() -> None:
-        on.reach(own.move, *motion.swept, q, r, w.zero, w.place)
-
     def strained() -> None:
-        on.when(own.between > 0, place)
         status.value = strain(on, motion.tables, w, q, out)
         on.when(on.both(own.attached > 0, on.same(status.value, 0)), attached)
 
@@ -224,8 +220,8 @@ class Correction(Missing):
         def released() -> None:
             calm = replace(self.motion, tables=replace(self.motion.tables, gravity=on.scratch(3)))
             calm.outward(on, self.q, w.zero, w.zero)
-            self.status.value = calm.fold(on, self.q, w.spin, w.momenta)
-            calm.unfold(on, self.q, w.direction)
+            self.status.value = calm.fold(on, w.spin, w.momenta)
+            calm.unfold(on, w.direction)
 
         def loose() -> None:
             for _ in range(2):  # once more, for what rounding left of momenta

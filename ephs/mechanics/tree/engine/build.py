@@ -6,8 +6,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
+from ephs.mechanics.road.charts import TIE, Chart, Kind
+from ephs.mechanics.road.cuts import Cut, Relative
+from ephs.mechanics.road.elimination import Closing, closing
+from ephs.mechanics.road.loops import kinds_of, loop_program
+from ephs.mechanics.road.pack import STANDARD, Packed
+from ephs.mechanics.road.programs import sweeps
+from ephs.mechanics.road.rigid import SUMS
 from ephs.mechanics.tree.engine.attachment import Attachment, attachment_of
-from ephs.mechanics.tree.engine.closing import Closing, closing
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.islands import islands_of
 from ephs.mechanics.tree.engine.links import Frames, links_of
@@ -15,12 +21,6 @@ from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
-from ephs.mechanics.tree.sweeps.charts import TIE, Chart, Kind
-from ephs.mechanics.tree.sweeps.cuts import Cut, Place, Relative
-from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
-from ephs.mechanics.tree.sweeps.pack import STANDARD, Packed
-from ephs.mechanics.tree.sweeps.programs import sweeps
-from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -117,7 +117,6 @@ def _plan(
     attached = reduced.attaching.network.acts
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
-    between = bool(np.any((forces.edge[:, 0] == ON_BODIES) & (forces.part[:, 0] >= 0)))
     island, bases = islands_of(reduced, found, acted)
     records = found.packed(gravity)
     program = sweeps(records.kind, general=bool(forced or driven or len(cut) or apart))
@@ -126,12 +125,11 @@ def _plan(
     if attached:
         reached["attach"] = network_program(), "solve"
     own = _own(
-        (len(found.parts), len(bases) if momenta else 0),
+        (len(found.parts), program.width, len(bases) if momenta else 0),
         reached,
         forced=forced,
         driven=driven,
         attached=attached,
-        between=between,
     )
     links = {"own": own, "island": island, "bases": bases.ravel(), **_links(records)}
     tables = {**links, **_joints(charts, cut, cut_numbers, eliminated), **forces.tables(), **_attached(net)}
@@ -175,7 +173,7 @@ def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
     attached = reduced.attaching.network.acts
     reached = {"attach": (network_program(), "solve")} if attached else {}
     whole = Closing(none, none, np.arange(size), none, none, 0, 0)
-    own = _own((len(parts), 0), reached, forced=True, driven=False, attached=attached, between=True)
+    own = _own((len(parts), 0, 0), reached, forced=True, driven=False, attached=attached)
     links = {"own": own, "island": none, "bases": np.zeros(0), **_links(records)}
     tables = {**links, **_joints(charts, cut, cut_numbers, whole), **forces.tables(), **_attached(net)}
     tables["component"] = forces.component
@@ -228,19 +226,18 @@ def _reached(sweeps: Program, loops: Program) -> dict[str, tuple[Program, str]]:
 
 
 def _own(
-    groups: tuple[int, int],
+    sizes: tuple[int, int, int],
     reached: Mapping[str, tuple[Program, str]],
     *,
     forced: bool,
     driven: bool,
     attached: bool,
-    between: bool,
 ) -> Table[Own]:
     made = Own.table(1)
     own = made[0]
-    own.links, own.islands = groups
+    own.links, own.width, own.islands = sizes
     own.forced, own.driven, own.falls = int(forced), int(driven), int("accelerations" in reached)
-    own.attached, own.between = int(attached), int(between)
+    own.attached = int(attached)
     for name, (program, entry) in reached.items():
         setattr(own, name, program.compiled()[entry].address)
     return made
@@ -256,7 +253,7 @@ def _shapes(
     (links, islands), (entropies, totals) = groups, booked
     rows, slots = len(closing.row), len(closing.slot)
     return {
-        "work": ((links + 1) * width,), "place": (links + 1, Place.real_width), "change": (links + 1, 6),
+        "work": ((links + 1) * width,),
         "pushed": (links, 6), "force": (freedoms,), "zero": (freedoms,), "attached": (joints,), "pulled": (joints,),
         "relative": (cuts, Relative.real_width),
         "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),

@@ -11,16 +11,16 @@ from typing import Any, Final, final
 
 import numpy as np
 
+from ephs.mechanics.road.cuts import frame_on, place_of
+from ephs.mechanics.road.pack import Part
+from ephs.mechanics.road.tree import shift_back, turned
 from ephs.mechanics.tree.engine.held import constrain
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.resisting import EDGES, PAIRS, resist, walk
 from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import ON_TREE, Acting, Tables, Work
-from ephs.mechanics.tree.sweeps.cuts import place_of
-from ephs.mechanics.tree.sweeps.pack import Part
 from ephs.semantics.linear.dense import clear, copy
-from ephs.semantics.spaces import se3
-from ephs.semantics.spaces.vectors import add, apply, dot, product, sub
+from ephs.semantics.spaces.vectors import dot, sub
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
@@ -121,7 +121,7 @@ class Drags(Lagged):
         status, component = motion.rates(on, base, y, q, self.seen, self)
 
         def place() -> None:
-            on.reach(motion.tables.own[0].axes, *motion.swept, q, self.axes)
+            on.reach(motion.tables.own[0].axes, *motion.swept, self.axes)
             on.when(self.given.size > 0, lambda: _push(on, self, motion))
             on.when(on.both(lossy, self.held.rows > 0), lambda: constrain(on, self, motion, q))
 
@@ -158,21 +158,22 @@ def _note(on: Evaluator, drags: Drags, tables: Tables, work: Work, edge: Acting,
         on.loop(d, entry)
 
     on.loop(d, resistance)
-    on.when(on.same(edge.kind, ON_TREE), lambda: None, lambda: _join(on, drags, work, edge, c))
+    on.when(on.same(edge.kind, ON_TREE), lambda: None, lambda: _join(on, drags, tables, work, edge, c))
 
 
-def _join(on: Evaluator, drags: Drags, work: Work, edge: Acting, c: Integer) -> None:
+def _join(on: Evaluator, drags: Drags, tables: Tables, work: Work, edge: Acting, c: Integer) -> None:
     """Write the rows of a loss between links, and add Tᵀ μ T to that of the pair."""
-    far, d = place_of(on, work.place, edge.second), edge.dim
-    turn = product(far.turn, edge.outer_turn)
-    at = sub(add(far.at, apply(far.turn, edge.outer_at)), place_of(on, work.place, 0).at)
+    places, d = work.places(tables), edge.dim
+    far = place_of(on, places, edge.second)
+    turn, place = frame_on(far, edge.outer_turn, edge.outer_at)
+    at = sub(place, place_of(on, places, 0).at)
     begun = drags.counts[PAIRS]
     last = on.select(begun > 0, begun - 1, 0)
     same = on.both(on.same(drags.pair[2 * last], edge.first), on.same(drags.pair[2 * last + 1], edge.second))
 
     def row(j: Integer) -> None:
         left = Vector(edge.reals, edge.real_start + Acting.left.offset + 6 * j, 6)
-        for k, x in enumerate(se3.wrench_outward(turn, at, [left[k] for k in range(6)])):
+        for k, x in enumerate(shift_back(turned(turn, [left[k] for k in range(6)]), at)):
             drags.row[c, 6 * j + k] = x
 
     def begin() -> None:
@@ -208,9 +209,9 @@ def _push(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
         one = tables.body[b]
 
         def pushed() -> None:
-            place = place_of(on, motion.work.place, one.link)
-            here = se3.wrench_outward(one.turn, one.at, [tables.wrench[b, k] for k in range(6)])
-            there = se3.wrench_outward(place.turn, place.at, here)
+            place = place_of(on, motion.work.places(tables), one.link)
+            turn, at = frame_on(place, one.turn, one.at)
+            there = shift_back(turned(turn, [tables.wrench[b, k] for k in range(6)]), at)
 
             def grow(p: Integer) -> None:
                 j = drags.rate[p]

@@ -5,7 +5,7 @@ from typing import Any, cast, final
 
 import numpy as np
 
-from ephs.mechanics.tree.engine.closing import Closing
+from ephs.mechanics.road.elimination import Closing
 from ephs.mechanics.tree.engine.drags import resisting
 from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, stiff_program
 from ephs.semantics.bundles.bundle import Array

@@ -4,15 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
+from ephs.mechanics.road.cuts import Relative, frame_on, motion_of, place_of, pose_of, twist_of
+from ephs.mechanics.road.needs import NO_INTEGERS
+from ephs.mechanics.road.tree import shift_back, turned
 from ephs.mechanics.tree.engine.near import Near
 from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Tables, Work
-from ephs.mechanics.tree.sweeps.cuts import Relative, between, motion_of, place_of
 from ephs.mechanics.tree.sweeps.expanding import About
-from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
-from ephs.semantics.spaces import se3, so3
-from ephs.semantics.spaces.vectors import apply_transposed, dot, product, scale, sub, transposed
+from ephs.semantics.spaces import se3
+from ephs.semantics.spaces.vectors import dot, scale, sub
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Variable, Vector, staged
 
 if TYPE_CHECKING:
@@ -139,8 +140,10 @@ class _Acting:
         body, w = self.tables.body[b], self.work
 
         def given() -> None:
-            here = se3.wrench_outward(body.turn, body.at, [self.tables.wrench[b, k] for k in range(6)])
-            self.totals[1] = self.totals[1] + dot(here, place_of(self.on, w.place, body.link).twist)
+            place = place_of(self.on, w.places(self.tables), body.link)
+            turn, at = frame_on(place, body.turn, body.at)
+            here = shift_back(turned(turn, [self.tables.wrench[b, k] for k in range(6)]), sub(at, place.at))
+            self.totals[1] = self.totals[1] + dot(here, place.twist)
             _grow(w.pushed, body.link, here)
 
         self.on.when(body.link >= 0, given)
@@ -253,16 +256,11 @@ class _Acting:
 
     def _between(self, edge: Acting, motion: Relative) -> None:
         """The motion of a spring's frames; its pose goes to the states of components."""
-        on, places, outer, at = self.on, self.work.place, edge.outer_turn, edge.outer_at
+        on, places = self.on, self.work.places(self.tables)
         near, far = place_of(on, places, edge.first), place_of(on, places, edge.second)
-        turn, there = between(near, far, outer, at)
-        motion.turn, motion.at = turn, there
-        motion.twist = sub(se3.twist_inward(outer, at, far.twist), se3.twist_inward(turn, there, near.twist))
-        inner = edge.inner_turn
-        pose = [
-            *so3.quaternion(on, product(transposed(inner), turn)),
-            *apply_transposed(inner, sub(there, edge.inner_at)),
-        ]
+        turn, at = frame_on(far, edge.outer_turn, edge.outer_at)
+        motion.turn, motion.at, motion.twist = turn, at, twist_of(near, far, turn, at)
+        pose = pose_of(on, frame_on(near, edge.inner_turn, edge.inner_at), (turn, at))
         into = self.work.x
         if self.read is not None:
             at_rest = self.read.expansion[self.on.select(edge.spring < 0, edge.friction, edge.spring)].state
@@ -342,11 +340,14 @@ class _Acting:
                 total.value = total.value + x * pull[j]
 
         on.loop(edge.dim, one)
-        whole = [total.value for total in wide]
-        outer = se3.wrench_outward(edge.outer_turn, edge.outer_at, whole)
-        inner = se3.wrench_outward(motion.turn, motion.at, scale(-1.0, whole))
-        on.when(edge.second >= 0, lambda: _grow(pushed, edge.second, outer))
-        on.when(edge.first >= 0, lambda: _grow(pushed, edge.first, inner))
+        whole = turned(motion.turn, [total.value for total in wide])
+
+        def push(link: Integer, by: list[Real]) -> None:
+            way = sub(motion.at, place_of(on, self.work.places(self.tables), link).at)
+            _grow(pushed, link, shift_back(by, way))
+
+        on.when(edge.second >= 0, lambda: push(edge.second, whole))
+        on.when(edge.first >= 0, lambda: push(edge.first, scale(-1.0, whole)))
 
     def conduct(self, row: Conduction) -> None:
         """Add the conduction of a component to the rates of two entropies, and note what leaves the first."""

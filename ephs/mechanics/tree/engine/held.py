@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from ephs.mechanics.road.rows import TARGET
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.sweeps.closing import TARGET
 from ephs.semantics.linear.dense import backward, cholesky, clear, copy, dot, forward, subtract
 from ephs.semantics.linear.skyline import skyline_solve
 from ephs.semantics.stage import Evaluator, Integer, Vector, staged
@@ -27,7 +27,7 @@ def constrain(on: Evaluator, drags: "Drags", motion: Mechanism, q: Vector) -> No
             drags.held[led + a, drags.row_of[j]] = -targets[a, TARGET]
 
         unit[j] = 1.0
-        motion.stray(on, q, unit)
+        motion.stray(on, unit)
         unit[j] = 0.0
         on.loop(targets.rows, entry)
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.mechanics.constraints.subgroup import Subgroup, generated
+from ephs.mechanics.road.pack import SLIDE, TURN, Packed, Part, packed
+from ephs.mechanics.road.records import Joint
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
-from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Packed, Part, packed
-from ephs.mechanics.tree.sweeps.records import Joint
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.codes import VECTOR

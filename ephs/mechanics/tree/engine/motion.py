@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
+from ephs.mechanics.road.records import Link
+from ephs.mechanics.road.rows import SIZE
 from ephs.mechanics.tree.engine.balance import correct, held, measure
 from ephs.mechanics.tree.engine.forces import act
 from ephs.mechanics.tree.engine.heats import absorb, count, entropies, heat_rates, hold, lawless, warm
 from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
-from ephs.mechanics.tree.sweeps.closing import SIZE
-from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.linear.dense import clear, subtract
 from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
@@ -75,13 +75,17 @@ class Mechanism(Motion):
     def _cuts(self) -> tuple[Argument, ...]:
         return self.tables.cut, self.tables.cut_numbers, self.work.relative
 
+    @property
+    def _placed(self) -> tuple[Argument, ...]:
+        return self.tables.cut, self.tables.cut_numbers, self.work.places(self.tables), self.work.relative
+
     def outward(self, on: Evaluator, q: Vector, r: Vector, lead: Vector) -> None:
         """The outward sweep: poses, twists, loads of all links, and the rows that close loops.
 
         ``lead`` are the accelerations of joints with prescribed motions.
         """
         e, w, own = self.tables, self.work, self.tables.own[0]
-        on.reach(own.move, *self.swept, q, r, lead, w.place)
+        on.reach(own.move, *self.swept, q, r, lead)
         clear(on, whole(w.pushed))
         if not self.looped:
             return
@@ -92,16 +96,16 @@ class Mechanism(Motion):
             w.value[a, SIZE] = 0.0
 
         on.loop(w.value.rows, forget)
-        on.reach(own.rows, e.cut, e.cut_numbers, w.place, w.relative, e.end, w.value, w.covector)
+        on.reach(own.rows, *self._placed, e.end, w.value, w.covector)
 
-    def fold(self, on: Evaluator, q: Vector, force: Vector, pushed: Matrix) -> Integer:
+    def fold(self, on: Evaluator, force: Vector, pushed: Matrix) -> Integer:
         """The inward sweep under forces on the rates and wrenches on links; return a status."""
-        still = on.reach(self.tables.own[0].fold, *self.swept, *self._rows, q, force, pushed)
+        still = on.reach(self.tables.own[0].fold, *self.swept, *self._rows, force, pushed)
         return self._still(on, still)
 
-    def unfold(self, on: Evaluator, q: Vector, rate: Vector) -> None:
+    def unfold(self, on: Evaluator, rate: Vector) -> None:
         """The last outward sweep: write accelerations."""
-        on.reach(self.tables.own[0].unfold, *self.swept, *self._rows, q, rate, self.work.change)
+        on.reach(self.tables.own[0].unfold, *self.swept, *self._rows, rate)
 
     def _still(self, on: Evaluator, still: Integer) -> Integer:
         """Status where a sweep says 1 + the link whose joint moves no mass, which loops may determine; else 0."""
@@ -123,9 +127,9 @@ class Mechanism(Motion):
         on.when(self.work.value.rows > 0, look)
         return on.select(found.value > 0, int(Status.DEPENDENT), 0)
 
-    def _resolve(self, on: Evaluator, q: Vector) -> Vector:
+    def _resolve(self, on: Evaluator) -> Vector:
         """The least change of rates, in the mass metric, that meets the targets, with the factors at hand."""
-        on.reach(self.tables.own[0].resolve, *self.swept, *self._rows, q, self.work.alter, self.work.change)
+        on.reach(self.tables.own[0].resolve, *self.swept, *self._rows, self.work.alter)
         return self.work.alter
 
     def accelerate(
@@ -149,18 +153,18 @@ class Mechanism(Motion):
                 status.value = act(on, self.tables, w, q, r, s_rate, made, totals, None, None, drags)
 
             def inward() -> None:
-                status.value = self.fold(on, q, w.force, w.pushed)
+                status.value = self.fold(on, w.force, w.pushed)
 
             def separate() -> None:
                 status.value = self._sound(on)
 
             def outward() -> None:
-                self.unfold(on, q, rate)
+                self.unfold(on, rate)
                 on.when(own.driven > 0, drive)
 
             def drive() -> None:
                 on.loop(rate.size, follow)
-                on.reach(own.power, *self.swept, *self._rows, q, r, w.force, w.answer)
+                on.reach(own.power, *self.swept, *self._rows, r, w.force, w.answer)
                 totals[1] = totals[1] + w.answer[0]
 
             def follow(j: Integer) -> None:
@@ -317,20 +321,15 @@ class Mechanism(Motion):
         on.loop(charts.size, joint)
         on.loop(self.tables.node.size, energy)
 
-    def stray(self, on: Evaluator, q: Vector, change: Vector) -> None:
+    def stray(self, on: Evaluator, change: Vector) -> None:
         """Write targets that take a change of the rates back across the constraints."""
         own, w = self.tables.own[0], self.work
-        on.reach(own.spread, *self.swept, q, change, w.change)
-        on.reach(own.across, *self._cuts, w.change, w.value)
+        on.reach(own.spread, *self.swept, change)
+        on.reach(own.across, *self._placed, w.value)
 
     def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
-        self.stray(on, q, change)
-        alter = self._resolve(on, q)
-
-        def add(j: Integer) -> None:
-            change[j] = change[j] + alter[j]
-
-        on.loop(change.size, add)
+        self.stray(on, change)
+        subtract(on, -1.0, self._resolve(on), change)
 
     def least(self, on: Evaluator, change: Vector) -> Real:
         first, least = self.tables.node.size + 2, on.variable(0.0)
@@ -356,10 +355,10 @@ class Mechanism(Motion):
         With ``always`` it is moved in any case: the tangent of closing is that of a round that was taken."""
         own, w, status = self.tables.own[0], self.work, on.counter(0)
         self.outward(on, q, r, w.zero)
-        on.reach(own.poses, *self._cuts)
+        on.reach(own.poses, *self._placed)
         on.reach(own.fit, *self._cuts, q)
         gap = self.gaps(on, q)
-        status.value = self.fold(on, q, w.zero, w.pushed)
+        status.value = self.fold(on, w.zero, w.pushed)
 
         def separate() -> None:
             status.value = self._sound(on)
@@ -370,7 +369,7 @@ class Mechanism(Motion):
 
         def go() -> None:
             self.gaps(on, q)
-            self.displace(on, self._resolve(on, q), q)
+            self.displace(on, self._resolve(on), q)
 
         on.when(on.negate(done), go)
         return status.value, gap, done
@@ -397,4 +396,4 @@ class Mechanism(Motion):
     def straighten(self, on: Evaluator, q: Vector, r: Vector) -> None:
         """Put the rates on the constraints, with the factors at hand."""
         on.reach(self.tables.own[0].relative_rates, *self._cuts, self.work.value)
-        subtract(on, -1.0, self._resolve(on, q), r)
+        subtract(on, -1.0, self._resolve(on), r)

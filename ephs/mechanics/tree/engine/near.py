@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 
+from ephs.mechanics.road.cuts import Relative, place_of
+from ephs.mechanics.road.needs import NO_INTEGERS
 from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Acting, Tables, Work
-from ephs.mechanics.tree.sweeps.cuts import Relative, place_of
 from ephs.mechanics.tree.sweeps.grouping import Group
-from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
 from ephs.semantics.spaces.vectors import Rows, add, apply, apply_transposed, dot, product, sub, transposed
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable
 
@@ -43,7 +43,7 @@ class Near:
     def of(on: Evaluator, tables: Tables, work: Work) -> "Near":
         """Return tests that have met no edge."""
         pair = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
-        return Near(on, tables, work.place, work.located, on.counter(-2), on.counter(-2), pair)
+        return Near(on, tables, work.places(tables), work.located, on.counter(-2), on.counter(-2), pair)
 
     def each(self, body: Callable[[Acting, Integer], None]) -> None:
         """Call body(edge, number) of the edges, but those whose frames are so far apart that nothing acts."""

@@ -10,19 +10,18 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final, final
 
+from ephs.mechanics.road import charts
+from ephs.mechanics.road.charts import Kind
+from ephs.mechanics.road.closures import Closures
+from ephs.mechanics.road.cuts import Cut
+from ephs.mechanics.road.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
+from ephs.mechanics.road.pack import Class
+from ephs.mechanics.road.programs import Sweeps
+from ephs.mechanics.road.records import Tree
+from ephs.mechanics.road.tree import outward, spread
 from ephs.mechanics.tree.engine.forces import act
-from ephs.mechanics.tree.sweeps import charts
 from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
-from ephs.mechanics.tree.sweeps.charts import Kind
-from ephs.mechanics.tree.sweeps.closures import Closures
-from ephs.mechanics.tree.sweeps.cuts import Cut
 from ephs.mechanics.tree.sweeps.expanding import ABOUT, About
-from ephs.mechanics.tree.sweeps.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
-from ephs.mechanics.tree.sweeps.outward import outward
-from ephs.mechanics.tree.sweeps.pack import Class
-from ephs.mechanics.tree.sweeps.programs import Sweeps
-from ephs.mechanics.tree.sweeps.records import Tree
-from ephs.mechanics.tree.sweeps.spreading import spread
 from ephs.semantics.linear.dense import cholesky, clear
 from ephs.semantics.stage import (
     Entry,
@@ -39,7 +38,7 @@ from ephs.semantics.stage import (
 )
 
 ACTIVE: Final = (
-    "work", "place", "relative", "value", "covector", "force", "pushed", "attached", "pulled", "temperature", "entropy",
+    "work", "relative", "value", "covector", "force", "pushed", "attached", "pulled", "temperature", "entropy",
     "located", "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",
 )  # fmt: skip
 """Arguments that have derivatives, beside those that only one of the functions has."""
@@ -97,21 +96,19 @@ class Residuals:
             tree = sweeps.tree(tables.own[0].links, tables.integers, tables.reals, work.work, tables.gravity)
             outward(on, tree, q, r)
             joints = Table(Cut, tables.cut.cells, tables.cut_numbers.cells, tables.cut.size // Cut.integer_width)
-            return tree, Closures(joints, work.place, work.relative, tables.end, work.value, work.covector)
+            return tree, Closures(joints, work.places(tables), work.relative, tables.end, work.value, work.covector)
 
         def place(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector) -> None:
-            tree, closing = outwards(on, tables, work, q, r)
-            _at_rest(on, tree)
-            closing.place(on, tree)
+            _, closing = outwards(on, tables, work, q, r)
+            closing.place(on)
 
         def assemble(
             on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, unit: Vector, mass: Matrix,
             factor: Matrix, jacobian: Matrix, terms: Vector, driven: Integer,
         ) -> Integer:  # fmt: skip
             tree, closing = outwards(on, tables, work, q, r)
-            _at_rest(on, tree)
-            closing.place(on, tree)
-            masses(on, tree, q, unit, mass)
+            closing.place(on)
+            masses(on, tree, unit, mass)
             found = cholesky(on, mass, factor)
             constraints(on, tree, closing, q, factor, jacobian, terms, driven)
             return found
@@ -121,8 +118,7 @@ class Residuals:
             terms: Vector, driven: Integer,
         ) -> None:  # fmt: skip
             tree, closing = outwards(on, tables, work, q, r)
-            _at_rest(on, tree)
-            closing.place(on, tree)
+            closing.place(on)
             constraints(on, tree, closing, q, factor, jacobian, terms, driven)
 
         def constraints(
@@ -140,16 +136,15 @@ class Residuals:
                     terms[m] = terms[m] + size / factor[at, at]
 
                 for link, e in ((joint.first, end), (joint.second, end + 1)):
-                    row_of_covector(on, tree, q, link, self._seen, closing.at_end(e), into, count)
+                    row_of_covector(on, tree, link, self._seen, closing.at_end(e), into, count)
 
             on.loop(terms.size - driven, empty)
             closing.each_row(on, one)
 
         def rigid(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, out: Vector) -> None:
             tree, _ = outwards(on, tables, work, q, r)
-            _at_rest(on, tree)
             clear(on, out)
-            needed_forces(on, tree, q, out)
+            needed_forces(on, tree, out)
 
         def twists(
             on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, unit: Vector, link: Integer, rows: Matrix
@@ -159,7 +154,7 @@ class Residuals:
 
             def column(k: Integer) -> None:
                 unit[k] = 1.0
-                spread(on, tree, q, unit)
+                spread(on, tree, unit)
                 unit[k] = 0.0
                 for j, value in enumerate(tree.states[link].change):
                     rows[k, j] = value
@@ -174,12 +169,12 @@ class Residuals:
             force, heat = out.part(0, n), out.part(n + m + 2 * c, work.entropy.size)
             charts.advance(on, self.kinds, tables.chart, base, about.increment, q)
             tree, closing = outwards(on, tables, work, q, r)
-            spread(on, tree, q, a)
-            closing.place(on, tree)
+            spread(on, tree, a)
+            closing.place(on)
             closing.along(on, out.part(n + m, c), out.part(n + m + c, c), n)
             _act(on, tree, tables, work, about, q, r, force, heat)
             closing.push(on, tree, multiplier)
-            needed_forces(on, tree, q, force)
+            needed_forces(on, tree, force)
             armatures(on, tree, a, force)
 
             def accelerated(k: Integer) -> None:
@@ -194,12 +189,11 @@ class Residuals:
             force, heat = out.part(n, n), out.part(2 * n + 2 * c, work.entropy.size)
             charts.advance(on, self.kinds, tables.chart, base, about.increment, q)
             tree, closing = outwards(on, tables, work, q, r)
-            _at_rest(on, tree)
-            closing.place(on, tree)
+            closing.place(on)
             weigh(on, tree)
             closing.along(on, out.part(2 * n, c), out.part(2 * n + c, c), n)
             _act(on, tree, tables, work, about, q, r, force, heat)
-            action(on, tree, q, r, out.part(0, n), force)
+            action(on, tree, r, out.part(0, n), force)
 
         def entry(function: Callable[..., Any], **arguments: Any) -> Entry:
             kinds = {**MOVING, **arguments}
@@ -244,15 +238,6 @@ def _act(
 def _clear(on: Evaluator, work: Work) -> None:
     clear(on, work.force)
     clear(on, Vector(work.pushed.cells, work.pushed.start, work.pushed.rows * 6))
-
-
-def _at_rest(on: Evaluator, tree: Tree) -> None:
-    """No accelerations beyond the biases."""
-
-    def still(i: Integer) -> None:
-        tree.states[i].change = [0.0] * 6
-
-    on.loop(tree.size, still)
 
 
 @cache

@@ -4,17 +4,18 @@ The mass matrix is that of composite bodies, see Featherstone, *Rigid Body Dynam
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from ephs.mechanics.road.cuts import place_of
+from ephs.mechanics.road.records import Link
+from ephs.mechanics.road.tree import Inertia, shift
 from ephs.mechanics.tree.engine.held import among, pull
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.sweeps.acting import ON_TREE
-from ephs.mechanics.tree.sweeps.cuts import place_of
-from ephs.mechanics.tree.sweeps.records import Link
 from ephs.semantics.linear.dense import cholesky, copy
 from ephs.semantics.linear.skyline import skyline_solve, skyline_times
 from ephs.semantics.spaces import vectors
-from ephs.semantics.spaces.vectors import add, apply, cross, plus, product, scale, sub, symmetric, transposed, upper
+from ephs.semantics.spaces.vectors import sub
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Vector, staged
 from ephs.solve.march.records import Status
 
@@ -149,7 +150,7 @@ def _factorise(on: Evaluator, drags: "Drags", weight: Real) -> Integer:
 @staged
 def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
     """The lower triangle of the mass matrix; columns are moved to the first link's place."""
-    tables, place, links = motion.tables, motion.work.place, motion.tables.links
+    tables, place, links = motion.tables, motion.work.places(motion.tables), motion.tables.links
     origin = place_of(on, place, 0).at
 
     def link_of(i: Integer) -> Link:
@@ -157,7 +158,7 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
 
     def one(i: Integer) -> None:
         link, here, body = link_of(i), place_of(on, place, i), drags.body.row(i)
-        for k, x in enumerate(_inertia(link, here.turn, sub(here.at, origin))):
+        for k, x in enumerate(Inertia.of(link, here.turn).about(sub(here.at, origin)).numbers):
             body[k] = x
 
     def carry(i: Integer) -> None:
@@ -171,11 +172,12 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
 
     def column(p: Integer) -> None:
         here, axis = drags.column.row(p), drags.axes.row(drags.rate[p])
-        for k, x in enumerate(cross([axis[0], axis[1], axis[2]], origin)):
-            here[k], here[3 + k] = axis[k], axis[3 + k] + x
+        for k, x in enumerate(shift([axis[m] for m in range(6)], origin)):
+            here[k] = x
 
     def row(j: Integer) -> None:
-        load = _momentum([drags.body[drags.owner[j], k] for k in range(10)], [drags.column[j, k] for k in range(6)])
+        body = [drags.body[drags.owner[j], k] for k in range(10)]
+        load = Inertia(body[0], body[1:4], body[4:]).momentum([drags.column[j, k] for k in range(6)])
 
         def entry(i: Integer) -> None:
             drags.mass[i, j] = vectors.dot([drags.column[i, k] for k in range(6)], load)
@@ -202,25 +204,6 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
     on.loop(n, column)
     on.loop(n, row)
     on.loop(links, armature)
-
-
-def _inertia(link: Link, turn: Any, at: Any) -> list[Real]:
-    """Mass, moment and inertia (upper triangle) of a link about a point, from which its frame is at ``at``."""
-    moment = apply(turn, link.moment)
-    inertia = product(product(turn, symmetric(link.inertia)), transposed(turn))
-    out = [[moment[i] * at[j] + at[i] * (moment[j] + link.mass * at[j]) for j in range(3)] for i in range(3)]
-    trace = out[0][0] + out[1][1] + out[2][2]
-    moved = [[(trace if i == j else 0.0) - out[i][j] for j in range(3)] for i in range(3)]
-    return [link.mass, *add(moment, scale(link.mass, at)), *upper(plus(inertia, moved))]
-
-
-def _momentum(body: list[Real], twist: list[Real]) -> list[Real]:
-    """(l, p) of mass, moment and inertia about a point, for a twist about it."""
-    mass, moment, inertia = body[0], body[1:4], symmetric(body[4:])
-    turning, moving = twist[:3], twist[3:]
-    return [
-        *add(apply(inertia, turning), cross(moment, moving)), *add(scale(mass, moving), cross(turning, moment))
-    ]  # fmt: skip
 
 
 @staged

@@ -4,16 +4,17 @@ from typing import Any, Final, final
 
 import numpy as np
 
+from ephs.mechanics.road.charts import TIE
+from ephs.mechanics.road.cuts import Cut, Relative
+from ephs.mechanics.road.loops import kinds_of, loop_program
+from ephs.mechanics.road.pack import STANDARD
+from ephs.mechanics.road.records import Place
 from ephs.mechanics.tree.engine.build import whole_of
 from ephs.mechanics.tree.engine.residuals import MOVING, point_program, residuals
 from ephs.mechanics.tree.equations.slopes import Slopes
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
-from ephs.mechanics.tree.sweeps.charts import TIE
-from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
 from ephs.mechanics.tree.sweeps.expanding import Expansion
-from ephs.mechanics.tree.sweeps.loops import kinds_of, loop_program
-from ephs.mechanics.tree.sweeps.pack import STANDARD
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rank import REGULAR, TINY
@@ -83,6 +84,8 @@ class Residual:
             "mass": np.zeros((n, n)), "factor": np.zeros((n, n)), "jacobian": np.zeros((m + driven, n)),
             "terms": np.zeros(m + driven), "rows": np.zeros((n, 6)), "made": self.made, "totals": self._totals,
         }  # fmt: skip
+        own: Any = whole.tables["own"][0]
+        own.width = self.program.width
         self._numbers = {"driven": driven, "link": 0}
         self.outs = {
             "residual": np.zeros(self.entropy_rates.stop), "action": np.zeros(2 * n + 2 * c + self.ns),
@@ -170,9 +173,14 @@ class Residual:
         self._call("constrain")()
         return 0
 
+    @property
+    def places(self) -> Array:
+        """(links + 1, width) rows of links and the ground, which begin with `ephs.mechanics.road.records.Place`."""
+        return self.arrays["work"].reshape(-1, self.program.width)
+
     def pose(self, body: int) -> Array:
         """(7,) of a body in the world, where `place` has been."""
-        place, frame = self.arrays["place"][self._bodies.link[body]], self._frames[body]
+        place, frame = self.places[self._bodies.link[body]], self._frames[body]
         turn = self._ground.T @ place[:9].reshape(3, 3)
         at = self._ground.T @ place[9:12] + turn @ frame[9:]
         return np.concatenate([matrix_to_quaternion(turn @ frame[:9].reshape(3, 3)), at])
@@ -183,7 +191,8 @@ class Residual:
 
     def twist(self, body: int) -> Array:
         """(6,) of a body in its frame, where `place` has been."""
-        return self.inside(body, self.arrays["place"][self._bodies.link[body], 12:18])
+        at = Place.twist.offset
+        return self.inside(body, self._seen(body, self.places[self._bodies.link[body], at : at + 6]))
 
     def twists(self, body: int) -> Array:
         """(6, n) a body's twist by the tree's rates, where `place` has been."""
@@ -191,10 +200,15 @@ class Residual:
         if link < 0:
             return np.zeros((6, self.n))
         self._call("twists")(link)
-        return self.inside(body, self.arrays["rows"]).T
+        return self.inside(body, self._seen(body, self.arrays["rows"])).T
+
+    def _seen(self, body: int, twist: Array) -> Array:
+        """(…, 6) twists of a body's link in the link's axes, from those in world axes."""
+        turn = self.places[self._bodies.link[body], :9].reshape(3, 3)
+        return np.concatenate([twist[..., :3] @ turn, twist[..., 3:] @ turn], axis=-1)
 
     def inside(self, body: int, twist: Array) -> Array:
-        """(…, 6) twists of a body in its frame, from those of its link."""
+        """(…, 6) twists of a body in its frame, from those of its link in the link's."""
         frame = self._frames[body]
         turn, at = frame[:9].reshape(3, 3), frame[9:]
         turning, moving = twist[..., :3], twist[..., 3:]

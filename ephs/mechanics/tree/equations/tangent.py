@@ -5,8 +5,8 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.rewrite.coordinates import unread
+from ephs.mechanics.road.records import Place
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.mechanics.tree.sweeps.cuts import Place
 from ephs.semantics.bundles.bundle import Array
 
 
@@ -118,7 +118,8 @@ class Linearised:
 
     def turning(self, q: Array, r: Array) -> tuple[Array, Array, Array]:
         """((m, n), (nv − n, n), (links + 1, 6, n)) derivatives by the tree's elements, at fixed rates r, of what the
-        rates make: of all rows, of cut joints' rates, of links' twists; cut joints' elements follow the tree's.
+        rates make: of all rows, of cut joints' rates, of links' twists in their frames. Cut joints' elements follow the
+        tree's.
 
         At rest the accelerations of what the rows, joints and links have are what they make of the tree's: J a, so that
         a in place of r gives J r.
@@ -131,12 +132,12 @@ class Linearised:
         found.arrays["base"][:] = q
         found.at(r, np.zeros(found.m))
         units = np.eye(nv + n)
-        slopes, places = self._slopes.both("residual", {"increment": units[:nv], "r": units[nv:]}, nv + n, "place")
+        slopes, places = self._slopes.both("residual", {"increment": units[:nv], "r": units[nv:]}, nv + n, "work")
         gravity[:] = pull
         following = slopes[found.cut_rates, nv:]
         slopes[:, :n] += slopes[:, n:nv] @ following
-        twists = places[:, Place.bias.offset : Place.bias.offset + 6]
-        return self._rows(slopes[:, :n]), slopes[found.cut_changes, :n], twists[..., :n]
+        moved = _seen(found.places, places[..., :n].reshape(*found.places.shape, n))
+        return self._rows(slopes[:, :n]), slopes[found.cut_changes, :n], moved
 
     @property
     def cut_rates(self) -> Array:
@@ -152,3 +153,15 @@ class Linearised:
         """(m,) what the constraints' rows on the accelerations are to be, −(d rows/dt)·r; and the rows' rank."""
         self.forward(q, r, s)
         return self._dense.targets()
+
+
+def _seen(place: Array, slopes: Array) -> Array:
+    """(links + 1, 6, n) derivatives of links' accelerations in their own axes, from those (links + 1, …, n) of their
+    places, whose accelerations are in world axes.
+    """
+    turn, turned = place[:, :9].reshape(-1, 3, 3), slopes[:, :9].reshape(len(place), 3, 3, -1)
+    bias, change = (slice(field.offset, field.offset + 6) for field in (Place.bias, Place.change))
+    moved = (place[:, bias] + place[:, change]).reshape(-1, 2, 3)
+    moving = (slopes[:, bias] + slopes[:, change]).reshape(len(place), 2, 3, -1)
+    found = np.einsum("lijn,lhi->lhjn", turned, moved) + np.einsum("lij,lhin->lhjn", turn, moving)
+    return found.reshape(len(place), 6, -1)

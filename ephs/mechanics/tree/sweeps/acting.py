@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import Any, Final, final
 
-from ephs.mechanics.tree.sweeps import loops, programs
+from ephs.mechanics.road import loops, programs
+from ephs.mechanics.road.charts import Chart
+from ephs.mechanics.road.cuts import Relative
+from ephs.mechanics.road.rigid import SUMS
 from ephs.mechanics.tree.sweeps.balances import ATTACH
-from ephs.mechanics.tree.sweeps.charts import Chart
-from ephs.mechanics.tree.sweeps.cuts import Place, Relative
 from ephs.mechanics.tree.sweeps.grouping import Group, Middle
-from ephs.mechanics.tree.sweeps.rigid import SUMS
 from ephs.semantics.descriptor.kernel_table import SIGNATURE
 from ephs.semantics.stage import (
     Integer,
@@ -49,14 +49,12 @@ class Own(Record):
 
     Attributes
     ----------
-    links
-        How many.
+    links, width
+        How many, and how many numbers of memory each of them takes.
     forced, driven
         1 where more than gravity acts; where joints have prescribed motions.
     attached
         1 where there is a network, which `attach` evaluates.
-    between
-        1 where springs act between bodies.
     islands
         How many groups of links keep momenta in every step; 0 where that is not asked for.
     falls
@@ -64,10 +62,10 @@ class Own(Record):
     """
 
     links = integer()
+    width = integer()
     forced = integer()
     driven = integer()
     attached = integer()
-    between = integer()
     islands = integer()
     falls = integer()
     accelerations = _sweep("accelerations")
@@ -231,13 +229,13 @@ class Tables:
     own
         One row.
     integers, reals, gravity
-        Of the sweeps, see `ephs.mechanics.tree.sweeps.records`; gravity (3,) in the ground's frame.
+        Of the sweeps, see `ephs.mechanics.road.records`; gravity (3,) in the ground's frame.
     chart, cut, cut_numbers
-        Joints, and those at which loops are cut, see `ephs.mechanics.tree.sweeps.cuts`.
+        Joints, and those at which loops are cut, see `ephs.mechanics.road.cuts`.
     at, slot, row, flat, end
-        The elimination of loops, see `ephs.mechanics.tree.engine.closing.Closing`.
+        The elimination of loops, see `ephs.mechanics.road.elimination.Closing`.
     island, bases
-        Group of each link that may move as a whole, and how: see `ephs.mechanics.tree.sweeps.rigid`.
+        Group of each link that may move as a whole, and how: see `ephs.mechanics.road.rigid`.
     port, net, numbers
         What is attached, and where: see `ephs.mechanics.tree.sweeps.network.Net`.
     drive, wrench, scal, supply, lead
@@ -307,18 +305,18 @@ class Work:
 
     Attributes
     ----------
-    work, place, change
-        The sweeps' own; links in the world, and their accelerations beyond the bias; the ground's last.
+    work
+        The sweeps' own: rows of links, the ground's last, which begin with `ephs.mechanics.road.records.Place`.
     pushed, force, zero
-        Wrenches (links, 6) on links, in their frames; forces on the tree's rates; zeros.
+        Wrenches (links, 6) on links, in world axes about their frames' origins; forces on the tree's rates; zeros.
     attached, pulled
         Forces on the degrees of freedom of all joints: of what is attached, and all but the constraints'.
     located
         (points, 6): points of groups, and directions there, in the world.
     relative
-        (cut joints, width): see `ephs.mechanics.tree.sweeps.cuts.Relative`.
+        (cut joints, width): see `ephs.mechanics.road.cuts.Relative`.
     value, entry, covector, along, largest
-        Of the rows of loops, see `ephs.mechanics.tree.sweeps.closing.Rows`.
+        Of the rows of loops, see `ephs.mechanics.road.rows.Rows`.
     temperature, entropy
         Efforts and entropies of the nodes.
     x, v, e, lam, f, c, jac, scratch
@@ -326,11 +324,11 @@ class Work:
     alter, moved
         Changes of the tree's rates, and of all joints' increments.
     momenta, spin
-        Of links (links, 6), in their frames; of rates that have inertia of their own.
+        Of links (links, 6), as wrenches on them; of rates that have inertia of their own.
     direction, descent
         Free part of the rates; accelerations at rest by weight and springs.
     kept, released, found, torque, sums
-        Of islands: momenta that steps keep, zeros, what `ephs.mechanics.tree.sweeps.rigid` writes, and its memory.
+        Of islands: momenta that steps keep, zeros, what `ephs.mechanics.road.rigid` writes, and its memory.
     still, idle, spare
         Zeros for given forces on all joints; memory for (heats, heat, work, flows).
     totals
@@ -340,8 +338,6 @@ class Work:
     """
 
     work: Vector
-    place: Matrix
-    change: Matrix
     pushed: Matrix
     force: Vector
     zero: Vector
@@ -381,9 +377,14 @@ class Work:
     answer: Vector
     fault: Integers
 
+    def places(self, tables: Tables) -> Matrix:
+        """Rows of links and the ground, which begin with `ephs.mechanics.road.records.Place`."""
+        own = tables.own[0]
+        return Matrix(self.work.cells, self.work.start, own.links + 1, own.width)
+
 
 WORK: Final[dict[str, Any]] = {
-    "work": vector(), "place": matrix(Place.real_width), "change": matrix(6), "pushed": matrix(6), "force": vector(),
+    "work": vector(), "pushed": matrix(6), "force": vector(),
     "zero": vector(), "attached": vector(), "pulled": vector(), "located": matrix(6),
     "relative": matrix(Relative.real_width), "value": matrix(4), "entry": vector(), "covector": matrix(6),
     "along": matrix(12), "largest": vector(), "temperature": vector(), "entropy": vector(), "x": vector(),

@@ -46,35 +46,54 @@ class Link(Record):
     armature = real()
 
 
-class State(Record):
-    """Quantities of a link that the sweeps keep, in its frame.
+class Place(Record):
+    """Motion of a link, in world axes about the origin of its frame: what stands first in its `State`.
 
     Attributes
     ----------
-    rotation, place
-        The link's frame in its parent's.
     turn, at
         The link's frame in the world.
     twist, bias
         Twist (ω, υ), and the acceleration at ṙ = 0, in which gravity and prescribed accelerations are.
+    change
+        Acceleration beyond the bias.
+    """
+
+    turn = reals(3, 3)
+    at = reals(3)
+    twist = reals(6)
+    bias = reals(6)
+    change = reals(6)
+
+
+class State(Record):
+    """Quantities of a link that the sweeps keep, in world axes about the origin of its frame.
+
+    Attributes
+    ----------
+    turn, at, twist, bias, change
+        See `Place`.
+    down
+        The frame's origin from that of the link's parent.
+    axes
+        Twists S of a joint's rates in its first ``dim`` rows, of joints that are walked backward.
     load
         Wrench that the link and what it carries need beyond inertia · change.
     angular, mixed, linear
         Articulated inertia [[A, C], [Cᵀ, M]]: upper triangles of A and M, rows of C.
     gain, inverse, push
         D⁻¹Uᵀ, D⁻¹ (upper triangle) and D⁻¹(τ − SᵀP) of the joint.
-    change
-        Acceleration beyond the bias.
-    down, level, reach
-        Gravity, and its scalar product with the frame's origin.
+    reach
+        Length of the way from the ground's origin, along the joints, in m.
     """
 
-    rotation = reals(3, 3)
-    place = reals(3)
     turn = reals(3, 3)
     at = reals(3)
     twist = reals(6)
     bias = reals(6)
+    change = reals(6)
+    down = reals(3)
+    axes = reals(6, 6)
     load = reals(6)
     angular = reals(6)
     mixed = reals(3, 3)
@@ -82,9 +101,6 @@ class State(Record):
     gain = reals(6, 6)
     inverse = reals(21)
     push = reals(6)
-    change = reals(6)
-    down = reals(3)
-    level = real()
     reach = real()
 
 
@@ -124,15 +140,6 @@ class Joint:
         """It turns about z, and that is all."""
         return self.basis == ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),)
 
-    @property
-    def units(self) -> dict[int, int]:
-        """Entries of a twist that are degrees of freedom -> number of the degree of freedom; none where rates have
-        inertia.
-        """
-        if self.armature:
-            return {}
-        return {column.index(1.0): j for j, column in enumerate(self.basis) if sorted(column) == [0.0] * 5 + [1.0]}
-
 
 class Links(Protocol):
     """Constants of links, by row."""
@@ -161,6 +168,8 @@ class Tree:
         How many links; row `size` of the states is the ground's.
     gravity
         (3,) in the ground's frame.
+    planar
+        All moves parallel to the plane of x and y, and all joints turn about z or slide.
     """
 
     joints: tuple[Joint, ...]
@@ -168,6 +177,13 @@ class Tree:
     links: Links
     states: States
     gravity: list[Real]
+    planar: bool
+
+    def units(self, joint: Joint) -> dict[int, int]:
+        """Entries of a twist that are degrees of freedom -> number of the degree of freedom, where that is known while
+        staging: a joint that turns about the plane's normal. None where rates have inertia.
+        """
+        return {2: 0} if self.planar and joint.revolute and not joint.armature else {}
 
     def each(self, on: Evaluator, body: Callable[[Integer], None], *, down: bool = False) -> None:
         """Call body(i) for all links, parents first, or last; written out where their number is known."""

@@ -7,31 +7,29 @@ units, all else is zero), and covectors on links as rows on the rates.
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-from ephs.mechanics.tree.sweeps.joints import force_outside, rate_inside
-from ephs.mechanics.tree.sweeps.outward import momentum
-from ephs.mechanics.tree.sweeps.records import Joint, Link, Tree
-from ephs.mechanics.tree.sweeps.spreading import spread
-from ephs.semantics.spaces.se3 import bracket, wrench_outward
-from ephs.semantics.spaces.vectors import add, apply_transposed, combine, dot, sub
+from ephs.mechanics.road.records import Joint, Link, Tree
+from ephs.mechanics.road.tree import Inertia, axes_of, moved_by, shift_back, spread
+from ephs.semantics.spaces.se3 import bracket
+from ephs.semantics.spaces.vectors import add, dot, sub
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
 
 Take: TypeAlias = Callable[[Integer, Joint, Link, list[Real], list[Real]], None]
 """Called with a link's number, joint and constants, the load on it, and the force that this is on the joint's rates."""
 
 
-def gather(on: Evaluator, tree: Tree, q: Vector, take: Take) -> None:
+def gather(on: Evaluator, tree: Tree, take: Take) -> None:
     """Carry the links' loads inwards, and let ``take`` see what each joint bears."""
 
     def one(i: Integer) -> None:
         def through(joint: Joint, link: Link) -> None:
             state = tree.states[i]
             load = state.load
-            force = force_outside(on, joint, link, q, [dot(column, load) for column in joint.basis])
+            force = [dot(axis, load) for axis in axes_of(joint, link, state)]
             take(i, joint, link, load, force)
 
             def take_up() -> None:
                 parent = tree.states[link.parent]
-                parent.load = add(parent.load, wrench_outward(state.rotation, state.place, load))
+                parent.load = add(parent.load, shift_back(load, state.down))
 
             on.when(link.parent < tree.size, take_up)
 
@@ -46,7 +44,7 @@ def _accelerated(on: Evaluator, tree: Tree, *, alone: bool) -> None:
     def one(i: Integer) -> None:
         def through(joint: Joint, link: Link) -> None:
             state = tree.states[i]
-            inertial = momentum(link, state.change)
+            inertial = Inertia.of(link, state.turn).momentum(state.change)
             state.load = inertial if alone else add(state.load, inertial)
 
         tree.visit(on, i, through)
@@ -54,7 +52,7 @@ def _accelerated(on: Evaluator, tree: Tree, *, alone: bool) -> None:
     tree.each(on, one)
 
 
-def needed_forces(on: Evaluator, tree: Tree, q: Vector, out: Vector) -> None:
+def needed_forces(on: Evaluator, tree: Tree, out: Vector) -> None:
     """Add the forces on the rates (n,) that the links need, where `outward` and `spread` have been.
 
     Wrenches on links are taken off their loads before.
@@ -65,7 +63,7 @@ def needed_forces(on: Evaluator, tree: Tree, q: Vector, out: Vector) -> None:
         for j, value in enumerate(force):
             out[link.r_at + j] = out[link.r_at + j] + value
 
-    gather(on, tree, q, take)
+    gather(on, tree, take)
 
 
 def armatures(on: Evaluator, tree: Tree, rates: Vector, out: Vector) -> None:
@@ -89,14 +87,14 @@ def weigh(on: Evaluator, tree: Tree) -> None:
     def one(i: Integer) -> None:
         def through(joint: Joint, link: Link) -> None:
             state = tree.states[i]
-            state.load = momentum(link, [0.0, 0.0, 0.0, *apply_transposed(state.turn, ground)])
+            state.load = Inertia.of(link, state.turn).momentum([0.0, 0.0, 0.0, *ground])
 
         tree.visit(on, i, through)
 
     tree.each(on, one)
 
 
-def action(on: Evaluator, tree: Tree, q: Vector, r: Vector, p: Vector, g: Vector) -> None:
+def action(on: Evaluator, tree: Tree, r: Vector, p: Vector, g: Vector) -> None:
     """The momenta ∂L/∂r, and ∂L/∂q with other forces, left-trivialised, where loads are what acts, negated.
 
     A change δ of a joint's element moves its link by S δ, and with it all that is carried further out: δu = [u, S δ]
@@ -112,33 +110,31 @@ def action(on: Evaluator, tree: Tree, q: Vector, r: Vector, p: Vector, g: Vector
         for j, value in enumerate(force):
             g[link.r_at + j] = -(g[link.r_at + j] + value)
 
-    gather(on, tree, q, take)
+    gather(on, tree, take)
 
     def moving(i: Integer) -> None:
         def through(joint: Joint, link: Link) -> None:
             state = tree.states[i]
-            state.load = momentum(link, state.twist)
+            state.load = Inertia.of(link, state.turn).momentum(state.twist)
 
         tree.visit(on, i, through)
 
     tree.each(on, moving)
 
     def one(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
-        twist = tree.states[i].twist
-        if not joint.backward:
-            rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
-            twist = sub(twist, combine(joint.basis, rate)) if joint.dim else twist
-        for j, value in enumerate(force):
-            unit: list[Real] = [float(j == k) for k in range(joint.dim)]
-            axis = combine(joint.basis, rate_inside(on, joint, link, q, unit))
+        state = tree.states[i]
+        twist = state.twist
+        if joint.dim and not joint.backward:
+            twist = sub(twist, moved_by(joint, link, state, [r[link.r_at + k] for k in range(joint.dim)]))
+        for j, (axis, value) in enumerate(zip(axes_of(joint, link, state), force, strict=True)):
             p[link.r_at + j] = value
             g[link.r_at + j] = g[link.r_at + j] + dot(load, bracket(twist, axis))
 
-    gather(on, tree, q, one)
+    gather(on, tree, one)
     armatures(on, tree, r, p)
 
 
-def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> None:
+def masses(on: Evaluator, tree: Tree, unit: Vector, mass: Matrix) -> None:
     """The mass matrix (n, n), where `outward` has been; ``unit`` (n,) is memory."""
 
     def clear(k: Integer) -> None:
@@ -146,7 +142,7 @@ def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> 
 
     def column(k: Integer) -> None:
         unit[k] = 1.0
-        spread(on, tree, q, unit)
+        spread(on, tree, unit)
         unit[k] = 0.0
         _accelerated(on, tree, alone=True)
 
@@ -154,7 +150,7 @@ def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> 
             for j, value in enumerate(force):
                 mass[k, link.r_at + j] = value
 
-        gather(on, tree, q, take)
+        gather(on, tree, take)
         unit[k] = 1.0
         armatures(on, tree, unit, mass.row(k))
         unit[k] = 0.0
@@ -164,7 +160,7 @@ def masses(on: Evaluator, tree: Tree, q: Vector, unit: Vector, mass: Matrix) -> 
 
 
 def row_of_covector(
-    on: Evaluator, tree: Tree, q: Vector, link: Integer, seen: Sequence[int], covector: list[Real], row: Vector,
+    on: Evaluator, tree: Tree, link: Integer, seen: Sequence[int], covector: list[Real], row: Vector,
     count: Callable[[Integer, Real], None],
 ) -> None:  # fmt: skip
     """Add a covector on a link's twist to a row on the rates.
@@ -193,4 +189,4 @@ def row_of_covector(
 
     on.loop(tree.size, clear)
     on.when(link >= 0, put)
-    gather(on, tree, q, take)
+    gather(on, tree, take)

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from ephs.mechanics.tree.sweeps import charts, cuts
-from ephs.mechanics.tree.sweeps.charts import Chart, Kind
-from ephs.mechanics.tree.sweeps.cuts import Cut
+from ephs.mechanics.road import charts, cuts
+from ephs.mechanics.road.charts import Chart, Kind
+from ephs.mechanics.road.cuts import Cut
 from ephs.semantics.spaces import codes
 from ephs.semantics.stage import (
     Entry,
@@ -32,17 +32,19 @@ def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
 
 NO_REALS: Final = ArrayReals(np.zeros(0))
 JOINT: Final[dict[str, Any]] = {"cut": indices(), "numbers": vector(), "motions": matrix(cuts.Relative.real_width)}
+PLACED: Final[dict[str, Any]] = {
+    "cut": indices(), "numbers": vector(), "places": matrix(), "motions": JOINT["motions"],
+}  # fmt: skip
 VALUE: Final = matrix(4)
 ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "rows": {
-        "cut": indices(), "numbers": vector(), "places": matrix(cuts.Place.real_width), "motions": JOINT["motions"],
-        "end": indices(), "value": VALUE, "covector": matrix(6),
+        **PLACED, "end": indices(), "value": VALUE, "covector": matrix(6),
     },
-    "poses": JOINT,
+    "poses": PLACED,
     "fit": {**JOINT, "q": vector()},
     "gaps": {**JOINT, "q": vector(), "value": VALUE, "worst": vector(1)},
     "relative_rates": {**JOINT, "value": VALUE},
-    "across": {**JOINT, "change": matrix(6), "value": VALUE},
+    "across": {**PLACED, "value": VALUE},
     "advance": {"chart": indices(), "base": vector(), "v": vector(), "q": vector()},
     "move": {"chart": indices(), "v": vector(), "q": vector()},
     "velocities": {"chart": indices(), **JOINT, "v": vector(), "r": vector(), "out": vector()},

@@ -1,4 +1,4 @@
-"""Loops closed on the way inwards: constraint rows eliminated in the order of `ephs.mechanics.tree.engine.closing`.
+"""Loops closed on the way inwards: constraint rows eliminated in the order of `ephs.mechanics.road.elimination`.
 
 A row K of a constraint is a covector on a link's acceleration, so that K μ is the wrench with which the multiplier μ
 pushes the link. Passing a joint takes the row's part along the joint out of it, which leaves Sᵀ K, couples it to the
@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.tree.sweeps.needs import LaidOut, Layout
-from ephs.mechanics.tree.sweeps.records import Joint, Link, State, Tree
-from ephs.semantics.spaces.se3 import wrench_outward
+from ephs.mechanics.road.needs import LaidOut, Layout
+from ephs.mechanics.road.records import Joint, Link, State, Tree
+from ephs.mechanics.road.tree import axes_of, shift_back
 from ephs.semantics.spaces.vectors import add, apply, combine, dot, scale, sub, symmetric
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 
@@ -27,7 +27,7 @@ class Rows:
     Attributes
     ----------
     at, slot, row, flat
-        As in `ephs.mechanics.tree.engine.closing.Closing`, row by row.
+        As in `ephs.mechanics.road.elimination.Closing`, row by row.
     value
         (rows, 4): target, multiplier, size before elimination, pivot.
     entry
@@ -155,11 +155,12 @@ def carry(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
         pair = on.counter(rows.at[4 * i + 3])
         first, last = rows.ended(i), rows.last(i)
         free = joint.dim and not joint.driven
+        axes = axes_of(joint, link, state) if free else []
 
         def one(s: Integer) -> None:
             a, k = rows.slot[2 * s], rows.at_slot(s)
             if free:
-                part = [dot(column, k) for column in joint.basis]
+                part = [dot(axis, k) for axis in axes]
                 inverse = symmetric(state.inverse[: joint.dim * (joint.dim + 1) // 2])
                 for j, (x, y) in enumerate(zip(part, apply(inverse, part), strict=True)):
                     rows.along[s, j], rows.along[s, 6 + j] = x, y
@@ -171,9 +172,10 @@ def carry(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
                     pair.value = pair.value + 1
 
                 on.loop(s + 1, couple, start=first)
-                k = sub(k, combine(state.gain[: joint.dim], part))
-                k = [0.0 if x in joint.units else value for x, value in enumerate(k)]
-            rows.grow(rows.slot[2 * s + 1], wrench_outward(state.rotation, state.place, k))
+                units = tree.units(joint)
+                rest = sub(k, combine(state.gain[: joint.dim], part))
+                k = [0.0 if x in units else value for x, value in enumerate(rest)]
+            rows.grow(rows.slot[2 * s + 1], shift_back(k, state.down))
 
         on.loop(last, one, start=first)
 

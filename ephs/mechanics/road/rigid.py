@@ -9,23 +9,16 @@ left of the rates has no momenta.
 from collections.abc import Sequence
 from typing import Final
 
-from ephs.mechanics.tree.sweeps.joints import frame, rate_inside, rate_outside
-from ephs.mechanics.tree.sweeps.outward import momentum
-from ephs.mechanics.tree.sweeps.records import Joint, Link, Tree
-from ephs.semantics.spaces.se3 import cobracket, twist_inward, wrench_outward
+from ephs.mechanics.road.records import Joint, Link, State, Tree
+from ephs.mechanics.road.tree import Inertia, outward, rates_of, shift, shift_back
+from ephs.semantics.spaces.se3 import cobracket
 from ephs.semantics.spaces.vectors import (
     Entries,
     Rows,
-    add,
     apply,
     apply_transposed,
-    combine,
-    cross,
     dot,
-    product,
-    scale,
     sub,
-    symmetric,
     transposed,
 )
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Vector
@@ -51,7 +44,7 @@ def rigid(
 ) -> None:
     """Change the rates by rigid motions of islands, so that their momenta are as ``target`` says.
 
-    Of the memory, frames become those in the ground's frame, and twists those of r at q.
+    The memory is that of `outward`; what `inward` found of joints stays.
 
     Parameters
     ----------
@@ -71,16 +64,14 @@ def rigid(
     along
         Entries of twists that are not known to be zero: N has no more columns than these.
     """
-    ground = tree.states[tree.size]
-    ground.rotation, ground.place = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0] * 3
-    ground.twist = [0.0] * 6
+    outward(on, tree, q, r)
 
     def empty(k: Integer) -> None:
         for j in range(SUMS):
             sums[k, j] = 0.0
 
     def one(i: Integer) -> None:
-        tree.visit(on, i, lambda joint, link: _add(on, tree, i, joint, link, q, r, island, sums))
+        tree.visit(on, i, lambda joint, link: _add(on, tree.states[i], link, island[i], sums))
 
     def each(k: Integer) -> None:
         _solve(on, k, bases, target, sums, momenta, torque, along)
@@ -89,9 +80,8 @@ def rigid(
         def through(joint: Joint, link: Link) -> None:
             def root() -> None:
                 state, k = tree.states[i], island[i]
-                twist = twist_inward(state.rotation, state.place, [sums[k, j] for j in range(6)])
-                rho = [dot(column, twist) / dot(column, column) for column in joint.basis]
-                for j, x in enumerate(rate_outside(on, joint, link, q, rho)):
+                twist = shift([sums[k, j] for j in range(6)], state.at)
+                for j, x in enumerate(rates_of(joint, link, state, tree.states[tree.size], twist)):
                     r[link.r_at + j] = r[link.r_at + j] + x
 
             on.when(on.both(on.same(link.parent, tree.size), island[i] >= 0), root)
@@ -104,38 +94,16 @@ def rigid(
     tree.each(on, turn)
 
 
-def _add(
-    on: Evaluator, tree: Tree, i: Integer, joint: Joint, link: Link, q: Vector, r: Vector, island: Integers,
-    sums: Matrix,
-) -> None:  # fmt: skip
-    """Place a link, and add it to its island."""
-    state, parent = tree.states[i], tree.states[link.parent]
-    rotation, place = frame(on, joint, link, q)
-    rate = rate_inside(on, joint, link, q, [r[link.r_at + k] for k in range(joint.dim)])
-    along = combine(joint.basis, rate) if joint.dim else [0.0] * 6
-    twist = add(twist_inward(rotation, place, parent.twist), along)
-    around = parent.rotation
-    place = add(parent.place, apply(around, place))
-    rotation = product(around, rotation)
-    state.rotation, state.place, state.twist = rotation, place, twist
+def _add(on: Evaluator, state: State, link: Link, k: Integer, sums: Matrix) -> None:
+    """Add a link to its island, number k."""
 
     def count() -> None:
-        k, moment = island[i], apply(rotation, link.moment)
-        first = add(scale(link.mass, place), moment)
-        turning = product(product(rotation, symmetric(link.inertia)), transposed(rotation))
-        # parallel axes: J + 2 (p·c) 1 − p cᵀ − c pᵀ + m (p·p 1 − p pᵀ), with the first moments c in the link's frame
-        both = add(scale(link.mass, place), scale(2.0, moment))
-        size = dot(place, both)
-        inertia = [
-            turning[a][b] + (size if a == b else 0.0) - 0.5 * (place[a] * both[b] + both[a] * place[b])
-            for a in range(3)
-            for b in range(a, 3)
-        ]
-        carried = wrench_outward(rotation, place, momentum(link, twist))
-        for j, x in enumerate([link.mass, *first, *inertia, *carried]):
+        own = Inertia.of(link, state.turn)
+        carried = shift_back(own.momentum(state.twist), state.at)
+        for j, x in enumerate([*own.about(state.at).numbers, *carried]):
             sums[k, j] = sums[k, j] + x
 
-    on.when(island[i] >= 0, count)
+    on.when(k >= 0, count)
 
 
 def _solve(
@@ -145,23 +113,16 @@ def _solve(
     """Put the rigid twist that is missing into the first six of an island's sums; write its momenta and torque."""
     count = len(along)
     basis = [[bases[36 * k + (6 * a + b)] if a in along else 0.0 for b in range(count)] for a in range(6)]
-    mass, first = sums[k, 0], [sums[k, j] for j in range(1, 4)]
-    inertia = symmetric([sums[k, j] for j in range(4, 10)])
-
-    def carried(u: Entries) -> list[Real]:
-        turning, moving = u[:3], u[3:]
-        angular = add(apply(inertia, turning), cross(first, moving))
-        return [*angular, *sub(scale(mass, moving), cross(first, turning))]
-
+    whole = Inertia(sums[k, 0], [sums[k, j] for j in range(1, 4)], [sums[k, j] for j in range(4, 10)])
     columns = transposed(basis)
-    images = [carried(column) for column in columns]
+    images = [whole.momentum(column) for column in columns]
     held = [[dot(columns[a], images[b]) for b in range(count)] for a in range(count)]
     found = apply_transposed(basis, [sums[k, 10 + j] for j in range(6)])
     wanted = [target[6 * k + j] for j in range(count)]
     factors = _factors(on, held)
     missing = apply(basis, _solved(factors, sub(wanted, found)))
-    whole = apply(basis, _solved(factors, wanted))
-    for j, x in enumerate(apply_transposed(basis, cobracket(whole, carried(whole)))):
+    moving = apply(basis, _solved(factors, wanted))
+    for j, x in enumerate(apply_transposed(basis, cobracket(moving, whole.momentum(moving)))):
         torque[6 * k + j] = x
     for j, x in enumerate(found):
         momenta[6 * k + j] = x

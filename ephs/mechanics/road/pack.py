@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.tree.sweeps.records import Joint, Link
+from ephs.mechanics.road.records import Joint, Link
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import codes, pair
 from ephs.semantics.stage import Table

@@ -2,22 +2,26 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from typing import Any, Final, final
 
-from ephs.mechanics.tree.sweeps import closing
-from ephs.mechanics.tree.sweeps.accelerations import Force, accelerate_outward, accelerations, no_force
-from ephs.mechanics.tree.sweeps.closing import Rows
-from ephs.mechanics.tree.sweeps.cuts import Place, show_place
-from ephs.mechanics.tree.sweeps.energy import energy
-from ephs.mechanics.tree.sweeps.inward import inward, load_inward
-from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
-from ephs.mechanics.tree.sweeps.outward import outward
-from ephs.mechanics.tree.sweeps.pack import SLIDE, TURN, Class
-from ephs.mechanics.tree.sweeps.records import Link, State, States, Tree
-from ephs.mechanics.tree.sweeps.rigid import SUMS, rigid
-from ephs.mechanics.tree.sweeps.spreading import axes, driven_power, spread
+from ephs.mechanics.road import rows as closing
+from ephs.mechanics.road.linear import (
+    Force,
+    accelerate_outward,
+    accelerations,
+    driven_power,
+    inward,
+    load_inward,
+    no_force,
+)
+from ephs.mechanics.road.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
+from ephs.mechanics.road.pack import SLIDE, TURN, Class
+from ephs.mechanics.road.records import Link, Place, State, States, Tree
+from ephs.mechanics.road.rigid import SUMS, rigid
+from ephs.mechanics.road.rows import Rows
+from ephs.mechanics.road.tree import axes, energy, outward, spread
 from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.stage import (
     Entry,
@@ -70,16 +74,16 @@ ROWS: Final[dict[str, Any]] = {
     "at": indices(), "slot": indices(), "row": indices(), "flat": indices(), "value": matrix(4), "entry": vector(),
     "covector": matrix(6), "along": matrix(12),
 }  # fmt: skip
-"""The rows of its loops: see `ephs.mechanics.tree.sweeps.closing.Rows`."""
+"""The rows of its loops: see `ephs.mechanics.road.rows.Rows`."""
 ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
-    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector(), "places": matrix(Place.real_width)},
-    "fold": {**MECHANISM, **ROWS, "q": vector(), "force": vector(), "wrench": matrix(6)},
-    "unfold": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
-    "resolve": {**MECHANISM, **ROWS, "q": vector(), "rate": vector(), "change": matrix(6)},
-    "spread": {**MECHANISM, "q": vector(), "x": vector(), "change": matrix(6)},
-    "axes": {**MECHANISM, "q": vector(), "columns": matrix(6)},
-    "power": {**MECHANISM, **ROWS, "q": vector(), "r": vector(), "force": vector(), "out": vector()},
+    "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector()},
+    "fold": {**MECHANISM, **ROWS, "force": vector(), "wrench": matrix(6)},
+    "unfold": {**MECHANISM, **ROWS, "rate": vector()},
+    "resolve": {**MECHANISM, **ROWS, "rate": vector()},
+    "spread": {**MECHANISM, "x": vector()},
+    "axes": {**MECHANISM, "columns": matrix(6)},
+    "power": {**MECHANISM, **ROWS, "r": vector(), "force": vector(), "out": vector()},
     "dependent": {**ROWS, "largest": vector()},
     "energy": {**MECHANISM, "q": vector(), "r": vector(), "momenta": matrix(6), "spin": vector(), "out": vector(3)},
     "rigid": {
@@ -115,7 +119,7 @@ class Sweeps:
     made_of
         The arguments.
     width
-        Numbers of memory that a link takes; the ground takes as many.
+        Numbers of memory that a link takes; the ground takes as many. If ``general``, each row begins with `Place`.
     program
         Entry functions for mechanisms with loops, wrenches on links or prescribed motions, or for trees on which
         nothing but gravity and forces on the rates act.
@@ -133,8 +137,9 @@ class Sweeps:
         self._states: States | None = None
         entries = others(self) if others is not None else self._general() if general else self._free()
         self._layout: Layout | None = None
+        shared = Place.real_width if general else 0
         constants, columns = known(
-            ("layout", self), lambda: layout_of(State.real_width, lambda survey: self._survey(survey, entries)).pairs
+            ("layout", self), lambda: layout_of(State.real_width, partial(self._survey, entries), shared).pairs
         )
         self._layout = Layout(dict(constants), dict(columns))
         self.width = self._layout.width
@@ -150,7 +155,7 @@ class Sweeps:
             "tangents", accelerations=entry.tangent("memory", "q", "r", "force", "rate", directions=directions)
         )
 
-    def _survey(self, survey: Survey, entries: dict[str, Entry]) -> None:
+    def _survey(self, entries: dict[str, Entry], survey: Survey) -> None:
         self._states = _Whole(survey.memory())
         for entry in entries.values():
             survey.returned(entry.function(survey, *(survey.argument(kind) for kind in entry.kinds.values())))
@@ -162,7 +167,10 @@ class Sweeps:
         if states is None:
             assert self._layout is not None
             states = Compact(State, self._layout, memory)
-        return Tree(self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, pull)
+        return Tree(
+            self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, pull,
+            self._class.planar,
+        )  # fmt: skip
 
     def _rows(
         self, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
@@ -212,16 +220,7 @@ class Sweeps:
     # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
 
     def _general(self) -> dict[str, Entry]:
-        def move(on: Evaluator, tree: Tree, q: Vector, r: Vector, lead: Vector, places: Matrix) -> None:
-            outward(on, tree, q, r, lead)
-
-            def show(i: Integer) -> None:
-                state = tree.states[i]
-                show_place(places, i, state, state.bias)
-
-            on.loop(tree.size + 1, show)
-
-        def fold(on: Evaluator, tree: Tree, rows: Rows, q: Vector, force: Vector, wrench: Matrix) -> Integer:
+        def fold(on: Evaluator, tree: Tree, rows: Rows, force: Vector, wrench: Matrix) -> Integer:
             fault = on.counter(0)
 
             def one(i: Integer) -> None:
@@ -230,7 +229,7 @@ class Sweeps:
                 closing.eliminate(on, rows, i, state)
                 closing.eliminate_load(on, rows, i, state)
                 inward(on, tree, i, fault)
-                load_inward(on, tree, q, _given_force(force), i)
+                load_inward(on, tree, _given_force(force), i)
                 closing.carry(on, tree, rows, i)
                 closing.carry_load(on, tree, rows, i)
 
@@ -239,55 +238,42 @@ class Sweeps:
             closing.eliminate_load(on, rows, tree.size, None)
             return fault.value
 
-        def outwards(on: Evaluator, tree: Tree, rows: Rows, q: Vector, rate: Vector, change: Matrix) -> None:
+        def outwards(on: Evaluator, tree: Tree, rows: Rows, rate: Vector) -> None:
             closing.multipliers(on, rows, tree.size, None)
 
             def one(i: Integer) -> None:
                 closing.push(on, tree, rows, i)
-                accelerate_outward(on, tree, q, rate, i)
+                accelerate_outward(on, tree, rate, i)
                 closing.multipliers(on, rows, i, tree.states[i])
 
             tree.each(on, one)
-            _show_changes(on, tree, change)
 
-        def resolve(on: Evaluator, tree: Tree, rows: Rows, q: Vector, rate: Vector, change: Matrix) -> None:
+        def resolve(on: Evaluator, tree: Tree, rows: Rows, rate: Vector) -> None:
             def unloaded(i: Integer) -> None:
                 tree.states[i].load = [0.0] * 6
 
             def one(i: Integer) -> None:
                 closing.eliminate_load(on, rows, i, tree.states[i])
-                load_inward(on, tree, q, no_force, i)
+                load_inward(on, tree, no_force, i)
                 closing.carry_load(on, tree, rows, i)
 
             on.loop(tree.size, unloaded)
             tree.each(on, one, down=True)
             closing.eliminate_load(on, rows, tree.size, None)
-            outwards(on, tree, rows, q, rate, change)
+            outwards(on, tree, rows, rate)
 
-        def spread_out(on: Evaluator, tree: Tree, q: Vector, x: Vector, change: Matrix) -> None:
-            spread(on, tree, q, x)
-            _show_changes(on, tree, change)
-
-        def power(on: Evaluator, tree: Tree, rows: Rows, q: Vector, r: Vector, force: Vector, out: Vector) -> None:
-            out[0] = driven_power(on, tree, rows, q, r, force)
+        def power(on: Evaluator, tree: Tree, rows: Rows, r: Vector, force: Vector, out: Vector) -> None:
+            out[0] = driven_power(on, tree, rows, r, force)
 
         def dependent(on: Evaluator, rows: Rows, largest: Vector) -> Integer:
             return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
 
         functions: dict[str, Callable[..., Any]] = {
-            "move": move, "fold": fold, "unfold": outwards, "resolve": resolve, "spread": spread_out, "axes": axes,
+            "move": outward, "fold": fold, "unfold": outwards, "resolve": resolve, "spread": spread, "axes": axes,
             "power": power, "dependent": dependent,
         }  # fmt: skip
         entries = {name: self.entry(function, ARGUMENTS[name]) for name, function in functions.items()}
         return entries | self._kept()
-
-
-def _show_changes(on: Evaluator, tree: Tree, change: Matrix) -> None:
-    def show(i: Integer) -> None:
-        for k, x in enumerate(tree.states[i].change):
-            change[i, k] = x
-
-    on.loop(tree.size, show)
 
 
 def _given_force(force: Vector) -> Force:

@@ -32,7 +32,8 @@ class Layout:
     constants
         Offset of a field's entry in the record -> its value in all rows.
     columns
-        Offset -> column of a matrix with as many rows; entries in neither mapping affect nothing.
+        Offset -> column of a matrix with as many rows, which holds constants where others read them, too; entries in
+        neither mapping affect nothing.
     """
 
     constants: Mapping[int, float]
@@ -60,8 +61,9 @@ class LaidOut(RealCells):
 
     def load(self, index: Integer) -> Real:
         assert isinstance(index, int)
-        column = self.layout.columns.get(index)
-        return self.layout.constants.get(index, 0.0) if column is None else self.cells.load(self.start + column)
+        if index in self.layout.constants or index not in self.layout.columns:
+            return self.layout.constants.get(index, 0.0)
+        return self.cells.load(self.start + self.layout.columns[index])
 
     def store(self, index: Integer, value: Real) -> None:
         assert isinstance(index, int)
@@ -351,19 +353,22 @@ class Survey(Evaluator):
         return function(on, *arguments)
 
 
-def layout_of(width: int, run: Callable[[Survey], None]) -> Layout:
+def layout_of(width: int, run: Callable[[Survey], None], shared: int = 0) -> Layout:
     """The layout of a record with so many entries that a program needs.
 
-    run(survey) evaluates all its entry functions, with ``survey.memory()`` as the record's numbers.
+    run(survey) evaluates all its entry functions, with ``survey.memory()`` as the record's numbers. The first entries,
+    ``shared`` of them, stay where they are, since others read them.
     """
     survey = Survey(width)
     while True:  # what is known of an entry changes twice at most: nothing, one constant, any number
         survey.begin()
         survey.entries.follows, survey.entries.live = {}, 0
         run(survey)
+        memory = survey.memory()
+        survey.returned([memory.load(k) for k in range(shared)])
         if survey.entries.settled():
             break
     found, needed = survey.entries.assumed, survey.entries.needed()
-    varying = [k for k in range(width) if found.get(k, 0.0) is None and needed >> k & 1]
+    varying = [k for k in range(shared, width) if found.get(k, 0.0) is None and needed >> k & 1]
     constants = {k: value for k, value in found.items() if k < width and value is not None}
-    return Layout(constants, {k: column for column, k in enumerate(varying)})
+    return Layout(constants, {k: column for column, k in enumerate([*range(shared), *varying])})

@@ -1,7 +1,8 @@
 """Joints at which loops are cut, and gears: their relative motion, the rows that close them, how far they are open.
 
 A cut joint lets twists B r pass in its second frame; a row n of the complement, n·B = 0, forbids one. With the twists
-u₁, u₂ of both links in that frame and the relative one u = u₂ − u₁, its acceleration is u̇₂ − u̇₁ + [u, u₁].
+u₁, u₂ of both links in that frame and the relative one u = u₂ − u₁, its acceleration is u̇₂ − u̇₁ + [u, u₁]. In world
+axes the row is one covector, of opposite signs, for both its links.
 
 A gear forbids Σ gᵢ rᵢ ≠ 0 of the rates of some joints. It is one row, to which each of its joints adds gᵢ (BᵢᵀBᵢ)⁻¹Bᵢᵀ
 in its own second frame: a cut joint without degrees of freedom, whose element is that of the joint, and which is open
@@ -10,12 +11,26 @@ where the element is not the one at which the gear meshes.
 
 from collections.abc import Callable
 
-from ephs.mechanics.tree.sweeps.charts import TIE, Chart, Kind, of_joints, visit_kind
-from ephs.mechanics.tree.sweeps.needs import NO_INTEGERS
-from ephs.mechanics.tree.sweeps.records import State
+from ephs.mechanics.road.charts import TIE, Chart, Kind, of_joints, visit_kind
+from ephs.mechanics.road.needs import NO_INTEGERS
+from ephs.mechanics.road.records import Place
+from ephs.mechanics.road.tree import shift, shift_back, turned
 from ephs.semantics.spaces import codes, se3, so3
+from ephs.semantics.spaces.se3 import bracket
 from ephs.semantics.spaces.staged_groups import STAGED
-from ephs.semantics.spaces.vectors import add, apply, apply_transposed, combine, dot, product, scale, sub, transposed
+from ephs.semantics.spaces.vectors import (
+    Entries,
+    Rows,
+    add,
+    apply,
+    apply_transposed,
+    combine,
+    dot,
+    product,
+    scale,
+    sub,
+    transposed,
+)
 from ephs.semantics.stage import (
     Evaluator,
     Integer,
@@ -79,17 +94,8 @@ class Cut(Record):
     start = real()
 
 
-class Place(Record):
-    """A link in the world: frame, twist, and acceleration at ṙ = 0 in its own axes."""
-
-    turn = reals(3, 3)
-    at = reals(3)
-    twist = reals(6)
-    bias = reals(6)
-
-
 class Relative(Record):
-    """Motion of a cut joint's second frame: pose in its first frame, frame in the first link, relative twist.
+    """Motion of a cut joint's second frame: pose in its first frame, frame in the world, relative twist in its axes.
 
     ``change`` is the twist's derivative at the accelerations that the links' places have.
     """
@@ -99,12 +105,6 @@ class Relative(Record):
     at = reals(3)
     twist = reals(6)
     change = reals(6)
-
-
-def show_place(places: Matrix, i: Integer, state: State, bias: list[Real]) -> None:
-    """Write where a link is and how it moves to its row."""
-    row = Place(NO_INTEGERS, 0, places.cells, places.start + i * places.columns)
-    row.turn, row.at, row.twist, row.bias = state.turn, state.at, state.twist, bias
 
 
 def place_of(on: Evaluator, places: Matrix, link: Integer) -> Place:
@@ -118,11 +118,20 @@ def motion_of(motion: Matrix, i: Integer) -> Relative:
     return Relative(NO_INTEGERS, 0, motion.cells, motion.start + i * motion.columns)
 
 
-def between(near: Place, far: Place, turn: list[list[Real]], at: list[Real]) -> tuple[list[list[Real]], list[Real]]:
-    """A frame of the far link, given in it, as the near link has it."""
-    back = transposed(near.turn)
-    there = apply(back, add(sub(far.at, near.at), apply(far.turn, at)))
-    return product(back, product(far.turn, turn)), there
+def frame_on(place: Place, turn: Rows, at: Entries) -> tuple[Rows, list[Real]]:
+    """A frame in the world, given in that of a link."""
+    return product(place.turn, turn), add(place.at, apply(place.turn, at))
+
+
+def pose_of(on: Evaluator, first: tuple[Rows, Entries], second: tuple[Rows, Entries]) -> list[Real]:
+    """The pose (7,) of a frame in another one, of which the world's axes are known."""
+    turn = product(transposed(first[0]), second[0])
+    return [*so3.quaternion(on, turn), *apply_transposed(first[0], sub(second[1], first[1]))]
+
+
+def twist_of(near: Place, far: Place, turn: Rows, at: Entries) -> list[Real]:
+    """The far link's twist relative to the near one, in the axes of a frame in the world."""
+    return turned(transposed(turn), sub(shift(far.twist, sub(at, far.at)), shift(near.twist, sub(at, near.at))))
 
 
 def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, Integer, list[Real]], None]) -> None:
@@ -172,7 +181,7 @@ def rows(
     Parameters
     ----------
     places
-        (links + 1, 24): `Place` of each link and the ground.
+        (links + 1, …): rows of links and the ground that begin with `Place`.
     motions
         (cuts, 31): receives `Relative`, but for poses.
     end
@@ -188,20 +197,20 @@ def rows(
     def one(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
         near, far = place_of(on, places, cut.first), place_of(on, places, cut.second)
-        outer_turn, outer_at = cut.outer_turn, cut.outer_at
-        turn, at = between(near, far, outer_turn, outer_at)
+        turn, at = frame_on(far, cut.outer_turn, cut.outer_at)
         motion.turn, motion.at = turn, at
-        first = se3.twist_inward(turn, at, near.twist)
-        twist = sub(se3.twist_inward(outer_turn, outer_at, far.twist), first)
-        motion.twist = twist
-        bias = sub(se3.twist_inward(outer_turn, outer_at, far.bias), se3.twist_inward(turn, at, near.bias))
-        total = add(se3.bracket(twist, first), bias)
-        motion.change = total
+        before, beyond, inside = sub(at, near.at), sub(at, far.at), transposed(turn)
+        first = shift(near.twist, before)
+        twist = sub(shift(far.twist, beyond), first)
+        bias = sub(shift(add(far.bias, far.change), beyond), shift(add(near.bias, near.change), before))
+        total = turned(inside, add(bracket(twist, first), bias))
+        motion.twist, motion.change = turned(inside, twist), total
 
         def row(a: Integer, e: Integer, normal: list[Real]) -> None:
             value[a, 0] = value[a, 0] - dot(normal, total)
-            grow(end[e + 1], se3.wrench_outward(outer_turn, outer_at, normal))
-            grow(end[e], scale(-1.0, se3.wrench_outward(turn, at, normal)))
+            covector = turned(turn, normal)
+            grow(end[e + 1], shift_back(covector, beyond))
+            grow(end[e], scale(-1.0, shift_back(covector, before)))
 
         _each_row(on, cut, row)
 
@@ -209,14 +218,13 @@ def rows(
     on.loop(cuts.size, one)
 
 
-def poses(on: Evaluator, cuts: Table[Cut], motions: Matrix) -> None:
+def poses(on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix) -> None:
     """Write poses of second frames in first ones, where `rows` has been."""
 
     def one(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
-        inner = cut.inner_turn
-        turn = product(transposed(inner), motion.turn)
-        motion.pose = [*so3.quaternion(on, turn), *apply_transposed(inner, sub(motion.at, cut.inner_at))]
+        inner = frame_on(place_of(on, places, cut.first), cut.inner_turn, cut.inner_at)
+        motion.pose = pose_of(on, inner, (motion.turn, motion.at))
 
     on.loop(cuts.size, one)
 
@@ -287,17 +295,17 @@ def relative_rates(on: Evaluator, cuts: Table[Cut], motions: Matrix, value: Matr
     on.loop(cuts.size, one)
 
 
-def across(on: Evaluator, cuts: Table[Cut], motions: Matrix, change: Matrix, value: Matrix) -> None:
-    """Write targets that take changes of links' twists (links, 6) back across the constraints."""
+def across(on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix, value: Matrix) -> None:
+    """Write targets that take the links' accelerations, as changes of their twists, back across the constraints."""
 
-    def of(link: Integer) -> list[Real]:
-        row, there = on.select(link < 0, 0, link), link >= 0
-        return [on.select(there, change[row, k], 0.0) for k in range(6)]
+    def change(link: Integer, at: Entries) -> list[Real]:
+        place = place_of(on, places, link)
+        return shift(place.change, sub(at, place.at))
 
     def one(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
-        near = se3.twist_inward(motion.turn, motion.at, of(cut.first))
-        moved = sub(se3.twist_inward(cut.outer_turn, cut.outer_at, of(cut.second)), near)
+        at = motion.at
+        moved = turned(transposed(motion.turn), sub(change(cut.second, at), change(cut.first, at)))
 
         def row(a: Integer, e: Integer, normal: list[Real]) -> None:
             value[a, 0] = value[a, 0] - dot(normal, moved)

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.tree.sweeps import cuts
-from ephs.mechanics.tree.sweeps.cuts import Cut, Relative
-from ephs.mechanics.tree.sweeps.records import Tree
+from ephs.mechanics.road import cuts
+from ephs.mechanics.road.cuts import Cut, Relative
+from ephs.mechanics.road.records import Tree
 from ephs.semantics.spaces.vectors import add, dot, scale
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Table, Vector
 
@@ -19,7 +19,7 @@ class Closures:
     Attributes
     ----------
     places
-        (links + 1, 24): places of links and the ground, with their accelerations where `cuts.Place` has biases.
+        (links + 1, …): rows of links and the ground that begin with `Place`.
     motions
         (cuts, 31): see `cuts.Relative`.
     end
@@ -37,21 +37,16 @@ class Closures:
     value: Matrix
     covector: Matrix
 
-    def place(self, on: Evaluator, tree: Tree) -> None:
-        """Write the places of links, and the motions and rows of cut joints."""
-
-        def show(i: Integer) -> None:
-            state = tree.states[i]
-            cuts.show_place(self.places, i, state, add(state.bias, state.change))
+    def place(self, on: Evaluator) -> None:
+        """Write the motions and rows of cut joints at the links' accelerations."""
 
         def clear(e: Integer) -> None:
             for k in range(6):
                 self.covector[e, k] = 0.0
 
-        on.loop(tree.size + 1, show)
         on.loop(self.covector.rows, clear)
         cuts.rows(on, self.cuts, self.places, self.motions, self.end, self.value, self.covector)
-        cuts.poses(on, self.cuts, self.motions)
+        cuts.poses(on, self.cuts, self.places, self.motions)
 
     def each_row(self, on: Evaluator, body: Callable[[Cut, Integer, Integer], None]) -> None:
         """Call body(joint, row, place of its first end) for all rows."""
