@@ -1,5 +1,6 @@
 """What a scene's elements declare of their numbers and names is all that there is of them."""
 
+import json
 from dataclasses import fields
 from pathlib import Path
 
@@ -89,3 +90,14 @@ def test_numbers_have_the_units_that_physics_gives_them():
     for key, value in expected.items():
         np.testing.assert_allclose(unit[key], value, rtol=1e-14)
     np.testing.assert_allclose(unit["bodies", "twist"] * 7.0, [1.0] * 3 + [3.0] * 3, rtol=1e-15)
+
+
+def test_springs_of_older_documents_name_each_end():
+    before = scene_to_text(ephs.load(next(path for path in SCENES if path.stem == "screw-press")))
+    data = json.loads(before)
+    for spring in data["springs"].values():
+        spring["body1"], spring["body2"] = spring.pop("bodies")
+        for key in ("at1", "at2"):
+            spring[key] = {"shape": [3], "values": spring[key]}
+    assert data["springs"]
+    assert scene_to_text(scene_from_text(json.dumps(data))) == before
