@@ -1,6 +1,6 @@
 """Steps of the natural method as staged functions: Newton's method, and the loop over steps."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from itertools import chain
 from typing import Any, Final
@@ -19,6 +19,7 @@ from ephs.semantics.stage import (
     indices,
     integer,
     matrix,
+    real,
     vector,
 )
 from ephs.solve.methods.guesses import BEFORE, extrapolated, restrain
@@ -62,6 +63,14 @@ PATIENCE: Final = 12, 25
 SOLVED: Final = 4e-16
 STALLED: Final = 1e-11
 """Relative residuals that are small enough at once, and once they do not fall."""
+
+
+def _each(on: Evaluator, scheme: Scheme, body: Callable[[Integer], None]) -> None:
+    """Do something for each stage."""
+    if scheme.single:
+        body(0)
+    else:
+        on.loop(scheme.stages, body)
 
 
 def _known(on: Evaluator, values: Iterable[float]) -> Vector:
@@ -180,7 +189,7 @@ def newton(
     def move() -> None:
         solve(on, o.rows, o.columns, o.start, o.entry, o.diagonal, m.factors, right, change, dense)
         part.value = restrain(on, t, z, Matrix(change.cells, change.start, scheme.stages, n))
-        on.loop(scheme.stages, subtract)
+        _each(on, scheme, subtract)
         if not single:
             slow = on.either(part.value < 1.0, ratio.value > 0.1 * before.value)
             fresh.value = on.select(on.either(on.same(iteration.value, 0), slow), 1, 0)
@@ -248,7 +257,7 @@ def advance(
             guess[i, j] = each[0] - z[i, j]
 
     def stages(source: Matrix, out: Matrix) -> None:
-        on.loop(count, lambda i: copy(on, source.row(i), out.row(i)))
+        _each(on, scheme, lambda i: copy(on, source.row(i), out.row(i)))
 
     def again() -> Truth:
         newton(on, scheme, t, g, o, x, z, scal, still, inputs, m, s, outcome)
@@ -258,7 +267,7 @@ def advance(
             failed = on.either(outcome[0] >= COMPONENT, on.same(outcome[0], DIVERGED))
         once = on.both(failed, tries.value < 2)
         # once more from a safe guess: the last values at all stages
-        on.when(once, lambda: on.loop(count, lambda i: copy(on, last.row(count - 1), z.row(i))))
+        on.when(once, lambda: _each(on, scheme, lambda i: copy(on, last.row(count - 1), z.row(i))))
         return on.negate(once)
 
     def book(i: Integer) -> None:
@@ -271,7 +280,7 @@ def advance(
     def keep() -> None:
         row = outcome[2]
         least.value = 0.0
-        on.loop(count, book)
+        _each(on, scheme, book)
         settle(on, t, x, unit, whole, m.v)
         copy(on, x, states.row(row))
 
@@ -311,7 +320,10 @@ def natural_program(stages: int) -> Program:
         "ledgers": matrix(5), "outcome": indices(4), "steps": integer(),
     }  # fmt: skip
     entries = {"advance": Entry.bundled(advance, kinds, known)}
-    if not scheme.single:
+    if scheme.single:  # what is called from one place only would be inlined: steps would take 4 % longer
+        point = {"x": vector(), "z": vector(), "scal": vector(3), "inputs": vector()}
+        entries["evaluate"] = Entry(evaluated, t=TABLES, **point, m=MEMORY, weight=real())
+    else:
         kinds = {
             "t": TABLES, "g": GROUPS, "dropped": indices(), "x": vector(), "z": matrix(), **step, "m": MEMORY,
             "s": STAGE_MEMORY, "fresh": integer(),
