@@ -10,7 +10,15 @@ from typing import TypeAlias
 
 from ephs.mechanics.road.records import Joint, Link, State, Tree
 from ephs.mechanics.road.rows import MULTIPLIER, Rows
-from ephs.mechanics.road.tree import axes_of, moved_by, outward, shift, shift_back
+from ephs.mechanics.road.tree import (
+    forces_along,
+    freedoms_of,
+    moved_by,
+    outward,
+    rates_along,
+    shift,
+    shift_back,
+)
 from ephs.semantics.spaces import vectors
 from ephs.semantics.spaces.vectors import (
     Entries,
@@ -68,7 +76,7 @@ def _eliminated(
     on: Evaluator, tree: Tree, joint: Joint, link: Link, state: State, inertia: vectors.Rows
 ) -> tuple[vectors.Rows, Truth]:
     """I − U D⁻¹ Uᵀ, and whether D is positive definite; rows of freedoms that are entries of a twist are zero."""
-    axes = axes_of(joint, link, state)
+    axes = freedoms_of(joint, link, state)
     force = [apply(inertia, axis) for axis in axes]
     own = [link.armature if joint.armature else 0.0] * joint.dim
     met = [[dot(axis, f) + float(i == j) * own[i] for j, f in enumerate(force)] for i, axis in enumerate(axes)]
@@ -110,7 +118,7 @@ def load_inward(on: Evaluator, tree: Tree, force: Force, i: Integer) -> None:
         state = tree.states[i]
         load: Entries = state.load
         if joint.dim and not joint.driven:
-            axes, tau = axes_of(joint, link, state), force(i, joint, link)
+            axes, tau = freedoms_of(joint, link, state), forces_along(joint, link, state, force(i, joint, link))
             free = [t - dot(axis, load) for t, axis in zip(tau, axes, strict=True)]
             inverse = symmetric(state.inverse[: joint.dim * (joint.dim + 1) // 2])
             state.push = [*apply(inverse, free), *state.push[joint.dim :]]
@@ -138,7 +146,7 @@ def accelerate_outward(on: Evaluator, tree: Tree, rate: Vector, i: Integer) -> N
         rates: list[Real] = [0.0] * joint.dim
         if not joint.driven:
             gain, push = state.gain, state.push
-            rates = [push[j] - dot(gain[j], change) for j in range(joint.dim)]
+            rates = rates_along(joint, link, state, [push[j] - dot(gain[j], change) for j in range(joint.dim)])
         state.change = add(change, moved_by(joint, link, state, rates)) if joint.dim else change
         for j, value in enumerate(rates):
             rate[link.r_at + j] = value

@@ -136,6 +136,12 @@ class Joint:
         return len(self.basis)
 
     @property
+    def round(self) -> bool:
+        """It turns about its frame's origin and may move along, so that its freedoms are those of any other axes."""
+        units = tuple(tuple(float(i == j) for j in range(6)) for i in range(6))
+        return self.basis == units[:3] or (self.basis == units and not self.backward)
+
+    @property
     def revolute(self) -> bool:
         """It turns about z, and that is all."""
         return self.basis == ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),)
@@ -181,9 +187,11 @@ class Tree:
 
     def units(self, joint: Joint) -> dict[int, int]:
         """Entries of a twist that are degrees of freedom -> number of the degree of freedom, where that is known while
-        staging: a joint that turns about the plane's normal. None where rates have inertia.
+        staging: a joint that turns about the plane's normal, or about or along all axes. None where rates have inertia.
         """
-        return {2: 0} if self.planar and joint.revolute and not joint.armature else {}
+        if joint.armature:
+            return {}
+        return {k: k for k in range(joint.dim)} if joint.round else {2: 0} if self.planar and joint.revolute else {}
 
     def each(self, on: Evaluator, body: Callable[[Integer], None], *, down: bool = False) -> None:
         """Call body(i) for all links, parents first, or last; written out where their number is known."""

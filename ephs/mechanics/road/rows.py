@@ -11,7 +11,7 @@ from typing import final
 
 from ephs.mechanics.road.needs import LaidOut, Layout
 from ephs.mechanics.road.records import Joint, Link, State, Tree
-from ephs.mechanics.road.tree import axes_of, shift_back
+from ephs.mechanics.road.tree import freedoms_of, shift_back
 from ephs.semantics.spaces.vectors import add, apply, combine, dot, scale, sub, symmetric
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 
@@ -155,7 +155,7 @@ def carry(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
         pair = on.counter(rows.at[4 * i + 3])
         first, last = rows.ended(i), rows.last(i)
         free = joint.dim and not joint.driven
-        axes = axes_of(joint, link, state) if free else []
+        axes = freedoms_of(joint, link, state) if free else []
 
         def one(s: Integer) -> None:
             a, k = rows.slot[2 * s], rows.at_slot(s)

@@ -87,6 +87,27 @@ def axes_of(joint: Joint, link: Link, state: State) -> list[list[Real]]:
     return [scale(link.sense, turned(state.turn, column)) for column in joint.basis]
 
 
+def freedoms_of(joint: Joint, link: Link, state: State) -> list[list[Real]]:
+    """Twists (d, 6) that span those of a joint: units along world axes where its freedoms are those of any axes."""
+    if not joint.round or joint.armature:
+        return axes_of(joint, link, state)
+    return [[float(j == k) for k in range(6)] for j in range(joint.dim)]
+
+
+def rates_along(joint: Joint, link: Link, state: State, along: list[Real]) -> list[Real]:
+    """The rates (d,) of a joint, from those along `freedoms_of`."""
+    if not joint.round or joint.armature:
+        return along
+    return [dot(axis[: joint.dim], along) for axis in axes_of(joint, link, state)]
+
+
+def forces_along(joint: Joint, link: Link, state: State, force: list[Real]) -> list[Real]:
+    """Forces (d,) on the rates along `freedoms_of`, from those on the joint's rates."""
+    if not joint.round or joint.armature:
+        return force
+    return combine(axes_of(joint, link, state), force)[: joint.dim]
+
+
 def moved_by(joint: Joint, link: Link, state: State, rates: Entries) -> list[Real]:
     """The twist of a link that rates (d,) of its joint make."""
     if joint.backward:
