@@ -64,7 +64,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 
 types: $(VENV)/.installed-dev
-	$(BIN)/basedpyright
+	$(BIN)/basedpyright --threads $(CORES)
 
 fuzz: $(VENV)/.installed-dev
 	$(PYTEST) -n $(CORES) --hypothesis-profile=fuzz

@@ -28,7 +28,7 @@ class BodyLine:
 def lines_of(scene: Any) -> dict[str, BodyLine]:
     """The springs of a scene, the segments NAME-1, NAME-2, … of its tendons, and lines of its elements."""
     found = {
-        name: BodyLine(*s.bodies, np.array(s.at1), np.array(s.at2), s.heat, coiled=True)
+        name: BodyLine(s.bodies[0], s.bodies[1], np.array(s.at1), np.array(s.at2), s.heat, coiled=True)
         for name, s in scene.all_springs()
     }
     for name, tendon in scene.all_tendons():
