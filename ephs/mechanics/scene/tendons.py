@@ -79,11 +79,14 @@ class Tendon(Element, section="tendons", said="tendons through points of bodies"
 
     def build(self, site: Site) -> None:
         segments, warm = self.segments, site.heated(self.heat) if self.damping else {}
-        inside = sum(float(np.linalg.norm(np.subtract(q, p))) for (a, p), (b, q) in self._pieces() if a == b)
         made = tendon(
-            [(one[1], two[1]) for one, two in segments], self.stiffness, (self.length or 0.0) - inside, self.damping,
-            slack=self.slack, heat=bool(warm),
-        )  # fmt: skip
+            [(one[1], two[1]) for one, two in segments],
+            self.stiffness,
+            (self.length or 0.0) - self.inside,
+            self.damping,
+            slack=self.slack,
+            heat=bool(warm),
+        )
         start = {f"segment{k}.pe.q_r": site.between(*one, *two) for k, (one, two) in enumerate(segments, 1)}
         if self.stiffness:
             apart = ([site.in_world(*end) for end in ends] for ends in segments)
@@ -100,6 +103,11 @@ class Tendon(Element, section="tendons", said="tendons through points of bodies"
     def segments(self) -> list[tuple[_Spot, _Spot]]:
         """The (body, point) at both ends of each segment between two different bodies."""
         return [(one, two) for one, two in self._pieces() if one[0] != two[0]]
+
+    @property
+    def inside(self) -> float:
+        """Length of the pieces within bodies, m."""
+        return sum(float(np.linalg.norm(np.subtract(q, p))) for (a, p), (b, q) in self._pieces() if a == b)
 
     def _pieces(self) -> Iterator[tuple[_Spot, _Spot]]:
         return pairwise(zip(self.bodies, self.points, strict=True))
