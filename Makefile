@@ -5,8 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SCENE ?= slider-crank
 UNTIL ?= 5
-# What a group of tests makes once is made by one worker.
-PYTEST := $(BIN)/python -m pytest --dist loadgroup
+PYTEST := $(BIN)/python -m pytest
 CORES ?= 2
 COUNT ?= 100000
 SEED ?= 0

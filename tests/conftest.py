@@ -8,6 +8,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import importlib  # noqa: E402
 import pkgutil  # noqa: E402
+from typing import Any  # noqa: E402
 
 import pytest  # noqa: E402
 from hypothesis import HealthCheck, Phase, settings  # noqa: E402
@@ -39,6 +40,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if function_of(item.nodeid) in long:
             item.add_marker(pytest.mark.long)
+
+
+SHARING = frozenset({"tests/semantics/stage/test_shipping.py"})
+"""Files of tests that share what takes minutes to make, as all object code: one worker runs all of a file."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Send the tests of a file that shares to one worker, all others to whichever is free.
+
+    The mark ``xdist_group`` does so only for pytest before 9.2, by a name of a test that has become its own.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Sharing(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return file if file in SHARING else nodeid
+
+    return Sharing(config, log)
 
 
 # Hypothesis also draws constants that it reads in modules of the checkout that are loaded. With all of them loaded a

@@ -22,7 +22,7 @@ from tests.rooms import SOURCES, module_name
 from tests.semantics.stage.arm import SYMBOLS, sections
 from tests.semantics.stage.test_objects import SMALL, value
 
-pytestmark = [pytest.mark.optimised, pytest.mark.xdist_group("shipping")]  # one worker emits all object code
+pytestmark = pytest.mark.optimised
 
 PROGRAMS = {program.name: program for program in programs()}
 LIBRARY = {"memset", "memcpy", "memmove"}
