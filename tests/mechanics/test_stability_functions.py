@@ -176,17 +176,17 @@ def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
         start = method.start(0.0, h)
         one, two = (method.step(start, part * h) for part in (1.0, 0.5))
         assert round(np.log2(one.error / two.error)) == method.exponent == power
-    # dense output is the polynomial through the stages, and the step itself at its ends
+    # dense output is the polynomial through the stages, and the step itself at its ends; no store of heat: y are states
     for attempt in (one, two):
-        assert np.abs(method.inside(attempt, attempt.h).x - attempt.end.x).max() <= 1e-14
-        assert np.abs(method.inside(attempt, 0.0).x - start.x).max() <= 1e-14
+        assert np.abs(method.inside(attempt, attempt.h).y - attempt.end.y).max() <= 1e-14
+        assert np.abs(method.inside(attempt, 0.0).y - start.y).max() <= 1e-14
     inside = method.inside(one, 0.05)
-    assert inside.t == 0.05 and np.abs(inside.x - two.end.x).max() <= 1e-6
+    assert inside.t == 0.05 and np.abs(inside.y - two.end.y).max() <= 1e-6
     assert np.abs(inside.z - two.end.z).max() <= 1e-4
     row = method.row(one.end)  # what is made by friction, and the energies of storages, each at its place
     names = [str(slot.path) for slot in method.model.descriptor.components]
     energies = dict(zip(names, row.energies, strict=True))
-    end = method.problem.descriptor.unpack(one.end.x)
+    end = method.problem.descriptor.unpack(one.end.y)
     at = {str(path): float(value[0]) for path, value in end.items()}
     assert energies["pe"] == pytest.approx(0.5 * SPRING * at["pe.q"] ** 2, rel=1e-12)
     assert energies["ke"] == pytest.approx(0.5 * at["ke.p"] ** 2 / MASS, rel=1e-12)
