@@ -50,7 +50,7 @@ SHARING = frozenset({"tests/semantics/stage/test_shipping.py"})
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Send the tests of a file that shares to one worker, all others to whichever is free.
 
-    The mark ``xdist_group`` does so only for pytest before 9.2, by a name of a test that has become its own.
+    The mark ``xdist_group`` relies on a private attribute of tests that pytest 9.2 no longer has.
     """
     from xdist.scheduler import LoadScopeScheduling
 

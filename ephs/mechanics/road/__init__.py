@@ -1,1 +1,7 @@
-"""Motion of links in world axes: outward sweep, rows of constraints, one linear system; see docs/architecture.md."""
+"""Motion of the links of a mechanism in world axes.
+
+In come the constants of links and joints (`records`) and the elements and rates of the joints; out go frames, twists,
+accelerations, energies, multipliers of constraints and how far loops are open. The outward sweep is in `tree`, the
+recursion of articulated inertias in `linear`, rows of loops in `cuts` and `rows`, their order in `elimination`, and the
+programs of a class of mechanisms in `programs`. Start reading at `tree`.
+"""

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene.site import Site
 
 Told: TypeAlias = bool | Mapping[str, object] | list[Mapping[str, object]]
-"""What a rule says: whether it holds, or values in the texts of its fault, or of each of its faults."""
+"""Answer of a rule: whether it holds, or values for the texts of its fault, or of each of its faults."""
 
 
 @final

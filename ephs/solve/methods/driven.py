@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -19,10 +18,6 @@ CUTS = 6
 """Largest number of halvings of a step without solution."""
 _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
 _DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN, Outcome.DEPTH)
-
-
-ComponentMethod: TypeAlias = Natural
-"""A method that discretises component by component."""
 
 
 def started(method: Natural, x: Array, sums: Array) -> NaturalState:

@@ -27,9 +27,9 @@ class EnergyEquations:
     within
         The equations by states.
     conduction
-        What is taken out of them; None: nothing.
+        Linear conduction that is taken out of them; None where there is none.
     linear
-        Whether conduction is all that there is.
+        Whether all components are stores of heat and linear conduction.
     """
 
     def __init__(self, model: Model, stores: HeatStores) -> None:

@@ -142,7 +142,7 @@ class Natural:
     elimination
         The present order of elimination, None before the first step.
     changes
-        How often it was decided anew.
+        Number of times that it was decided anew.
     redundant
         The equations that it leaves out, in words.
     nodes

@@ -12,8 +12,8 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.breakpoints import NEAR
 from ephs.solve.control import Control, Grid
-from ephs.solve.methods.driven import ComponentMethod, advance_driven, advance_whole, started
-from ephs.solve.methods.natural import Chunk, NaturalState
+from ephs.solve.methods.driven import advance_driven, advance_whole, started
+from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
@@ -49,12 +49,12 @@ class Paced:
         Makes the method for a compiled model.
     """
 
-    def __init__(self, problem: Problem, t0: float, control: Control, make: Callable[[Model], ComponentMethod]) -> None:
+    def __init__(self, problem: Problem, t0: float, control: Control, make: Callable[[Model], Natural]) -> None:
         d = problem.descriptor
         self._make, self._model = make, compile_model(d, problem.reference, problem.inputs(t0, problem.initial))
         self.problem, self.method = problem, make(self._model)
         self.name, self._step = self.method.name, control.step
-        self._within: ComponentMethod | None = None
+        self._within: Natural | None = None
         self._iterations = self._cut = 0
         self._rtol, self._atol = control.rtol.rates(d), control.atol.rates(d)
         self._counted = _counted(problem)

@@ -1,4 +1,4 @@
-"""What the unknowns of a natural step satisfy, as staged functions: Gauss stages, corrected component by component.
+"""Equations of the unknowns of a natural step, as staged functions: Gauss stages, corrected component by component.
 
 With one stage these are the relations over the step. With several, every component has its continuous relation at
 each. Over the step the stages' increments of each state make one increment V; the relations over the step, evaluated

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from ephs.mechanics.road.cuts import Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
-from ephs.mechanics.road.records import Place
+from ephs.mechanics.road.records import Place, State
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
 
@@ -203,3 +203,13 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
         parts = (loop.motions, loop.value, loop.covector, loop.element, worst, values)
         found.append([part.tobytes() for part in parts])
     assert found[0] == found[1]
+
+
+def test_the_memory_of_a_link_begins_with_its_place():
+    """Rows of `State` are read as `Place`: the same fields at the same offsets."""
+    fields = [name for name, field in vars(Place).items() if hasattr(field, "offset")]
+    assert fields == ["turn", "at", "twist", "bias", "change"]
+    for name in fields:
+        one, other = vars(Place)[name], vars(State)[name]
+        assert (one.offset, one.shape) == (other.offset, other.shape)
+    assert Place.real_width == vars(State)["down"].offset

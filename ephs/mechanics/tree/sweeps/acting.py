@@ -50,7 +50,7 @@ class Own(Record):
     Attributes
     ----------
     links, width
-        How many, and how many numbers of memory each of them takes.
+        Number of links, and of the numbers of memory of each.
     forced, driven
         1 where more than gravity acts; where joints have prescribed motions.
     attached
