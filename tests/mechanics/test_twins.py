@@ -223,3 +223,18 @@ def test_twins_move_alike(name, load):
         for state in ("ke.p", "pe.q"):
             here, there = one[f"bodies.{box}.{state}"], two[f"{component_path('bodies', body)}.{state}"]
             assert np.abs(here - there).max() <= twin.condition * ROUNDING * np.abs(there).max()
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_twins_linearise_alike(name, load):
+    """In independent coordinates of joints, out of equilibrium, too; in all states there are others."""
+    twin = TWINS[name](load)
+    scene = ephs.linearize(load((PIN if twin.pinned else "") + twin.text))
+    system = by_hand(twin)
+    hand = ephs.linearize(system, inputs=twin.inputs)
+    assert hand.A.shape == scene.A.shape
+    one, other = hand.eigenvalues, scene.eigenvalues
+    apart = max(np.abs(one - value).min() for value in other)
+    assert apart <= twin.condition * ROUNDING * np.abs(other).max()
+    whole = ephs.linearize(system, inputs=twin.inputs, form="paper")
+    assert whole.A.shape[0] > scene.A.shape[0]

@@ -1,10 +1,14 @@
 """Exact derivatives of a mechanism's dynamics, and its constraints, from the linearised equations."""
 
+import numpy as np
+
 from ephs.mechanics.dynamics.links import Links
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, VelocityDerivatives
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.mechanics.tree.finding.tables import CUT
+from ephs.mechanics.tree.finding.tables import CUT, TREE
+from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces import SE3
 
 Slopes = tuple[Array, Array, Array]
 """(n,) accelerations, their derivatives as `Linearised.columns` has them, and those by forces (n, n)."""
@@ -51,3 +55,41 @@ def velocity_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array
     layout, n = linear.equations.layout, linear.equations.n
     joints = {name: cut[where - n] for name, where in layout.freedoms.items() if where.size and where[0] >= n}
     return VelocityDerivatives(rows, joints, links.inside(twists))
+
+
+def state_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array) -> dict[Path, tuple[Array, Array]]:
+    """State of the system -> ((d, n), (d, n)) its change by the tree's elements at fixed rates, and by these.
+
+    Of poses, momenta, relative poses of joints and springs; entropies and states of attachments are states themselves.
+    """
+    eq, found = linear.equations, linear.equations.dense.residual
+    reduced, t, n = eq.reduced, eq.reduced.tables, eq.n
+    _, _, moved = linear.turning(q, r)
+    links.place(q, r)
+    out: dict[Path, tuple[Array, Array]] = {}
+    still, unit = np.zeros((6, n)), SE3.identity()
+    twists = [found.twists(i) for i in range(reduced.links)] + [still]
+    poses = [found.pose(i) for i in range(reduced.links)] + [unit]
+    for i, link in enumerate(reduced.places):
+        if link.pose is not None:
+            out[link.pose.path] = twists[i], still
+        if link.momentum is not None:
+            change = found.inside(i, moved[found.link(i)].T).T
+            out[link.momentum.path] = t.inertia[i] @ change, t.inertia[i] @ twists[i]
+    for i, edge in enumerate(reduced.edges):
+        if edge.path is None or edge.state is None:
+            continue
+        d = edge.pair.dim
+        if t.kind[i] == TREE:
+            by_place = np.eye(n)[int(t.r_at[i]) : int(t.r_at[i]) + d]
+        else:
+            one, two, near, far = int(t.first[i]), int(t.second[i]), t.offset1[i], t.offset2[i]
+            inside = SE3.compose(SE3.inverse(SE3.compose(poses[one], near)), SE3.compose(poses[two], far))
+            turned = SE3.adjoint(SE3.inverse(far)) @ twists[two]
+            turned -= SE3.adjoint(SE3.inverse(SE3.compose(near, inside))) @ twists[one]
+            by_place = t.left[i][:d] @ turned
+        out[edge.state] = by_place, np.zeros((d, n))
+    for one in reduced.attaching.network.inertias:
+        turning = np.eye(n)[int(reduced.attaching.ports[one.rate])]
+        out[one.state.path] = np.zeros((1, n)), one.inertia * one.ratio * turning[None]
+    return out

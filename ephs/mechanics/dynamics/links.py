@@ -5,7 +5,6 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.motion.views import BodyState
-from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
@@ -23,8 +22,13 @@ class Links:
         self._residual = equations.dense.residual
         self._q, self._r = np.zeros(equations.reduced.coordinates), np.zeros(equations.n)
         found = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
-        scene: Scene | None = equations.problem.scene
-        self._number = found if scene is None else {name: found[name] for name, _ in scene.all_bodies()}
+        named = {name: found[name] for name in equations.problem.names.values() if name in found}
+        self._number = named or found
+
+    def weights(self) -> dict[str, float]:
+        """Body -> its weight in N."""
+        places, size = self.equations.reduced.places, float(np.linalg.norm(self.equations.gravity))
+        return {name: float(places[i].inertia[5, 5]) * size for name, i in self._number.items()}
 
     def place(self, q: Array, r: Array) -> None:
         """Poses and twists of all links, into the scratch memory."""
@@ -32,7 +36,7 @@ class Links:
         self._q, self._r = q, r
 
     def bodies(self) -> dict[str, BodyState]:
-        """Body -> pose and twist, in the order of the scene, or outwards."""
+        """Body -> pose and twist, in the order of their names, or outwards."""
         found = self._residual
         return {name: BodyState(found.pose(i), found.twist(i)) for name, i in self._number.items()}
 

@@ -44,24 +44,28 @@ class Dynamics:
 
     Attributes
     ----------
+    problem
+        What it was made of.
     state0
         The initial state, its loops closed.
+    weights
+        Body -> its weight in N.
     loading
         Loads of a scene, which act in full unless ``loading.share`` is less.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.scene: Any = problem.scene
-        self.name = problem.name
-        self._problem = problem
-        self._equations = Equations(self._problem, 0.0, pushed=True)
+        self.problem, self.name = problem, problem.name
+        self._equations = Equations(problem, 0.0, pushed=True)
         if self._equations.prescribed.changing:
             raise OptionError("motion", "one that changes with time", "constant rates: dynamics have no time")
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout
         self._links = Links(self._equations)
+        self.weights = self._links.weights()
         self.loading = Loading(self._equations, self._links)
-        self.placing, self._steps = Placing(self._equations), Steps(self._problem, self._equations)
+        self.placing, self._steps = Placing(self._equations), Steps(self.problem, self._equations)
         with failing_at(0.0):
             start = self._equations.start(0.0)
         self.state0 = self._state(start)
@@ -108,7 +112,8 @@ class Dynamics:
         SceneError
             A name is unknown, a value has the wrong length, or a loop does not close.
         """
-        made = None if adjust or self._stretches else self.placing.state(self.state0, coordinates, rates)
+        stretched = self.scene is not None and has_stretches(self.scene)  # belts and tendons follow coordinates
+        made = None if adjust or stretched else self.placing.state(self.state0, coordinates, rates)
         if made is not None:
             return made
         by_name = [self.layout.named("state", given) for given in (coordinates, rates)]
@@ -117,11 +122,6 @@ class Dynamics:
             return self.closed(self._state(following(self._equations, moved, *map(self.placing.places, by_name))))
         scene = self.scene.with_state(*by_name, adjust=adjust)
         return self._of_states(problem_of_scene(scene).initial)
-
-    @property
-    def _stretches(self) -> bool:
-        """Whether stretches of belts and tendons of the scene follow its coordinates."""
-        return self.scene is not None and has_stretches(self.scene)
 
     def unpack(self, array: ArrayLike) -> State:
         """The state of an array in the layout of `State.array`; loops are not closed.
@@ -166,11 +166,11 @@ class Dynamics:
 
     def view(self, state: State) -> Any:
         """The state by names, as functions of inputs read it: ``view.joints.pin.rate``."""
-        return self._problem.view(self._equations.states(self._reduced(state)))
+        return self.problem.view(self._equations.states(self._reduced(state)))
 
     def states(self, state: State) -> dict[Path, Array]:
         """All states of the scene's system by path, as `simulate` takes them for ``initial``."""
-        return {**self._problem.initial, **self._equations.states(self._reduced(state))}
+        return {**self.problem.initial, **self._equations.states(self._reduced(state))}
 
     # ---- accelerations and forces ------------------------------------------------------------------------------
 
@@ -301,9 +301,7 @@ class Dynamics:
     def energies(self, state: State) -> Energies:
         """Kinetic, potential and thermal energy."""
         eq = self._equations
-        taken = state.entropies[
-            eq.reduced.tables.node == -1
-        ]  # by the environment, whose energy belongs to no component
+        taken = state.entropies[eq.reduced.tables.node == -1]  # by the environment: energy of no component
         return Energies.of(eq.model, eq.row(self._reduced(state)).energies, float(taken.sum()))
 
     def derivatives(
@@ -334,6 +332,10 @@ class Dynamics:
     def velocity_derivatives(self, state: State) -> VelocityDerivatives:
         """Exact derivatives by the configuration of velocities: constraints' rows, cut joints, bodies."""
         return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
+
+    def state_derivatives(self, state: State) -> dict[Path, tuple[Array, Array]]:
+        """Derivatives of the system's states; see `ephs.mechanics.dynamics.differentiating.state_derivatives_of`."""
+        return differentiating.state_derivatives_of(self._linear, self._links, state.q, state.r)
 
     def step(
         self, state: State, h: float, method: "str | Method | MethodEntry" = "rk54", *, forces: ByJoint | None = None
@@ -379,7 +381,7 @@ class Dynamics:
 
     def _of_states(self, states: States) -> State:
         eq = self._equations
-        q, r, s = PaperStates(eq.reduced, replace(self._problem, initial=states)).initial()
+        q, r, s = PaperStates(eq.reduced, replace(self.problem, initial=states)).initial()
         with failing_at(0.0):  # momenta off the joints, as some methods leave them: the nearest in the mass metric
             r = np.asarray(np.linalg.solve(eq.mass(q, r), self._links.momenta(states)), dtype=float)
             return self._state(eq.closed(self._counted(q, r, s)))

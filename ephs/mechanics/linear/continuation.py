@@ -12,7 +12,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
-from ephs.mechanics.linear.scene import freedoms_of
+from ephs.mechanics.linear.freedoms import freedoms_of
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import eigenvalues, svd
 

@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ephs.mechanics.linear.statespace import StateSpace
-from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError
@@ -33,30 +35,30 @@ def linearize(
     ----------
     state
         A `State` of `ephs.dynamics`, values of states by path, an `Equilibrium`, or ``"equilibrium"``, which finds
-        one. Default: the initial state of a scene, the identity for states of a system. In a moving state, the linear
-        system holds at that instant.
+        one. Default: the initial state of a scene; of a system what its components carry. In a moving state, the
+        linear system holds at that instant.
     inputs
         Names of inputs of a scene: ``"joints.pin"``, a force on its twist u_r, ``"bodies.crank"``, a wrench
         in the body frame, ``"markers.tip"``, a force in world axes; all joints by default. For a system
         ``{port: {"effort": e}}`` or ``{"flow": f}``, the prescribed quantity at its outer ports and its value; zero
-        flow at all other ports.
+        flow at all other ports. A system with joints takes names, too, of which the paths of boxes are part; its
+        prescribed motions are followed, and are no inputs.
     outputs
         Default: the power conjugates of the inputs. For a scene, names as for inputs give rates and twists; with
         ``.coordinate`` (joints) and ``.position`` (bodies, markers) positions. For a system, ports and paths of states.
     form
-        ``"reduced"``: a scene in independent joint coordinates; ``"paper"``: the states of its system.
+        ``"reduced"``: a mechanism in independent joint coordinates; ``"paper"``: the states of its system.
     reference
         The reference environment of a system.
 
     Raises
     ------
     OptionError
-        There is no such port, or the state does not fit.
+        There is no such port, the state does not fit, or a component has no place in joint coordinates.
     SimulationError
         No equilibrium was found, or the motion is not determined in the state.
     """
     from ephs.mechanics.linear.equilibrium import Equilibrium, equilibrium
-    from ephs.mechanics.linear.system import linear_system
 
     if form not in ("reduced", "paper"):
         raise OptionError("form", form, "reduced or paper")
@@ -65,14 +67,13 @@ def linearize(
     elif isinstance(state, str):
         raise OptionError("state", state, "a state, or the word equilibrium")
     if isinstance(model, System):
-        given: Any = state.states if isinstance(state, Equilibrium) else state
-        return linear_system(model, given, inputs, outputs, reference)
+        return _of_system(model, state, inputs, outputs, form, reference)
     if reference is not None:
         raise OptionError("reference", reference, "none: a scene's [world] has its own")
     if isinstance(inputs, Mapping):
         raise OptionError("inputs", inputs, "names of joints, bodies and markers")
     from ephs.mechanics.dynamics import State, dynamics
-    from ephs.mechanics.linear.scene import linear_scene
+    from ephs.mechanics.linear.mechanism import linear_mechanism
 
     if isinstance(state, Equilibrium):
         assert isinstance(state.model, Scene)
@@ -81,16 +82,46 @@ def linearize(
         raise OptionError(
             "state", "a mapping", "a State of ephs.dynamics, for a scene; or scene.with_state(…) as model"
         )
-    if form == "reduced":
-        return linear_scene(model, state, inputs, outputs)
     mechanism = dynamics(model)
+    if form == "reduced":
+        points = {
+            str(name): (str(marker.body), np.asarray(marker.at))
+            for name, marker in model.all_markers()
+            if marker.body != GROUND
+        }
+        at = mechanism.state0 if state is None else mechanism.closed(state)
+        return linear_mechanism(mechanism, at, inputs, outputs, points)
     at = mechanism.state0 if state is None else state
     assert isinstance(at, State)
-    from ephs.mechanics.runs.simulate import problem_of_scene
+    from ephs.mechanics.linear.system import linear_system
 
-    return linear_system(
-        problem_of_scene(model).system, mechanism.states(at), _driven(model), outputs, _reference(model), model.name
-    )
+    system = mechanism.problem.system
+    return linear_system(system, mechanism.states(at), _driven(model), outputs, _reference(model), model.name)
+
+
+def _of_system(
+    system: System,
+    state: Any,
+    inputs: "Sequence[str] | Mapping[str, Any] | None",
+    outputs: Sequence[str] | None,
+    form: str,
+    reference: Reference | None,
+) -> StateSpace:
+    from ephs.mechanics.dynamics import State
+    from ephs.mechanics.linear.equilibrium import Equilibrium
+    from ephs.mechanics.linear.mechanism import linear_mechanism
+    from ephs.mechanics.linear.pencil import mechanism_of, system_problem
+    from ephs.mechanics.linear.system import linear_system
+
+    given: Any = state.states if isinstance(state, Equilibrium) else None if isinstance(state, State) else state
+    prescribed, names = (inputs, None) if isinstance(inputs, Mapping) else (None, inputs)
+    model = mechanism_of(system_problem(system, given, prescribed, reference)) if form == "reduced" else None
+    if model is not None:
+        at = model.closed(state) if isinstance(state, State) else model.state0
+        return linear_mechanism(model, at, names, outputs, None)
+    if isinstance(state, State):
+        raise OptionError("state", "a State", "values of states by path, of a system without joints or in paper form")
+    return linear_system(system, given, inputs, outputs, reference)
 
 
 def _driven(scene: Scene) -> dict[str, Any]:

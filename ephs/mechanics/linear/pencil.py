@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, svd
@@ -25,6 +26,8 @@ from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from ephs.mechanics.dynamics import Dynamics
 
 SETTLED, LEAST = 1e-12, 1e-6
 """Relative step at which Newton's method ends, with this least scale of unknowns."""
@@ -54,6 +57,28 @@ def system_problem(
     if not problem.constant:
         raise OptionError("inputs", "a function", "constants")
     return problem
+
+
+def mechanism_of(problem: Problem) -> "Dynamics | None":
+    """The bodies and joints of a problem in joint coordinates; None where nothing is joined.
+
+    Raises
+    ------
+    OptionError
+        There are joints, beside something that has no place in joint coordinates.
+    """
+    from ephs.mechanics.dynamics import Dynamics
+
+    found = frames_of(problem.descriptor)
+    if not found.links:
+        return None
+    try:
+        return Dynamics(problem)
+    except Unplaced as error:
+        if not found.joints:  # the poses of bodies that nothing joins are independent
+            return None
+        expected = "a mechanism in joint coordinates; form='paper' linearises all its states, open joints among them"
+        raise OptionError("model", str(error), expected) from error
 
 
 @final

@@ -4,7 +4,7 @@ What its states may do, x = X ξ, is spanned by independent states, so that X is
 give ξ̇, with least-norm multipliers, whatever is redundant. States of the environment act on nothing and are left out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, final
@@ -52,33 +52,41 @@ def linear_system(
         raise OptionError("inputs", inputs, "{port: {'effort': e}} or {port: {'flow': f}}, of a system")
     problem = system_problem(system, states, inputs, reference, name)
     with failing_at(0.0):
-        return _Linear(Pencil(problem), problem.descriptor.pack(problem.initial)).whole(outputs)
+        return LinearSystem(problem, problem.descriptor.pack(problem.initial)).whole(outputs)
 
 
 @final
-class _Linear:
-    """One linearisation."""
+class LinearSystem:
+    """One linearisation.
 
-    def __init__(self, pencil: Pencil, x: Array) -> None:
-        self.pencil, self.x = pencil, x
-        d = pencil.problem.descriptor
+    Attributes
+    ----------
+    which, X
+        Places of the k independent states, and (n_w, k) what all do with them.
+    A, B
+        (k, k), (k, m) of the independent states; m are the numbers of all outer ports.
+    ports
+        Outer power port -> (d, k + m) what the power conjugate of its input is, of states and inputs.
+    columns
+        Outer power port -> its place among the m.
+    held
+        Outer ports whose input holds states, so that its derivative would act.
+    """
+
+    def __init__(self, problem: Problem, x: Array) -> None:
+        self.pencil, self.x = Pencil(problem), x
+        pencil, d = self.pencil, problem.descriptor
         self.z = pencil.unknowns(x)
-        self.parts = pencil.parts(x, self.z)
-        if held := pencil.differentiated(self.parts):
-            expected = "the other of effort and flow there: as it is, its derivative would act on the states"
-            raise OptionError("inputs", ", ".join(held), expected)
+        self.parts = p = pencil.parts(x, self.z)
+        self.held = pencil.differentiated(p)
         still = [
             i for slot in d.components if isinstance(slot.primitive, Storage) and slot.primitive.environment
             for state in slot.reads for i in range(state.rates.start, state.rates.stop)
         ]  # fmt: skip
         self.left_out = np.array(still, dtype=np.int64)
-        self.which = pencil.independent(self.parts, self.left_out)
-        self.X = pencil.span(self.parts, self.which, self.left_out)
-        self.k = self.which.size
-
-    def whole(self, outputs: Sequence[str] | None) -> StateSpace:
-        """The linear system."""
-        p, X, k, pencil = self.parts, self.X, self.k, self.pencil
+        self.which = pencil.independent(p, self.left_out)
+        self.X = X = pencil.span(p, self.which, self.left_out)
+        self.k = k = self.which.size
         rows, by_states, by_inputs = pencil.algebraic(p)
         back = pseudoinverse(rows, part=ELIMINATION)  # efforts, multipliers, outer flows: a = by ξ and u, and W c
         given = np.hstack([by_states @ X, by_inputs])
@@ -92,20 +100,44 @@ class _Linear:
         rest = found[moving.shape[1] :]
         whole, known = by + W @ rest, np.abs(found).max(axis=0, initial=0.0)  # κ ε of which is in all of a solution
         terms = np.abs(back) @ np.abs(given) + np.abs(W).sum(axis=1, keepdims=True) * known
-        sizes = Sizes.of(found[:, k:], terms[:, :k], terms[:, k:])
+        self.sizes = Sizes.of(found[:, k:], terms[:, :k], terms[:, k:])
+        self.A, self.B = found[:k, :k], found[:k, k:]
         efforts, flows = whole[: pencil.n_e], whole[pencil.n_e + pencil.n_l :]
-        A, B = found[:k, :k], found[:k, k:]
-        names_in = self._names_in()
-        C, D, names_out = self._outputs(outputs, efforts, flows)
-        structure, reason = _structure(p, X, self.which, A)
+        self.ports: dict[str, Array] = {}
+        self.columns: dict[str, slice] = {}
+        flow = at = 0
+        for slot, effort in pencil.ports:
+            dim = slot.quantity.space.dim
+            self.ports[str(slot.path)] = flows[flow : flow + dim] if effort else efforts[slot.efforts]
+            self.columns[str(slot.path)] = slice(at, at + dim)
+            flow, at = flow + (dim if effort else 0), at + dim
+
+    def refuse(self, ports: Collection[str]) -> None:
+        """Refuse inputs that hold states.
+
+        Raises
+        ------
+        OptionError
+            One of them does.
+        """
+        if held := [name for name in self.held if name in ports]:
+            expected = "the other of effort and flow there: as it is, its derivative would act on the states"
+            raise OptionError("inputs", ", ".join(held), expected)
+
+    def whole(self, outputs: Sequence[str] | None) -> StateSpace:
+        """The linear system of all independent states."""
+        self.refuse(self.ports)
+        pencil, A, X = self.pencil, self.A, self.X
+        C, D, names_out = self._outputs(outputs)
+        structure, reason = _structure(self.parts, X, self.which, A)
         if structure is not None:
             A = (structure.J - structure.R) @ structure.Q
         d = pencil.problem.descriptor
         return StateSpace(
-            pencil.problem.name, A, B, C, D, self._names(), names_in, names_out, structure, reason,
+            pencil.problem.name, A, self.B, C, D, self._names(), self._names_in(), names_out, structure, reason,
             MappingProxyType({str(slot.path): X[slot.rates] for slot in d.states if slot.quantity.space.dim}),
             MappingProxyType({str(path): value.copy() for path, value in d.unpack(self.x).items()}),
-            partial(_play, pencil.problem, pencil.model, self.x, X), sizes,
+            partial(_play, pencil.problem, pencil.model, self.x, X), self.sizes,
         )  # fmt: skip
 
     def _turning(self) -> Array:
@@ -136,16 +168,9 @@ class _Linear:
         ports = self.pencil.ports
         return tuple(name for slot, _ in ports for name in _numbered(str(slot.path), slot.quantity.space.dim))
 
-    def _outputs(
-        self, wanted: Sequence[str] | None, efforts: Array, flows: Array
-    ) -> tuple[Array, Array, tuple[str, ...]]:
+    def _outputs(self, wanted: Sequence[str] | None) -> tuple[Array, Array, tuple[str, ...]]:
         """C, D and names: of ports the power conjugate of what is prescribed there, of states their change."""
-        rows: dict[str, Array] = {}
-        at, width = 0, efforts.shape[1] - self.k
-        for slot, effort in self.pencil.ports:
-            dim = slot.quantity.space.dim
-            rows[str(slot.path)] = flows[at : at + dim] if effort else efforts[slot.efforts]
-            at += dim if effort else 0
+        rows, width = dict(self.ports), self.B.shape[1]
         ports = tuple(rows)
         for slot in self.pencil.problem.descriptor.states:
             rows.setdefault(str(slot.path), np.hstack([self.X[slot.rates], np.zeros((slot.quantity.space.dim, width))]))

@@ -1,4 +1,4 @@
-"""A scene linearised in joint coordinates.
+"""A mechanism linearised in joint coordinates.
 
 Small motions about a state are η, increments of a choice of independent degrees of freedom, and ρ, of their rates: the
 tree's joints move by δq = Z η (left-trivialised) and change their rates by δr = Z ρ + Y η, so that loops stay closed
@@ -10,102 +10,52 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
-from ephs.mechanics.dynamics import Derivatives, Dynamics, State, dynamics
+from ephs.mechanics.dynamics import Derivatives, Dynamics, State
+from ephs.mechanics.linear.freedoms import freedoms_of, unbalanced
+from ephs.mechanics.linear.ports import Ports
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
-from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import did_you_mean, listing
-from ephs.mechanics.scene.model import GROUND, Scene
+from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
 from ephs.solve.errors import OptionError
+from ephs.solve.heats import exponential_law
 from ephs.solve.methods.stored import Stored
 from ephs.solve.model import compile_model
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
-from ephs.solve.sparse import Index
 from ephs.solve.stepping import Row
 
 BALANCED = 1e-7
 """Largest unbalanced fraction of the applied forces at an equilibrium."""
 ROUNDED = 1e-9
 """Relative asymmetry allowed in a stiffness: rounding of chains of differentiated poses."""
-MASSLESS = 1e-14
-"""Inertia, as a part of the largest, below which it is rounding: rows determine what has none."""
-LEAST = 1e-2
-"""Substitute inertia of massless freedoms, relative to the least one: pivoting takes them as dependent first."""
 
 
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Freedoms:
-    """The independent degrees of freedom at a state.
+def linear_mechanism(
+    model: Dynamics,
+    state: State,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+    points: Mapping[str, tuple[str, Array]] | None,
+) -> StateSpace:
+    """See `ephs.linearize`.
 
     Parameters
     ----------
-    which
-        (k,) their places among the tree's n freedoms.
-    Z
-        (n, k) what they do to all: the identity on ``which``, zero for the rows of the constraints.
+    points
+        Names of points of bodies, each with its body and place there; None where the ports and states of the system
+        are meant, too, and inputs are these ports by default.
     """
-
-    which: Index
-    Z: Array
-
-
-def freedoms_of(model: Dynamics, state: State) -> Freedoms:
-    """Independent degrees of freedom, by pivoting in the mass metric."""
-    from scipy.linalg import qr, solve_triangular
-
-    found, n = model.constraints(state), model.layout.n
-    if not found.rank:
-        return Freedoms(np.arange(n), np.eye(n))
-    inertia = np.diag(model.mass_matrix(state))
-    heavy = inertia > MASSLESS * inertia.max()
-    light = 1.0 / np.sqrt(np.where(heavy, inertia, LEAST * inertia[heavy].min()))
-    factors: Any = qr(found.rows * light, mode="economic", pivoting=True)
-    upper, order, rank = np.asarray(factors[1]), np.asarray(factors[2], dtype=np.int64), found.rank
-    dependent, which = order[:rank], np.sort(order[rank:])
-    place = {int(j): i for i, j in enumerate(order[rank:])}
-    rest = -np.asarray(solve_triangular(upper[:rank, :rank], upper[:rank, rank:]), dtype=float)[
-        :, [place[int(j)] for j in which]
-    ]
-    Z = np.zeros((n, which.size))
-    Z[which, np.arange(which.size)] = 1.0
-    Z[dependent] = light[dependent][:, None] * rest / light[which]
-    return Freedoms(which, Z)
-
-
-def unbalanced(model: Dynamics, state: State, free: Freedoms, stiffness: Array) -> float:
-    """Unbalanced fraction of the forces at rest in a state; 0 without forces.
-
-    Weights act at their arms, and all else counts with what ``stiffness`` (n, n) makes of it over 1 rad or m: forces
-    that balance each other may vanish one by one.
-    """
-    q, r, s = _split(model, state)
-    rest = model.unpack(np.concatenate([q, np.zeros_like(r), s]))
-    gravity, applied = model.gravity(rest), model.applied(rest)
-    terms = np.abs(applied) + np.abs(stiffness).sum(axis=1)
-    for name, body in model.scene.all_bodies():
-        arms = np.linalg.norm(model.jacobian(rest, name)[3:], axis=0)
-        terms += arms * body.mass * float(np.linalg.norm(model.scene.world.gravity))
-    left, terms = free.Z.T @ (applied - gravity), np.abs(free.Z.T) @ terms
-    return float(np.abs(left).max(initial=0.0) / (terms.max(initial=0.0) or 1.0))
-
-
-def linear_scene(
-    scene: Scene, state: State | None, inputs: Sequence[str] | None, outputs: Sequence[str] | None
-) -> StateSpace:
-    """See `ephs.linearize`."""
-    model = dynamics(scene)
-    at = model.state0 if state is None else model.closed(state)
-    return _Linear(model, at, inputs, outputs).whole()
+    return _Linear(model, state, inputs, outputs, points).whole()
 
 
 @final
@@ -125,7 +75,12 @@ class _Linear:
     """Data shared by the parts of one linearisation."""
 
     def __init__(
-        self, model: Dynamics, state: State, inputs: Sequence[str] | None, outputs: Sequence[str] | None
+        self,
+        model: Dynamics,
+        state: State,
+        inputs: Sequence[str] | None,
+        outputs: Sequence[str] | None,
+        points: Mapping[str, tuple[str, Array]] | None,
     ) -> None:
         self.model, self.state = model, state
         self.free = freedoms_of(model, state)
@@ -134,13 +89,24 @@ class _Linear:
         self.moving = bool(np.any(self.r))
         self.velocities = model.velocity_derivatives(self.state)
         self.motors = model.layout.attached
-        self.nodes = [
-            i for i, path in enumerate(model.layout.entropies) if i in self.motors or tuple(path)[-3:-2] == ("thermal",)
-        ]
+        d = model.problem.descriptor
+        storages = [(slot, slot.primitive) for slot in d.components if isinstance(slot.primitive, Storage)]
+        stores = {state.path: storage for slot, storage in storages for state in slot.reads}
+        self.stores = [stores[path] for path in model.layout.entropies]
+        self.nodes = [i for i, store in enumerate(self.stores) if i in self.motors or not store.environment]
         self.ad = self._ad()
         self.turned = self._turned()
-        prescribed = {name for name, joint in model.scene.all_joints() if joint.motion is not None}
+        self.points, self.bodies = points or {}, tuple(model.bodies(state))
+        prescribed = {name for name, of in model.layout.edges.items() if any(edge.motion for _, edge in of)}
         default = tuple(f"joints.{name}" for name in model.joints if name not in prescribed and self._dim(name))
+        self.system: Ports | None = None
+        self.pushed: dict[str, tuple[str, slice]] = {}
+        if points is None:
+            edges = [(name, edge) for name, of in model.layout.edges.items() for _, edge in of if edge.port is not None]
+            moved = frozenset(edge.port for _, edge in edges if edge.port is not None and edge.motion is not None)
+            self.system = Ports(model.problem, d.pack(model.states(state)), self._embedded(), moved)
+            self.pushed = {str(edge.port): (name, edge.freedoms) for name, edge in edges if edge.port not in moved}
+            default = self.system.names
         self.inputs = default if inputs is None else tuple(inputs)
         self.outputs = self.inputs if outputs is None else tuple(outputs)
 
@@ -160,6 +126,18 @@ class _Linear:
                 if own.size and own[0] < self.n:
                     out[np.ix_(own, own)] = edge.pair.manifold.ad(self.r[own])
         return out
+
+    def _embedded(self) -> dict[Path, Array]:
+        """State of the system -> (d, states) what the states do to it."""
+        still = len(self.nodes)
+        out = {
+            path: np.hstack(
+                [by_place @ self.free.Z + by_rate @ self.turned, by_rate @ self.free.Z, np.zeros((len(by_rate), still))]
+            )
+            for path, (by_place, by_rate) in self.model.state_derivatives(self.state).items()
+        }
+        warm = np.eye(2 * self.k + still)[2 * self.k :]
+        return out | {self.model.layout.entropies[i]: warm[j : j + 1] for j, i in enumerate(self.nodes)}
 
     def _turned(self) -> Array:
         """(n, k) Y: how the dependent rates change with the configuration while the independent ones do not."""
@@ -188,38 +166,62 @@ class _Linear:
         A[warm, place] = (by.entropy_q @ Z + by.entropy_r @ Y)[self.nodes]
         A[warm, rate] = (by.entropy_r @ Z)[self.nodes]
         A[warm, warm] = by.entropy_s[np.ix_(self.nodes, self.nodes)]
-        B, C, names_in, names_out = self._ports(by.acceleration_force)
+        B, names_in = self._driven(by.acceleration_force)
+        C, D, names_out = self._outputs(B.shape[1])
         structure, reason, A = self._structure(A, by)
-        D = np.zeros((C.shape[0], B.shape[1]))
         return StateSpace(
-            self.model.scene.name, A, B, C, D, self._names(), names_in, names_out,
+            self.model.name, A, B, C, D, self._names(), names_in, names_out,
             structure, reason, MappingProxyType(self._shapes()),
             MappingProxyType({str(path): value for path, value in self.model.states(self.state).items()}),
             partial(_play, self), Sizes.of(B, C, D),
         )  # fmt: skip
 
-    def _ports(self, by_force: Array) -> tuple[Array, Array, tuple[str, ...], tuple[str, ...]]:
-        B, C, given, seen = [], [], [], []
+    def _driven(self, by_force: Array) -> tuple[Array, tuple[str, ...]]:
+        """B, and the names of its columns."""
+        columns, names = [np.zeros((2 * self.k + len(self.nodes), 0))], list[str]()
         for name in self.inputs:
-            port = self._port(name)
-            if port.of_place:
-                raise OptionError("inputs", name, "a joint, a body or a marker")
-            force = by_force @ port.jacobian.T
-            B.append(np.vstack([np.zeros((self.k, force.shape[1])), force[self.free.which], self._still(force)]))
-            given += _numbered(name, force.shape[1])
-        for name in self.outputs:
-            C.append(self._seen(self._port(name)))
-            seen += _numbered(name, C[-1].shape[0])
-        size = 2 * self.k + len(self.nodes)
-        return (
-            np.hstack([np.zeros((size, 0)), *B]),
-            np.vstack([np.zeros((0, size)), *C]),
-            tuple(given),
-            tuple(seen),
-        )
+            if (system := self._attached(name)) is not None:
+                columns.append(system.given(name))
+            else:
+                port = self._port(name)
+                if port.of_place:
+                    raise OptionError("inputs", name, "a joint, a body or a marker")
+                force = by_force @ port.jacobian.T
+                still = np.zeros((self.k, force.shape[1])), np.zeros((len(self.nodes), force.shape[1]))
+                columns.append(np.vstack([still[0], force[self.free.which], still[1]]))
+            names += _numbered(name, columns[-1].shape[1])
+        return np.hstack(columns), tuple(names)
 
-    def _still(self, force: Array) -> Array:
-        return np.zeros((len(self.nodes), force.shape[1]))
+    def _outputs(self, width: int) -> tuple[Array, Array, tuple[str, ...]]:
+        """C, D, and the names of their rows."""
+        rows, through, names = [np.zeros((0, 2 * self.k + len(self.nodes)))], [np.zeros((0, width))], list[str]()
+        for name in self.outputs:
+            known = {} if self.system is None else self.system.states
+            if (system := self._attached(name)) is not None:
+                rows.append(system.seen(name))
+                through.append(self._through(system, name, width))
+            else:
+                rows.append(known[name] if name in known else self._seen(self._port(name)))
+                through.append(np.zeros((len(rows[-1]), width)))
+            names += _numbered(name, len(rows[-1]))
+        return np.vstack(rows), np.vstack(through), tuple(names)
+
+    def _attached(self, name: str) -> Ports | None:
+        """The ports of the system where a name is one of them, and none of a joint."""
+        own = self.system
+        return own if own is not None and name in own.names and name not in self.pushed else None
+
+    def _through(self, system: Ports, seen: str, width: int) -> Array:
+        """(d, width) the power conjugate at a port by all inputs: forces change no rate at once."""
+        out, at = np.zeros((len(system.seen(seen)), width)), 0
+        for name in self.inputs:
+            if self._attached(name) is not None:
+                here = system.through(seen, name)
+                out[:, at : at + here.shape[1]] = here
+                at += here.shape[1]
+            else:
+                at += len(self._port(name).jacobian)
+        return out
 
     def _seen(self, port: "_Port") -> Array:
         """Rows of C of a displacement, or of a rate."""
@@ -230,13 +232,17 @@ class _Linear:
 
     def _port(self, name: str) -> "_Port":
         """A port by its name."""
+        if name in self.pushed:
+            joint, part = self.pushed[name]
+            whole = self._port(f"joints.{joint}")
+            return _Port(whole.jacobian[part], whole.turning[part], of_place=False)
         kind, _, rest = name.partition(".")
         words = {"joints": ".coordinate", "bodies": ".position", "markers": ".position"}
-        scene, model = self.model.scene, self.model
+        model = self.model
         known = {
             "joints": [n for n in model.joints if self._dim(n)],
-            "bodies": [n for n, _ in scene.all_bodies()],
-            "markers": [n for n, marker in scene.all_markers() if marker.body != GROUND],
+            "bodies": self.bodies,
+            "markers": tuple(self.points),
         }
         for suffix in ("", words.get(kind, "")):
             own = rest.removesuffix(suffix) if rest.endswith(suffix) else rest
@@ -246,12 +252,12 @@ class _Linear:
                     turning = self.velocities.joints.get(own, np.zeros_like(jacobian))
                     return _Port(jacobian, turning, bool(suffix))
                 if kind == "markers":
-                    marker = dict(scene.all_markers())[own]
-                    return self._point(marker.body, marker.at, of_place=bool(suffix))
+                    return self._point(*self.points[own], of_place=bool(suffix))
                 if suffix:
                     return self._point(own, np.zeros(3), of_place=True)
                 return _Port(model.jacobian(self.state, own), self.velocities.bodies[own], of_place=False)
         every = [f"{key}.{n}" for key, found in known.items() for n in found]
+        every += [] if self.system is None else [*self.system.names, *self.system.states]
         hint = did_you_mean(name, every, f"such as {listing(every)}")
         raise OptionError("port", name, f"the name of a joint, body or marker with a quantity; {hint}")
 
@@ -310,10 +316,10 @@ class _Linear:
 
     def _warming(self, entropy: int) -> float:
         """dθ/ds of a thermal node in K²/J."""
-        path = self.model.layout.entropies[entropy]
-        node = dict(self.model.scene.all_thermal())[".".join([*path[1:-3:2], str(path[-2])])]
-        s = float(_split(self.model, self.state)[2][entropy])
-        return node.temperature * float(np.exp(s / node.capacity)) / node.capacity
+        law = exponential_law(self.stores[entropy])
+        assert law is not None
+        c1, c2 = law
+        return c1 / c2**2 * float(np.exp(_split(self.model, self.state)[2][entropy] / c2))
 
     # ---- names and shapes --------------------------------------------------------------------------------------
 
@@ -350,7 +356,7 @@ def _numbered(name: str, count: int) -> list[str]:
 
 def _play(linear: _Linear, t: Array, moved: Array) -> Solution:
     """The mechanism along some displacements (frames, states) of the state."""
-    problem = problem_of_scene(linear.model.scene)
+    problem = linear.model.problem
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     stored, rows = Stored(model), list[Row]()
     for row in moved:

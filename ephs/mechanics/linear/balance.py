@@ -1,0 +1,143 @@
+"""The balance of a mechanism's forces, by steps along the eigenvectors of its stiffness in the mass metric."""
+
+import numpy as np
+
+from ephs.mechanics.dynamics import Dynamics, State
+from ephs.mechanics.linear.continuation import StaticPath, follow
+from ephs.mechanics.linear.freedoms import freedoms_of, unbalanced
+from ephs.mechanics.runs.assembling import tendon_lengths
+from ephs.mechanics.tree.finding.frames import frames_of
+from ephs.mechanics.tree.finding.spanning import Edge
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces.decompositions import metric_eigen
+from ephs.semantics.spaces.rank import ELIMINATION, TINY
+from ephs.solve.errors import Outcome, SimulationError
+from ephs.solve.problem import NO_STATE
+
+STALLED = 1e-9
+"""Allowed unbalanced fraction of the forces where iterations stagnate."""
+UNFELT = 1e-9
+"""Fraction of the forces along directions without stiffness that counts as rounding."""
+ENOUGH = 1e-12
+"""Allowed unbalanced fraction of the applied forces."""
+STRIDE = 0.3
+"""Largest change of a mechanism in one step, in rad or m."""
+STEPS = 200
+HALVINGS = 8
+"""Reduction of a step after which loops do not close."""
+
+
+def balanced(model: Dynamics) -> tuple[State, float, int, StaticPath | None]:
+    """The equilibrium, its unbalanced fraction of the forces, the number of steps, and the path of the loads."""
+    if not model.loading:
+        return *_settled(model), None
+    model.loading.share = 0.0
+    try:
+        start, _, _ = _settled(model)
+    finally:
+        model.loading.share = 1.0
+    path = follow(model, start, model.problem.length)
+    if path is None:
+        raise restless(*_culprit(model, start))
+    state = path.states[-1]
+    left = unbalanced(model, state, freedoms_of(model, state), model.derivatives(state).force_q)
+    return state, left, len(path.shares) - 1, path
+
+
+def _settled(model: Dynamics) -> tuple[State, float, int]:
+    """The equilibrium, its unbalanced fraction of the forces, and the number of steps."""
+    lengths = lengths_of(model)
+    state, shift, before = _followed(model, _without_rates(model, model.state0), lengths), 0.0, np.inf
+    best, stalled = np.inf, 0
+    for step in range(STEPS):
+        free = freedoms_of(model, state)
+        by, Z = model.derivatives(state), free.Z
+        left = unbalanced(model, state, free, by.force_q)
+        if left <= ENOUGH or (left <= STALLED and stalled >= 3):
+            return state, left, step
+        best, stalled = (left, 0) if left < 0.5 * best else (best, stalled + 1)
+        if left > before:
+            shift = max(4.0 * shift, 1e-3)
+        else:
+            shift *= 0.1
+        before = left
+        M = Z.T @ by.force_a @ Z
+        force = M @ _still(model, state)[free.which]
+        pulled = by.acceleration_s[:, lengths] @ by.entropy_r[lengths]
+        K = -M @ ((by.acceleration_q + pulled) @ Z)[free.which]
+        values, ways = metric_eigen(0.5 * (K + K.T), 0.5 * (M + M.T))
+        size = np.abs(values)
+        flat = size <= ELIMINATION * size.max(initial=0.0)
+        push = ways.T @ force
+        push[flat & (np.abs(push) <= UNFELT * np.abs(push).max(initial=0.0))] = 0.0
+        stretch = push / np.where(flat, max(float(size.max(initial=0.0)), TINY), size + shift * size.max(initial=0.0))
+        change = Z @ (ways @ stretch)
+        change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
+        state = _followed(model, _nearest(model, state, change), lengths)
+    raise restless(*_culprit(model, state))
+
+
+def lengths_of(model: Dynamics) -> list[int]:
+    """Places of tendons' lengths among the entropies."""
+    found = tendon_lengths(frames_of(model.problem.descriptor), model.problem.initial)
+    return [model.layout.entropies.index(path) for path, _ in found]
+
+
+def _followed(model: Dynamics, state: State, lengths: list[int]) -> State:
+    """The state with tendons as long as they are where the joints put their points."""
+    if not lengths:
+        return state
+    q, r, s = model.layout.split(state.array)
+    found = tendon_lengths(frames_of(model.problem.descriptor), model.states(state))
+    for place, (_, length) in zip(lengths, found, strict=True):
+        s[place] = length[0]
+    return model.unpack(np.concatenate([q, r, s]))
+
+
+def _nearest(model: Dynamics, state: State, change: Array) -> State:
+    """The state without rates after a change, or the largest half, quarter, … of it after which loops close."""
+    for halvings in range(HALVINGS):
+        try:
+            return _without_rates(model, model.closed(model.moved(state, 0.5**halvings * change)))
+        except SimulationError:
+            continue
+    return _without_rates(model, model.closed(model.moved(state, 0.5**HALVINGS * change)))
+
+
+def _still(model: Dynamics, state: State) -> Array:
+    """(n,) accelerations from rest."""
+    found = model.acceleration(state)
+    out = np.zeros(model.layout.n)
+    for name, where in model.freedoms.items():
+        out[where] = found[name][: where.size]
+    return out
+
+
+def _without_rates(model: Dynamics, state: State) -> State:
+    q, r, s = model.layout.split(state.array)
+    return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
+
+
+def _culprit(model: Dynamics, state: State) -> tuple[str, str]:
+    """The joint that accelerates most from rest, and how."""
+    found = {name: float(np.abs(a).max(initial=0.0)) for name, a in model.acceleration(state).items()}
+    name = max(found, key=lambda n: found[n])
+    what = f"from rest it still accelerates by {found[name]:.3g} rad/s² or m/s²"
+    driven = [n for n, parts in model.layout.edges.items() if any(_driven(model, edge) for _, edge in parts)]
+    if driven:
+        what += f"; the constant drive of {', '.join(driven)} is balanced nowhere"
+    return f"joints.{name}", what
+
+
+def _driven(model: Dynamics, edge: Edge) -> bool:
+    """Whether a force is given at a joint without a spring."""
+    if edge.port is None or edge.spring < 0:
+        return False
+    spring = model.problem.descriptor.components[edge.spring].primitive
+    given = model.problem.signal(edge.port)
+    return not given.effort and bool(np.any(given.at(0.0, NO_STATE))) and spring.name == "no_potential"
+
+
+def restless(path: str, what: str) -> SimulationError:
+    """The error of a model without equilibrium near by: where, and what still moves."""
+    return SimulationError(Outcome.RESTLESS, 0.0, path, what, None)

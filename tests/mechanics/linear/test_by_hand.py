@@ -1,0 +1,116 @@
+"""Mechanisms made by hand, linearised in independent coordinates of joints, as their scenes are."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import ephs
+from ephs import Pattern, junction, quantity
+from ephs.mechanics import rigid_body
+from ephs.mechanics.elements import components
+from ephs.mechanics.scene.build import scene_inputs
+from ephs.semantics.spaces import SE3
+from tests.mechanics.dynamics.drawn import moving
+from tests.mechanics.methods.test_by_hand import four_bar
+
+EPS = 2.2e-16
+
+
+def given_at_ports(scene):
+    """What a scene prescribes, by the outer ports of its system."""
+    return {
+        str(port): {"effort" if signal.effort else "flow": signal.value} for port, signal in scene_inputs(scene).items()
+    }
+
+
+@settings(max_examples=15)
+@given(drawn=moving())
+def test_a_system_has_the_linear_system_of_its_scene(drawn):
+    """With heat, springs, loops, driven and prescribed joints, in motion; joints have the paths of their boxes."""
+    scene, _, state, _ = drawn
+    system, inputs = scene.system(), given_at_ports(scene)
+    one = ephs.linearize(scene, state)
+    states = ephs.dynamics(scene).states(state)
+    two = ephs.linearize(system, {str(path): value for path, value in states.items()}, inputs=inputs)
+    assert len(one.states) == len(two.states)
+    size = max(np.abs(one.A).max(initial=0.0), 1.0)
+    assert np.abs(one.A - two.A).max(initial=0.0) <= 1e3 * EPS * size * max(1, len(one.A))  # loops closed once more
+
+
+@pytest.mark.parametrize("name", ["bricard", "motor-four-bar", "hot-brake", "screw-press", "cardan-shaft"])
+def test_a_system_has_the_eigenvalues_of_its_scene(name):
+    scene = ephs.load(f"scenes/{name}.toml")
+    one, two = ephs.linearize(scene), ephs.linearize(scene.system(), inputs=given_at_ports(scene))
+    assert np.array_equal(one.A, two.A)
+    assert [state.replace("joints.", "joints.joints.") for state in one.states if state.startswith("joints.")] == [
+        state for state in two.states if state.startswith("joints.")
+    ]
+
+
+def moving_four_bar():
+    """The linkage by hand with its crank at 3 rad/s, and as a scene."""
+    scene, system, poses, inputs = four_bar()
+    model = ephs.dynamics(system, initial=poses, inputs=inputs)
+    return scene, system, model.state(rates={"main": 3.0}), poses, inputs
+
+
+def test_a_loop_made_by_hand_has_two_states_and_in_motion_no_other_eigenvalues_than_its_scene():
+    scene, system, state, poses, inputs = moving_four_bar()
+    first = ephs.dynamics(scene)
+    there = ephs.dynamics(system, initial=poses, inputs=inputs).states(state)
+    expected = ephs.linearize(scene, first.unpack(state.array))
+    found = ephs.linearize(system, {str(path): value for path, value in there.items()}, inputs=inputs)
+    assert found.A.shape == (2, 2)
+    size = np.abs(expected.A).max()
+    assert np.abs(found.A - expected.A).max() <= 1e3 * EPS * size
+    whole = ephs.linearize(system, {str(path): value for path, value in there.items()}, inputs=inputs, form="paper")
+    nearest = max(np.abs(whole.eigenvalues - value).min() for value in expected.eigenvalues)
+    assert whole.A.shape[0] > 2 and nearest > 1e-3 * size  # in all states joints may open: other eigenvalues
+
+
+def test_ports_of_joints_are_the_forces_on_them():
+    _, system, _, poses, inputs = moving_four_bar()
+    found = ephs.linearize(system, poses, inputs=inputs)
+    named = ephs.linearize(system, poses, inputs=["joints.main"])
+    assert found.inputs == ("motor",) and named.inputs == ("joints.main",)
+    assert np.abs(found.B - named.B).max() == 0.0 and np.array_equal(found.C, named.C)
+    assert np.array_equal(found.D, [[0.0]])
+
+
+def test_a_voltage_drives_the_current_that_it_sees():
+    """Of the coil b' = u − …, i = b/l, by hand-made attachments in all states of the system."""
+    scene = ephs.load("scenes/motor-four-bar.toml")
+    states = ["motors.drive.coil.b", "bodies.rocker.pe.q", "bodies.crank.ke.p"]
+    found = ephs.linearize(scene.system(), inputs=given_at_ports(scene), outputs=["voltages.drive", *states])
+    assert found.inputs == ("voltages.drive",)
+    coil = found.states.index("motors.drive.coil.b")
+    size = np.abs(found.A).max()
+    assert np.abs(found.B[:, 0] - np.eye(len(found.A))[coil]).max() <= 1e3 * EPS * size
+    inductance = scene.motors["drive"].inductance
+    assert np.abs(found.C[0] - np.eye(len(found.A))[coil] / inductance).max() <= 1e3 * EPS * size
+    assert np.abs(found.D).max() <= 1e3 * EPS
+    assert np.array_equal(found.C[1], np.eye(len(found.A))[coil])
+    # What the states do to poses and momenta of bodies is what they do to them along the motion.
+    model = ephs.dynamics(scene)
+    jacobian = model.jacobian(model.state0, "rocker")
+    free = [name.split(".")[1] for name in found.states if name.endswith(".rate")]
+    assert free and np.abs(found.C[2:8, 0]).max() > 0.0
+    column = jacobian @ np.concatenate([ephs.linearize(scene, outputs=[f"joints.{j}"]).C[:, 1] for j in model.freedoms])
+    assert np.abs(found.C[2:8, 0] - column).max() <= 1e-12 * np.abs(column).max()
+
+
+def test_what_has_no_place_in_joint_coordinates_is_refused_where_joints_could_open():
+    momentum = quantity.body_momentum
+    boxes = {"rod": {"p": "p"}, "rope": {"p": "p", "x": "x"}, "mass": {"p": "x"}}
+    rope = ephs.transformer({"p": momentum, "x": quantity.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
+    parts = {"rod": rigid_body(1.0, [1, 1, 1]), "rope": rope, "mass": ephs.library.point_mass(m=1.0)}
+    junctions = {"p": junction(momentum), "x": junction(quantity.momentum)}
+    loose = Pattern(junctions=junctions, boxes=boxes)(**parts)
+    assert len(ephs.linearize(loose).states) == 12  # a free body: poses are independent
+    held = Pattern(
+        junctions=junctions | {"ground": junction(momentum)},
+        boxes=boxes | {"earth": {"p": "ground"}, "pin": {"p1": "ground", "p2": "p"}},
+    )(**parts, earth=components.ground(), pin=ephs.mechanics.joint("revolute", SE3.identity(), SE3.identity()))
+    with pytest.raises(ephs.OptionError, match=r"form='paper'"):
+        ephs.linearize(held)
+    assert len(ephs.linearize(held, form="paper").states) > 2
