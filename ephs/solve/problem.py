@@ -213,6 +213,8 @@ class Problem:
         Makes of a solution the motion in the terms of its field; None for a system that is not a scene.
     scene
         The scene that the system was built from, or None.
+    constraints
+        Makes what its joints hold, as `ephs.mechanics.constraints` has it; None where there are no joints.
     dependences
         Says in words which constraints depend on which: what a run that fails at them tells its user.
     shaky
@@ -249,6 +251,7 @@ class Problem:
     motion: Callable[["Solution"], Motion] | None = None
     scene: Any = None
     document: Callable[[], str] = str
+    constraints: Callable[[], Any] | None = None
     dependences: Callable[[], str] | None = None
     shaky: Callable[[], bool] | None = None
     shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
@@ -260,6 +263,11 @@ class Problem:
     length: float = 1.0
     names: Mapping[Path, str] = field(default_factory=dict)
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
+
+    @property
+    def mechanical(self) -> bool:
+        """Whether bodies move in it."""
+        return self.motion is not None or self.linked is not None
 
     def signal(self, port: Path) -> Signal:
         """What is prescribed at an outer port.

@@ -29,7 +29,7 @@ class Balance:
         rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
         totals = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
         self._scale = max(self._scale, totals.scale)
-        return float(totals.defect(mechanical=self._problem.scene is not None)[-1]) * totals.scale / self._scale
+        return float(totals.defect(mechanical=self._problem.mechanical)[-1]) * totals.scale / self._scale
 
 
 def guarded(progress: Progress | None) -> Progress | None:

@@ -10,7 +10,6 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.kinematics import Link, elements
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
@@ -77,27 +76,59 @@ class GearHold:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Mechanism:
-    """A mechanism with the centre (3,) and the length in m by which it is measured."""
+    """A mechanism in one configuration.
 
-    now: Snapshot
+    Parameters
+    ----------
+    joints
+        Names of the joints whose wrenches are asked for.
+    links
+        All joints between bodies.
+    poses, roots
+        (n, 7) of bodies and frames, and their inverse root inertias.
+    joined
+        Rigid gears: name, and joint -> factor of its rate in the sum that vanishes.
+    centre, length
+        (3,), and the length in m by which it is measured: origins of joints and bodies are within it of the centre.
+    """
+
+    joints: tuple[str, ...]
+    links: tuple[Link, ...]
+    poses: Array
+    roots: Array
+    joined: tuple[tuple[str, Mapping[str, float]], ...]
     centre: Array
     length: float
-    joined: tuple[tuple[str, Gear], ...] = ()
 
     @staticmethod
     def of(scene: Scene) -> "Mechanism":
-        """The mechanism of a scene: origins of joints and bodies are within the length of the centre."""
+        """The mechanism of a scene."""
         now = Snapshot.of(scene)
-        ends = [link.second(now.poses)[4:] for link in now.links]
-        points = np.array([*ends, *now.poses[:, 4:]]).reshape(-1, 3)
+        ratios = {
+            name: dict(zip(gear.joints, [-1.0, *np.atleast_1d(gear.ratio)], strict=True))
+            for name, gear in scene.every("gears")
+            if not gear.stiffness
+        }
+        return Mechanism.between([name for name, _ in scene.all_joints()], now.links, now.poses, now.roots(), ratios)
+
+    @staticmethod
+    def between(
+        joints: Sequence[str],
+        links: Sequence[Link],
+        poses: Array,
+        roots: Array,
+        gears: Mapping[str, Mapping[str, float]],
+    ) -> "Mechanism":
+        """The mechanism of links between bodies in these poses."""
+        ends = [link.second(poses)[4:] for link in links]
+        points = np.array([*ends, *poses[:, 4:]]).reshape(-1, 3)
         centre = points.mean(axis=0) if len(points) else np.zeros(3)
         length = float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
-        rigid = tuple((name, gear) for name, gear in scene.every("gears") if not gear.stiffness)
-        return Mechanism(now, centre, length or 1.0, rigid)
+        return Mechanism(tuple(joints), tuple(links), poses, roots, tuple(gears.items()), centre, length or 1.0)
 
     def holds(self, poses: Array, *, motions: bool = True) -> list[Hold]:
         """Constraints of all joints in a configuration, then of the prescribed motions."""
-        pairs = list(zip(self.now.links, elements(self.now.links, poses), strict=True))
+        pairs = list(zip(self.links, elements(self.links, poses), strict=True))
         out = [self._hold(link, poses, x) for link, x in pairs]
         if motions:
             out += [self._hold(link, poses, x, moved=True) for link, x in pairs if link.motion is not None]
@@ -105,16 +136,14 @@ class Mechanism:
 
     def gears(self, poses: Array) -> list[GearHold]:
         """Constraints of the rigid gears in a configuration."""
-        links = {link.name: (link, x) for link, x in zip(self.now.links, elements(self.now.links, poses), strict=True)}
+        links = {link.name: (link, x) for link, x in zip(self.links, elements(self.links, poses), strict=True)}
         out: list[GearHold] = []
-        for name, gear in self.joined:
-            chosen = [links[joint] for joint in gear.joints]
+        for name, ratios in self.joined:
+            chosen = [links[joint] for joint in ratios]
             rates = {
                 link.name: self._hold(link, poses, x, moved=True).rows[0] / self._unit(link, x) for link, x in chosen
             }
-            row = -rates[gear.joints[0]]
-            for joint, ratio in zip(gear.joints[1:], np.atleast_1d(gear.ratio), strict=True):
-                row = row + ratio * rates[joint]
+            row = np.sum([ratio * rates[joint] for joint, ratio in ratios.items()], axis=0)
             row = row / max(float(np.linalg.norm(row)), TINY)
             out.append(GearHold(name, chosen[0][0].body2, chosen[1][0].body2, row[None], rates))
         return out
@@ -127,7 +156,7 @@ class Mechanism:
 
     def moved(self, step: Array) -> Array:
         """The poses (n, 7) after spatial twists (n, 6) about the centre, lengths divided by the mechanism's."""
-        out = self.now.poses.copy()
+        out = self.poses.copy()
         for pose, twist in zip(out, step, strict=True):
             pose[4:] -= self.centre
             pose[:] = SE3.compose(SE3.exp(np.concatenate([twist[:3], self.length * twist[3:]])), pose)

@@ -63,11 +63,11 @@ def _beyond(sizes: Mapping[str, float], least: float, most: float) -> Iterator[t
 def _held(scene: Scene) -> Iterator[str]:
     """Gears that hold joints still, and a mechanism that cannot move."""
     of = Mechanism.of(scene)
-    links, gears = of.now.links, of.gears(of.now.poses)
-    if len(of.now.bodies) > LARGEST or not (gears or len(links) > len(of.now.bodies)):
+    links, gears = of.links, of.gears(of.poses)
+    if len(of.poses) > LARGEST or not (gears or len(links) > len(of.poses)):
         return  # trees without gears can move
-    holds = of.holds(of.now.poses, motions=False)
-    size = 6 * len(of.now.bodies)
+    holds = of.holds(of.poses, motions=False)
+    size = 6 * len(of.poses)
     before, after = (
         _null(np.vstack([np.zeros((0, size)), *(hold.rows for hold in rows)])) for rows in (holds, (*holds, *gears))
     )
@@ -89,7 +89,7 @@ def undetermined_bodies(scene: Scene) -> Iterator[str]:
         return
     size = 6 * len(bodies)
     resting = np.repeat([body.mass > 0.0 for _, body in bodies], 6)
-    holds = [hold.rows for hold in (*of.holds(of.now.poses), *of.gears(of.now.poses))]
+    holds = [hold.rows for hold in (*of.holds(of.poses), *of.gears(of.poses))]
     ways = _null(np.vstack([np.eye(size)[resting], *holds]))
     for i, (name, _) in enumerate(bodies):
         if np.abs(ways[6 * i : 6 * i + 6]).max(initial=0.0) > SPANNED:

@@ -78,13 +78,12 @@ class Dependence:
         return text + (f", {self.here} of these only in this configuration" if self.here else "")
 
 
-def dependences(scene: Scene) -> tuple[Dependence, ...]:
-    """Redundancies in the scene's state, joint by joint in the scene's order, then gear by gear.
+def dependences(of: Mechanism) -> tuple[Dependence, ...]:
+    """Redundancies in a configuration, joint by joint in their order, then gear by gear.
 
     The numbers of directions add up to the number of constraint equations that depend on others.
     """
-    of = Mechanism.of(scene)
-    holds, gears = of.holds(of.now.poses), of.gears(of.now.poses)
+    holds, gears = of.holds(of.poses), of.gears(of.poses)
     every = [*holds, *gears]
     found = redundant(every)
     near = _nearby(of, holds, found[: len(holds)])
@@ -107,7 +106,7 @@ def dependences(scene: Scene) -> tuple[Dependence, ...]:
 
 def explain(scene: Scene) -> str:
     """The scene's dependences and undetermined bodies, as advice for a run that failed; "" where there are none."""
-    return "; ".join(filter(None, [in_words(dependences(scene)), *undetermined_bodies(scene)]))
+    return "; ".join(filter(None, [in_words(dependences(Mechanism.of(scene))), *undetermined_bodies(scene)]))
 
 
 def in_words(found: Sequence[Dependence]) -> str:
@@ -125,14 +124,13 @@ def in_words(found: Sequence[Dependence]) -> str:
     return f"{several} on others{axes}: {_listed(clauses)}"
 
 
-def indeterminate(scene: Scene) -> dict[str, Array]:
+def indeterminate(of: Mechanism) -> dict[str, Array]:
     """By joint, (6,) whether each component of its wrench (moment, force in the joint frame C2) is indeterminate.
 
     These are the components that `JointMotion.wrench` gives as NaN.
     """
-    of = Mechanism.of(scene)
-    out = {name: np.zeros(6, dtype=bool) for name, _ in scene.all_joints()}
-    holds = of.holds(of.now.poses)
+    out = {name: np.zeros(6, dtype=bool) for name in of.joints}
+    holds = of.holds(of.poses)
     if not holds:
         return out
     u, sigma, _ = svd(np.vstack([hold.rows for hold in holds]))
@@ -235,15 +233,15 @@ def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> lis
     least = sum(space.shape[1] for space in found)
     if not least:
         return None
-    now, out = of.now, None
-    _, sigma, vt = svd(np.vstack([hold.rows for hold in of.holds(now.poses, motions=False)]))
+    out = None
+    _, sigma, vt = svd(np.vstack([hold.rows for hold in of.holds(of.poses, motions=False)]))
     ways = vt[rank_of(sigma, CONSTRAINT) :]
-    links = [replace(link, coordinates=None) for link in now.links]
+    links = [replace(link, coordinates=None) for link in of.links]
     rng = np.random.default_rng(0)
     for _ in range(TRIALS if len(ways) else 0):
         step = (rng.standard_normal(len(ways)) @ ways).reshape(-1, 6)
         there = of.moved(step * (AWAY / np.abs(step).max()))
-        closed = close_loops(links, there, now.roots(), frozenset(), Scale(of.length, 1.0))
+        closed = close_loops(links, there, of.roots, frozenset(), Scale(of.length, 1.0))
         if closed is None:
             continue
         there = of.holds(closed)

@@ -200,7 +200,7 @@ def _natural4(model: Model) -> Natural:
 
 
 def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
-    if setting.problem.scene is not None or not _flat(setting.problem):
+    if not _flat(setting.problem):
         return on_joints(_corrected(_implicit))(setting)
     if setting.options:
         raise OptionError("options", ", ".join(setting.options), "none: a system without bodies has no momenta")
@@ -347,7 +347,7 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
     name = method.name
     if problem.scene is not None and not method.scenes:
         raise OptionError("method", name, f"{', '.join(m.name for m in METHODS.values() if m.scenes)} for a scene")
-    if method.posed and problem.scene is None and _flat(problem):
+    if method.posed and _flat(problem):
         raise OptionError("method", name, "radau, which took its place for systems without bodies")
     if hard is not None and not method.impacts:
         known = ", ".join(m.name for m in (*METHODS.values(), AUTO) if m.impacts)
@@ -362,8 +362,6 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
 def _for_all(problem: Problem, step: float | None) -> tuple[MethodEntry, str]:
     if step is not None:
         return METHODS["natural"], "a constant step is given"
-    if problem.scene is not None:
-        return AUTO, "a scene without a constant step"
     if _flat(problem):
         return METHODS["radau"], "a system on vector spaces without a constant step"
     from ephs.mechanics.tree.finding.parts import parts_of

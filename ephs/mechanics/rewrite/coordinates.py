@@ -9,6 +9,7 @@ from typing import final
 
 import numpy as np
 
+from ephs.mechanics.constraints.holding import Mechanism
 from ephs.mechanics.constraints.redundancy import dependences, in_words
 from ephs.mechanics.constraints.subgroup import Subgroup, generated
 from ephs.mechanics.rewrite.rewrite import Strength
@@ -238,7 +239,7 @@ def _redundant(scene: Scene, reduced: Reduced, before: int) -> Step | None:
     rows = sum(loop.rows for loop in found)
     if _rank(reduced, found) == rows:
         return None
-    repeated = dependences(scene)
+    repeated = dependences(Mechanism.of(scene))
     lasting = sum(len(each.directions) - each.here for each in repeated)
     left = lasting - sum(6 - loop.group.dim for loop in found)
     if left <= 0:  # the redundancy is absent in neighbouring configurations

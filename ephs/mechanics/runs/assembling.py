@@ -7,16 +7,19 @@ follow from both.
 """
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
+from ephs.mechanics.constraints.holding import Mechanism
 from ephs.mechanics.motion.batch import compose, inverse
+from ephs.mechanics.scene.adjust import mass_roots
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.kinematics import Link, extent
 from ephs.mechanics.scene.tree import spanning_hops
-from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
+from ephs.mechanics.tree.finding.frames import GROUND, Frames, Unplaced, frames_of
+from ephs.mechanics.tree.finding.parts import parts_of
 from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -26,10 +29,17 @@ from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.systems.system import System
+from ephs.solve.ending import solution_of
+from ephs.solve.problem import Problem
+from ephs.solve.result.record import Record
 from ephs.solve.result.solution import Solution
 
 TENSION_SPRINGS = ("tension_spring", "slack_spring")
 """Storages of the length of a tendon."""
+OPEN = 1e-6
+"""Largest joint residual of given initial states, in m or rad."""
+OFF = 1e-3
+"""Relative error allowed in momenta off the joints: nodal momenta of some methods satisfy joints to their order."""
 
 
 @final
@@ -78,6 +88,11 @@ class FlatJoints:
                 angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # of small ones, and half turns still show
                 worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
         return worst
+
+    @property
+    def holding(self) -> bool:
+        """Whether a joint holds anything."""
+        return any(link.coupling.dim < 6 for link in self.links)
 
     def _inside(self, solution: Solution, number: int) -> Array:
         """(n, 7) relative poses of a joint."""
@@ -185,3 +200,66 @@ def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection
         if path not in given:
             out[path] = x
     return out
+
+
+def constraints_of(joints: FlatJoints, problem: Problem) -> Mechanism:
+    """What the joints of a system hold in its initial state."""
+    state, wiring = problem.initial, joints.frames.wiring
+    links: list[Link] = []
+    for link, joint in zip(joints.links, joints.frames.joints, strict=True):
+        port = wiring.outer.get(joint.rate)
+        signal = None if port is None else problem.signals.get(port)
+        moved = signal is not None and signal.effort and joint.pair.dim == 1
+        motion = float(signal.at(0.0, state)[0]) if signal is not None and moved else None
+        links.append(replace(link, motion=motion, near=np.array(state[joint.state.path])))
+    poses = np.array([SE3.identity() if path is None else state[path] for path in joints.poses]).reshape(-1, 7)
+    for hop in spanning_hops(joints.links, len(poses), ()):
+        if joints.poses[hop.body] is None:  # a frame is where the joint before it puts it
+            x = state[joints.relative[hop.link]]
+            link = links[hop.link]
+            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+    inertias = [link.inertia for link in joints.frames.links]
+    heaviest = max(inertias, key=lambda inertia: float(inertia[5, 5]), default=np.eye(6))
+    whole = [heaviest if inertia[5, 5] == 0.0 else inertia for inertia in inertias]  # some metric: frames have no mass
+    roots = mass_roots(np.array([i[5, 5] for i in whole]), np.array([i[:3, :3] for i in whole]).reshape(-1, 3, 3))
+    names = [link.name for link in links if link.coupling.dim < 6]
+    return Mechanism.between(names, links, poses, roots, _gears(joints, problem))
+
+
+def _gears(joints: FlatJoints, problem: Problem) -> dict[str, dict[str, float]]:
+    """Box of a rigid gear -> joint -> factor of its rate in the sum that vanishes."""
+    try:
+        network = parts_of(problem).network
+    except Unplaced:
+        return {}
+    named = {joint.rate: str(joint.path) for joint in joints.frames.joints}
+    out: dict[str, dict[str, float]] = {}
+    for tie in network.ties:
+        path = problem.descriptor.components[tie.component].path
+        box = Path(tuple(path)[:-1]) if len(path) > 1 else path
+        out[str(box)] = {named[network.rates[i][0]]: ratio for i, ratio in tie.terms}
+    return out
+
+
+def check_closed(problem: Problem) -> None:
+    """Check given initial states against the joints.
+
+    Raises
+    ------
+    AssemblyError
+        A joint is open, or a momentum contradicts the joints by more than methods leave it off them.
+    """
+    d = problem.descriptor
+    x = d.pack(problem.initial)
+    once = Record(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
+    assert problem.motion is not None
+    motion = problem.motion(solution_of(problem, once, {}))
+    gap = float(motion.constraint_error()[0])
+    if gap > OPEN:
+        raise AssemblyError("open-joint", problem.name, found=f"{gap:.1e} m or rad")
+    for path, value in motion.state(0).items():
+        given = problem.initial[path]
+        if value.shape == given.shape and path[-1] == "p":
+            off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
+            if off > OFF:
+                raise AssemblyError("off-joint", path, found=off)

@@ -12,7 +12,6 @@ from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
 from ephs.mechanics.runs.touching import run_of_touching, without_contacts
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units, mobility_of
-from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import ROOT, Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
@@ -148,12 +147,9 @@ def _motion(problem: Problem, given: Collection[str]) -> Iterator[CheckItem]:
         yield CheckItem("motion", False, str(error))
         return
     gap, slip = float(start.constraint_error[0]), float(start.velocity_error[0])
-    if problem.scene is not None:
-        now = Snapshot.of(problem.scene)
-        near = ASSEMBLY * now.scale(problem.scene.world.gravity).length
-        yield CheckItem("closure", gap < near, f"largest gap {gap:.1e} m or rad, largest velocity residual {slip:.1e}")
-    elif problem.gaps is not None:
-        yield CheckItem("closure", gap < ASSEMBLY, f"largest gap {gap:.1e} m or rad")
+    if problem.motion is not None or problem.gaps is not None:
+        detail = f"largest gap {gap:.1e} m or rad, largest velocity residual {slip:.1e}"
+        yield CheckItem("closure", gap < ASSEMBLY * problem.length, detail)
     error, ledgers = float(start.energy_error.max()), start.ledgers
     stored = float(np.max(np.sum([np.abs(energy) for energy in ledgers.storages.values()], axis=0), initial=0.0))
     stored += _weight(problem.scene) if problem.scene is not None else 0.0
@@ -183,16 +179,17 @@ def _weight(scene: Scene) -> float:
 
 
 def _redundancy(problem: Problem, count: int) -> Iterator[CheckItem]:
-    """Dependent constraints; of a system without a scene, only their number."""
-    if problem.scene is None:
+    """Dependent constraints; of a system without joints, only their number."""
+    if problem.constraints is None:
         detail = f"{count} of the constraint equations depend on others"
         if count:
             detail += "; the motion is unique, their multipliers are not"
         yield CheckItem("redundant constraints", True, detail)
         return
-    repeated = dependences(problem.scene)
+    mechanism = problem.constraints()
+    repeated = dependences(mechanism)
     detail = in_words(repeated) or "none"
     if repeated and not any(each.here for each in repeated):  # where motions part, none is unique
         detail += "; the motion is still unique"
     yield CheckItem("redundant constraints", True, detail)
-    yield CheckItem("joint wrenches", True, wrenches_in_words(indeterminate(problem.scene)))
+    yield CheckItem("joint wrenches", True, wrenches_in_words(indeterminate(mechanism)))

@@ -1,20 +1,22 @@
 """`simulate`: from a system or a scene to its motion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.constraints.redundancy import explain
+from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.redundancy import dependences, explain, in_words
 from ephs.mechanics.methods.options import options_of
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, chosen
 from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.views import view_of
 from ephs.mechanics.rewrite.folded import folded_problem
-from ephs.mechanics.runs.assembling import flat_joints, start_of
+from ephs.mechanics.runs.assembling import check_closed, constraints_of, flat_joints, start_of
 from ephs.mechanics.runs.journaling import journaled
 from ephs.mechanics.runs.pace import longest_step
 from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
@@ -47,13 +49,11 @@ from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.findings import POLICIES, judged
 from ephs.solve.breakpoints import Breakpoints
 from ephs.solve.control import ATOL, RTOL, Control, Tolerance, told_apart
-from ephs.solve.ending import solution_of
 from ephs.solve.errors import OptionError, count_of, failing_at, nearest_of, number_of
 from ephs.solve.events import events_of
 from ephs.solve.journal import Journal
 from ephs.solve.methods.own import Method, coefficients_of
 from ephs.solve.problem import Problem, Signal
-from ephs.solve.result.record import Record
 from ephs.solve.result.solution import Solution
 from ephs.solve.sampled import Sampling, holding
 from ephs.solve.threads import in_one_thread
@@ -62,10 +62,6 @@ from ephs.solve.watching import guarded
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-OPEN = 1e-6
-"""Largest joint residual of given initial states, in m or rad."""
-OFF = 1e-3
-"""Relative error allowed in momenta off the joints: nodal momenta of some methods satisfy joints to their order."""
 FORMS = ("paper", "folded", "reduced")
 
 
@@ -328,7 +324,11 @@ def problem_of_system(
     linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
     given = reference or Reference()
     document = cache(lambda: system_text(system, signals, given))
-    return Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked, document=document)
+    made = Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked, document=document)
+    if not joints.holding:
+        return made
+    held = cache(lambda: constraints_of(joints, made))
+    return replace(made, constraints=held, dependences=lambda: in_words(dependences(held())))
 
 
 @paused_collector()
@@ -365,6 +365,7 @@ def problem_of_scene(
         motion=lambda solution: SceneMotion(scene, solution),
         scene=scene,
         document=lambda: once(scene, "text", lambda: scene_to_text(scene)),
+        constraints=lambda: Mechanism.of(scene),
         dependences=lambda: explain(scene),
         shaky=lambda: is_shaky(scene),
         length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
@@ -372,28 +373,5 @@ def problem_of_scene(
         names=once(scene, "names", lambda: scene_names(scene)),
     )
     if initial:
-        _on_joints(problem)
+        check_closed(problem)
     return problem
-
-
-def _on_joints(problem: Problem) -> None:
-    """Check given initial states against the joints.
-
-    Raises
-    ------
-    AssemblyError
-        A joint is open, or a momentum contradicts the joints by more than methods leave it off them.
-    """
-    d = problem.descriptor
-    x = d.pack(problem.initial)
-    once = Record(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
-    motion = SceneMotion(problem.scene, solution_of(problem, once, {}))
-    gap = float(motion.constraint_error()[0])
-    if gap > OPEN:
-        raise AssemblyError("open-joint", problem.name, found=f"{gap:.1e} m or rad")
-    for path, value in motion.state(0).items():
-        given = problem.initial[path]
-        if value.shape == given.shape and path[-1] == "p":
-            off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
-            if off > OFF:
-                raise AssemblyError("off-joint", path, found=off)

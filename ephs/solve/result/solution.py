@@ -171,7 +171,7 @@ class Solution:
     @cached_property
     def energy_error(self) -> Array:
         """(n,) defect of the energy balance, relative to the largest ``K + |V − V₀| + |heat| + |work|`` of the run."""
-        return self.ledgers.defect(mechanical=self.scene is not None)
+        return self.ledgers.defect(mechanical=self.problem is not None and self.problem.mechanical)
 
     @property
     def entropy_production(self) -> Array:
