@@ -11,6 +11,7 @@ from benchmarks.hard.loops import stretched
 from ephs.mechanics.constraints.holding import Mechanism
 from ephs.mechanics.constraints.plausible import doubts
 from ephs.mechanics.constraints.redundancy import dependences, explain
+from ephs.mechanics.runs.simulate import problem_of_system
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = [*sorted(ROOT.glob("scenes/*.toml")), *sorted(ROOT.glob("examples/*.toml"))]
@@ -58,6 +59,10 @@ def test_a_gear_that_repeats_others_is_named():
         (f"outer{k}", ("inner0", "outer0", f"inner{k}")) for k in (1, 2)
     ]
     assert doubts(planets()) == ()
+    found = dependences(problem_of_system(planets().system()).constraints())  # the same gears without a scene
+    assert [str(each).replace("gears.", "") for each in found] == [
+        str(each) for each in dependences(Mechanism.of(planets()))
+    ]
 
 
 def test_gears_that_hold_joints_still_are_named():

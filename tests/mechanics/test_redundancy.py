@@ -11,8 +11,8 @@ import ephs
 from ephs.mechanics.constraints.holding import Mechanism
 from ephs.mechanics.constraints.redundancy import dependences, explain, indeterminate, wrenches_in_words
 from ephs.mechanics.runs.check import check_model
-from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.scene.build import component_path, scene_inputs
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import GROUND
 from ephs.semantics.spaces import SE3
@@ -356,3 +356,17 @@ def test_a_joint_doubled_repeats_itself(scene):
         if of.kind not in ("screw", "universal"):  # a screw couples two directions, a cross has axes askew
             assert all(np.count_nonzero([*d.moment, *d.force]) == 1 for d in found[0].directions)
     agrees(twice)
+
+
+@pytest.mark.parametrize("name", ["four-bar", "bricard", "cardan-shaft", "n-four-bar"])
+def test_a_system_repeats_what_its_scene_does(name):
+    """In the same words, but for the paths of boxes."""
+    scene = ephs.load(ROOT / "scenes" / f"{name}.toml")
+    inputs = {
+        str(port): {"effort" if signal.effort else "flow": signal.value} for port, signal in scene_inputs(scene).items()
+    }
+    of, own = problem_of_system(scene.system(), None, inputs).constraints(), Mechanism.of(scene)
+    assert [str(each).replace("joints.", "") for each in dependences(of)] == [str(each) for each in dependences(own)]
+    here, there = indeterminate(of), indeterminate(own)
+    assert [joint.removeprefix("joints.") for joint in here] == list(there)
+    assert all(np.array_equal(*each) for each in zip(here.values(), there.values(), strict=True))

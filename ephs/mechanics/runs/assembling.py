@@ -18,8 +18,7 @@ from ephs.mechanics.scene.adjust import mass_roots
 from ephs.mechanics.scene.geometry import Coupling
 from ephs.mechanics.scene.kinematics import Link, extent
 from ephs.mechanics.scene.tree import spanning_hops
-from ephs.mechanics.tree.finding.frames import GROUND, Frames, Unplaced, frames_of
-from ephs.mechanics.tree.finding.parts import parts_of
+from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
 from ephs.mechanics.tree.finding.wiring import Wiring
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -223,21 +222,22 @@ def constraints_of(joints: FlatJoints, problem: Problem) -> Mechanism:
     whole = [heaviest if inertia[5, 5] == 0.0 else inertia for inertia in inertias]  # some metric: frames have no mass
     roots = mass_roots(np.array([i[5, 5] for i in whole]), np.array([i[:3, :3] for i in whole]).reshape(-1, 3, 3))
     names = [link.name for link in links if link.coupling.dim < 6]
-    return Mechanism.between(names, links, poses, roots, _gears(joints, problem))
+    return Mechanism.between(names, links, poses, roots, _gears(joints))
 
 
-def _gears(joints: FlatJoints, problem: Problem) -> dict[str, dict[str, float]]:
+def _gears(joints: FlatJoints) -> dict[str, dict[str, float]]:
     """Box of a rigid gear -> joint -> factor of its rate in the sum that vanishes."""
-    try:
-        network = parts_of(problem).network
-    except Unplaced:
-        return {}
-    named = {joint.rate: str(joint.path) for joint in joints.frames.joints}
-    out: dict[str, dict[str, float]] = {}
-    for tie in network.ties:
-        path = problem.descriptor.components[tie.component].path
-        box = Path(tuple(path)[:-1]) if len(path) > 1 else path
-        out[str(box)] = {named[network.rates[i][0]]: ratio for i, ratio in tie.terms}
+    wiring, out = joints.frames.wiring, dict[str, dict[str, float]]()
+    named = {joint.rate: str(joint.path) for joint in joints.frames.joints if joint.pair.dim == 1}
+    for number, slot in enumerate(wiring.components):
+        primitive, ports = slot.primitive, wiring.ports(number)
+        if not isinstance(primitive, Reversible) or primitive.reads or not named.keys() >= set(ports.values()):
+            continue
+        _, rows = primitive.structure({})
+        box = Path(tuple(slot.path)[:-1]) if len(slot.path) > 1 else slot.path
+        for k, row in enumerate(rows):
+            ratios = zip(ports.values(), row.tolist(), strict=True)
+            out[f"{box}" if len(rows) == 1 else f"{box}[{k}]"] = {named[at]: ratio for at, ratio in ratios}
     return out
 
 
