@@ -30,7 +30,7 @@ KEPT = 0.3
 """As `Stages.enough`, at constant steps: with a kept matrix errors fall by a rate, and not as squares."""
 NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
-PIVOTING = ("swap", "swaps", "end", "ends")
+PIVOTING = ("swaps", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
 FACTORS, FACTORED, SUBSTITUTED = 2, 120, 40
 """Evaluations that cost as much as factors of a matrix of n freedoms, and solutions: 2 + n²/120 and 1 + n/40.
@@ -202,27 +202,27 @@ class Kept:
     Parameters
     ----------
     stages
-        The same method step by step, with three stages, whose Jacobian and counts it shares.
+        The same method step by step, whose Jacobian and counts it shares.
     """
 
     def __init__(self, stages: Stages) -> None:
-        eq, m = stages.equations, stages.jacobian.size
+        eq, m, scheme = stages.equations, stages.jacobian.size, stages.scheme
         self._stages, self._counted = stages, [0, 0]
-        (one, pair), (vector, turned) = stages.scheme.values, stages.scheme.back.T
-        out = np.column_stack([np.real(vector), np.real(turned), -np.imag(turned)])
+        # In these coordinates the inverse is (Re μ, −Im μ; Im μ, Re μ) on the pair of each of its eigenvalues μ.
+        out = np.ascontiguousarray(_parts(scheme.back.T, -1.0).T)
+        count, systems = scheme.nodes.size, len(scheme.values)
         self.newton = Newton.table(1)
         n: Any = self.newton[0]
-        n.enough, n.rough, n.stale = stages.enough_kept, stages.rough, 1
-        # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
-        n.decay, n.growth, n.turning = 1.0 / one.real, (1.0 / pair).real, (1.0 / pair).imag
+        n.enough, n.rough, n.stale, n.pairs = stages.enough_kept, stages.rough, 1, systems - 1
         shapes: dict[str, tuple[int, ...]] = {
-            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "single": (m, m), "pair": (2 * m, m),
-            "stages": (3, m), "change": (3, m), "part": (m,), "parts": (2 * m,), "right": (2 * eq.n,), "y": (eq.size,),
-            "rate": (eq.size,), "q": (eq.reduced.coordinates,),
+            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "factors": (count * m, m),
+            "right": (2 * eq.n,), "y": (eq.size,), "rate": (eq.size,), "q": (eq.reduced.coordinates,), "part": (count,),
+            **dict.fromkeys(("stages", "change", "parts"), (count, m)),
         }  # fmt: skip
         self.memory: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "newton": self.newton, "inverse": stages.inverse, "into": np.linalg.inv(out), "out": out,
-            **{name: np.zeros(m, dtype=np.int64) for name in PIVOTING},
+            "values": _parts(1.0 / np.array(scheme.values)[:, None], 1.0).ravel(),
+            **{name: np.zeros(systems * m, dtype=np.int64) for name in PIVOTING},
         }  # fmt: skip
 
     def renew(self, state: ReducedState) -> None:
@@ -278,5 +278,10 @@ class Kept:
     def parts(self) -> list[tuple[str, Any]]:
         """All that the next step depends on, by name."""
         integers, reals = self.newton.arrays
-        names = "matrix", "damping", "spring", "single", "pair", *PIVOTING
+        names = "matrix", "damping", "spring", "factors", *PIVOTING
         return [("newton", integers), ("newton_reals", reals), *((name, self.memory[name]) for name in names)]
+
+
+def _parts(rows: Array, sign: float) -> Array:
+    """Rows in real numbers: the first, which is real, and both parts of each other one, the second times a sign."""
+    return np.array([np.real(rows[0]), *(part for row in rows[1:] for part in (np.real(row), sign * np.imag(row)))])

@@ -6,7 +6,7 @@ Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8.
 from dataclasses import dataclass
 from typing import final
 
-from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.linear.dense import clear, copy, dot
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
 from ephs.solve.march.evaluating import evaluate, place
 from ephs.solve.march.memory import Errors
@@ -26,7 +26,7 @@ def newton(
     on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
     errors: Errors, stiff: Stiff, y: Vector, q: Vector,
 ) -> Integer:  # fmt: skip
-    """Solve the three stages of a step of length h from (base, start), k[0] known; their rates go to k.
+    """Solve the stages of a step of length h from (base, start), k[0] known; their rates go to k.
 
     Returns
     -------
@@ -90,12 +90,12 @@ def filtered(
     on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, k: Matrix,
     errors: Errors, stiff: Stiff,
 ) -> Real:  # fmt: skip
-    """Return the error of a step relative to the tolerance, by the embedded method of order 3.
+    """Return the error of a step relative to the tolerance, by the embedded method, of order ``stages``.
 
     The difference is filtered by the equations, as its stiff part must be; where it is too large, once more from where
     it leads, as of stiff parts the first estimate is.
     """
-    m, n = stiff.part, stiff.newton[0]
+    m, n = stiff.parts.row(0), stiff.newton[0]
     worst, solver = on.variable(0.0), Solver(on, stiff, n.factored)
 
     def estimate(first: Vector) -> None:
@@ -153,20 +153,24 @@ class _Newton:
         on, s, size = self.on, self.stiff, self.stiff.matrix.rows
 
         def defect(j: Integer) -> None:
-            rests = [self.k[i + 1, j] - _weighted(s.inverse, i, s.stages, j) / self.h for i in range(3)]
-            for row, out in ((0, s.part), (1, s.parts.part(0, size)), (2, s.parts.part(size, size))):
-                out[j] = s.into[row, 0] * rests[0] + s.into[row, 1] * rests[1] + s.into[row, 2] * rests[2]
+            def rest(i: Integer) -> None:
+                s.part[i] = self.k[i + 1, j] - self._led(i, j)
 
-        def back(j: Integer) -> None:
-            for i in range(3):
-                x = s.out[i, 0] * s.part[j] + s.out[i, 1] * s.parts[j] + s.out[i, 2] * s.parts[size + j]
-                s.change[i, j] = x
+            def turn(i: Integer) -> None:
+                s.parts[i, j] = dot(on, s.into.row(i), s.part)
+
+            on.loop(s.stages.rows, rest)
+            on.loop(s.stages.rows, turn)
+
+        def back(i: Integer) -> None:
+            def entry(j: Integer) -> None:
+                s.change[i, j] = _summed(on, s.out.row(i), s.parts, j)
+
+            on.loop(size, entry)
 
         on.loop(size, defect)
-        solver = Solver(on, s, self.h)
-        solver.one()
-        solver.two()
-        on.loop(size, back)
+        Solver(on, s, self.h).all()
+        on.loop(s.stages.rows, back)
 
     def size(self, errors: Errors, y: Vector) -> Real:
         """Largest change relative to the tolerance at the stages' values, which are written to y.
@@ -178,14 +182,19 @@ class _Newton:
 
         def reach(j: Integer) -> None:
             most = on.variable(0.0)
-            for i in range(3):
+
+            def stage(i: Integer) -> None:
                 most.value = on.maximum(most.value, on.absolute(s.stages[i, j] + s.change[i, j]))
+
+            on.loop(s.stages.rows, stage)
             y[j] = on.absolute(y[j]) + most.value
 
         def compare(j: Integer) -> None:
-            for i in range(3):
+            def stage(i: Integer) -> None:
                 x = on.absolute(s.change[i, place(on, self.motion, j)]) / errors.allowed[j]
                 worst.value = on.select(x <= worst.value, worst.value, x)
+
+            on.loop(s.stages.rows, stage)
 
         on.loop(s.matrix.rows, reach)
         self.motion.sizes(on, self.start, y, errors.allowed)
@@ -205,14 +214,27 @@ class _Newton:
 
     def rates(self) -> None:
         """Rates that lead to the stages, of all that is not summed: these are those of the stages."""
+
+        def stage(i: Integer) -> None:
+            def one(j: Integer) -> None:
+                self.k[i + 1, j] = self._led(i, j)
+
+            self.on.loop(self.motion.summed, one)
+
+        self.on.loop(self.stiff.stages.rows, stage)
+
+    def _led(self, i: Integer, j: Integer) -> Real:
+        """The rate of one number at a stage that leads to the increments of all stages."""
         s = self.stiff
-
-        def one(j: Integer) -> None:
-            for i in range(3):
-                self.k[i + 1, j] = _weighted(s.inverse, i, s.stages, j) / self.h
-
-        self.on.loop(self.motion.summed, one)
+        return _summed(self.on, s.inverse.row(i), s.stages, j) / self.h
 
 
-def _weighted(weights: Matrix, i: int, stages: Matrix, j: Integer) -> Real:
-    return weights[i, 0] * stages[0, j] + weights[i, 1] * stages[1, j] + weights[i, 2] * stages[2, j]
+def _summed(on: Evaluator, weights: Vector, rows: Matrix, j: Integer) -> Real:
+    """One entry of the weighted sum of a matrix's rows."""
+    total = on.variable(0.0)
+
+    def add(i: Integer) -> None:
+        total.value = total.value + weights[i] * rows[i, j]
+
+    on.loop(rows.rows, add)
+    return total.value
