@@ -18,7 +18,7 @@ from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
 from ephs.solve.march.newton import ITERATIONS
-from ephs.solve.methods.collocation import Collocation
+from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
 
@@ -42,9 +42,16 @@ FAST = 2e-3
 """Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
 
 
-def costs(freedoms: int) -> tuple[int, int]:
-    """Cost of factors and of solutions with them, in evaluations of the rates."""
-    return FACTORS + freedoms * freedoms // FACTORED, 1 + freedoms // SUBSTITUTED
+def costs(freedoms: int, stages: int) -> tuple[int, int]:
+    """Cost of factors for a number of stages and of solutions with them, in evaluations of the rates."""
+    work = freedoms * (2 * stages - 1)  # a complex matrix takes four times as much as a real one
+    return FACTORS + freedoms * work // (5 * FACTORED), 1 + work // (5 * SUBSTITUTED)
+
+
+def scheme_of(equations: Equations, control: Control) -> Collocation:
+    """The stages of radau on a mechanism: by the tolerance, and fewer of them where surfaces may touch."""
+    kinked = bool(equations.reduced.tables.support.any())
+    return radau_for(control.rtol.value if control.step is None else None, kinked=kinked)
 
 
 @final
@@ -246,7 +253,7 @@ class Kept:
     def cost(self) -> int:
         """Cost of matrices, factors and solutions so far, in evaluations, roughly."""
         n: Any = self.newton[0]
-        factors, solutions = costs(self._stages.equations.n)
+        factors, solutions = costs(self._stages.equations.n, self._stages.scheme.nodes.size)
         return self._stages.jacobian.cost + solutions * int(n.iterations) + factors * int(n.factorisations)
 
     def fastest(self) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
-from ephs.solve.methods.collocation import moments, radau, values
+from ephs.solve.methods.collocation import moments, radau_for, values
 from ephs.solve.methods.continuous import Instant, Matrices
 from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.passages import Passages
@@ -31,8 +31,6 @@ PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""
 
 ITERATIONS = 10
-COARSE, FINE = 3e-3, 3e-7
-"""Relative tolerances above the first are for order 5, those below the second for order 13, the others for order 9."""
 ROUNDING = 10.0 * np.finfo(float).eps
 """Part of the terms of an equation by which rounding changes their sum."""
 FARTHEST = 2.0
@@ -102,8 +100,7 @@ class Radau:
         self._passages = Passages(self.model, self.stores, self.equations.conduction)
         self._settling = Settling(self.model, self.stores.components)
         self._chosen = control.step is None
-        rtol = control.rtol.value
-        self.scheme = radau(3 if not self._chosen or rtol > COARSE else 5 if rtol >= FINE else 7)
+        self.scheme = radau_for(control.rtol.value if self._chosen else None)
         self.exponent = self.scheme.nodes.size + 1.0
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.evaluations = self.factorisations = self.iterations = 0
