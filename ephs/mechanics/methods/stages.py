@@ -14,10 +14,11 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.stage import PLAIN
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
-from ephs.solve.march.newton import ITERATIONS
+from ephs.solve.march.iteration import iterate
 from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
@@ -168,10 +169,9 @@ class Stages:
         eq, size, count = self.equations, self.jacobian.size, self.scheme.nodes.size
         stages, rates = np.zeros((count, size)), np.zeros((count, eq.size))
         coldest = eq.heats.coldest(y0[self.heat])  # an iterate may overshoot, a solution is not below
-        totals = slice(eq.nv + eq.n + eq.ns, eq.size)
-        worst, before = np.zeros(eq.counted.size), np.inf
-        rate = moved = np.inf
-        for iteration in range(1, ITERATIONS + 1):
+        worst = np.zeros(eq.counted.size)
+
+        def correct(_: Any) -> float:
             for i, node in enumerate(self.scheme.nodes):
                 y = y0.copy()
                 y[:size] += stages[i]
@@ -181,23 +181,13 @@ class Stages:
             change = self._change(state, h, rates[:, :size] - self.inverse @ stages / h)
             reached = np.abs(y0)  # states that start from zero, such as heat, are scaled by their end values
             reached[:size] += np.abs(stages + change).max(axis=0)
-            worst = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
-            moved = float(np.max(worst, initial=0.0))
-            if not np.isfinite(moved):
-                break
-            stages += change
-            if iteration > 1:
-                rate = moved / before
-                # heats are quadratic in rates: their first change is no measure of convergence
-                if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self.enough, self.rough):
-                    break
-            if moved <= self.enough or (iteration > 1 and moved * rate <= self.enough * (1.0 - min(rate, 0.9))):
-                return stages, rates[:, totals], iteration <= 2 or rate < FAST
-            if iteration > 2 and rate > 0.5 and moved <= self.rough:  # only rounding remains
-                return stages, rates[:, totals], False
-            before = moved
-        if moved <= self.rough:  # near a change of rank the matrix is no good, and the iteration slow
-            return stages, rates[:, totals], False
+            worst[:] = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
+            stages[:] += change
+            return float(np.max(worst, initial=0.0))
+
+        found = iterate(PLAIN, correct, self.enough, self.rough, FAST)
+        if found.solved:
+            return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 

@@ -7,18 +7,12 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.semantics.linear.dense import clear, copy, dot
-from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
 from ephs.solve.march.evaluating import evaluate, place
+from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 from ephs.solve.march.stiff import Solver, Stiff, whole
-
-ITERATIONS = 10
-"""Iterations after which a step is given up."""
-FAST = 0.3
-"""A rate of convergence from which on a new matrix is made: one costs as much as a dozen iterations."""
-BEYOND = 1e300
-"""Bound of numbers: nan is not below it."""
 
 
 @staged
@@ -35,8 +29,7 @@ def newton(
     """
     run = _Newton(on, motion, control, start, h, k, stiff)
     n = stiff.newton[0]
-    status, tries, done = on.counter(0), on.counter(0), on.counter(0)
-    before, rate = on.variable(BEYOND), on.variable(BEYOND)
+    status, moved = on.counter(0), on.variable(0.0)
     on.when(on.negate(on.absolute(n.factored - h) <= 0.0), Solver(on, stiff, h).factorise)
     clear(on, whole(stiff.stages))
 
@@ -51,36 +44,26 @@ def newton(
     def rest(i: Integer) -> None:
         copy(on, k.row(0), k.row(i + 1))
 
-    def once() -> Truth:
-        tries.value, n.iterations = tries.value + 1, n.iterations + 1
+    def correct(tries: Integer) -> Real:
+        n.iterations, moved.value = n.iterations + 1, 2.0 * BEYOND
         # The stages begin at the start of the step, whose rates are known.
-        begins = on.same(tries.value, 1)
+        begins = on.same(tries, 1)
         on.when(begins, lambda: on.loop(stiff.stages.rows, rest), lambda: on.loop(stiff.stages.rows, stage))
         on.when(on.same(status.value, 0), go)
-        return on.either(on.negate(on.same(status.value, 0)), done.value > 0)
+        return moved.value
 
     def go() -> None:
         run.solve()
-        moved = run.size(errors, y)
+        moved.value = run.size(errors, y)
         run.move()
-        later = tries.value > 1
-        rate.value = on.select(later, moved / before.value, BEYOND)
-        slow = on.minimum(rate.value, 0.9)
-        close = on.both(later, moved * rate.value <= n.enough * (1.0 - slow))
-        solved = on.either(moved <= n.enough, close)
-        # Rounding, or a poor matrix near a change of rank, ends convergence.
-        stuck = on.both(tries.value > 2, on.both(rate.value > 0.5, moved <= n.rough))
-        rough = on.either(stuck, on.both(tries.value >= ITERATIONS, moved <= n.rough))
-        away = on.both(on.both(tries.value > 2, rate.value >= 1.0), moved > on.maximum(10.0 * n.enough, n.rough))
-        lost = on.either(on.negate(moved < BEYOND), on.either(away, tries.value >= ITERATIONS))
-        fast = on.either(tries.value <= 2, rate.value < FAST)
-        n.stale = on.select(on.both(solved, fast), 0, 1)
-        done.value = on.select(on.either(solved, rough), 1, 0)
-        failed = on.both(lost, on.same(done.value, 0))
-        status.value = on.select(failed, int(Status.UNSETTLED), 0)
-        before.value = moved
 
-    on.repeat(once)
+    found = iterate(on, correct, n.enough, n.rough, FAST)
+
+    def judge() -> None:
+        n.stale = on.select(found.fast, 0, 1)
+        status.value = on.select(found.solved, 0, int(Status.UNSETTLED))
+
+    on.when(on.same(status.value, 0), judge)
     on.when(on.same(status.value, 0), run.rates)
     return status.value
 
