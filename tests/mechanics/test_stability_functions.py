@@ -12,6 +12,7 @@ import pytest
 import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
+from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
@@ -36,17 +37,19 @@ def rational(top, bottom, z):
     return np.linalg.solve(under, over)
 
 
+def pade(top, bottom):
+    """The rational function of these degrees next to the exponential one."""
+
+    def coefficients(own, other, sign):
+        whole = math.factorial(own + other)
+        return [sign**j * math.factorial(own + other - j) * math.comb(own, j) / whole for j in range(own + 1)]
+
+    return lambda z: rational(coefficients(top, bottom, 1), coefficients(bottom, top, -1), z)
+
+
 def diagonal(stages):
     """Padé (s, s): s Gauss stages, of which one is the midpoint rule."""
-    top = [
-        math.factorial(2 * stages - j) * math.comb(stages, j) / math.factorial(2 * stages) for j in range(stages + 1)
-    ]
-    return lambda z: rational(top, [(-1) ** j * x for j, x in enumerate(top)], z)
-
-
-def radau(z):
-    """Padé (2, 3): Radau IIA with three stages."""
-    return rational([1.0, 2 / 5, 1 / 20], [1.0, -3 / 5, 3 / 20, -1 / 60], z)
+    return pade(stages, stages)
 
 
 def explicit(a, b):
@@ -70,7 +73,7 @@ def semi(z):
 FUNCTIONS = {
     "natural": diagonal(1),
     "natural4": diagonal(3),
-    "radau": radau,
+    "radau": pade(2, 3),
     "rk54": explicit(tableaux.A5, tableaux.B5),
     "rk87": explicit(tableaux.A8, tableaux.B8),
     "semi": semi,
@@ -98,6 +101,21 @@ def test_a_step_is_the_stability_function(scene, method, h):
     step = FUNCTIONS[method](h * A)
     for i, expected in enumerate((Y, step @ Y, step @ step @ Y)):
         assert np.abs(found[i] - expected).max() <= 1e-11
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("stages", [3, 5, 7])
+def test_steps_of_radau_are_the_stability_function_of_their_number_of_stages(scene, stages, compiled, monkeypatch):
+    """Padé (s − 1, s), in compiled steps and in those taken one by one; −s/z is left of what is fast."""
+    monkeypatch.setattr(implicit, "scheme_of", lambda *_: coefficients(stages))
+    if not compiled:
+        monkeypatch.setattr(implicit.Implicit, "many", lambda *_: None)
+    for h in (0.3, 2.0):
+        found, step = states(scene, "radau", h, 2), pade(stages - 1, stages)(h * A)
+        assert np.abs(found - [Y, step @ Y, step @ step @ Y]).max() <= 1e-11
+    assert np.abs(found[1] - pade(stages - 2, stages - 1)(h * A) @ Y).max() >= 1e-6  # one stage less shows
+    fast = states(scene, "radau", 1e4, 1)[1]
+    assert np.abs(fast + stages * np.linalg.solve(1e4 * A, Y)).max() <= 0.01 * np.abs(fast).max()
 
 
 def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle(scene):

@@ -180,6 +180,7 @@ GROUPS = {
             *(f"{MECHANICS}/tree/test_{name}.py" for name in ("attached", "gears", "joint_rates", "oracle", "sweeps")),
             f"{MECHANICS}/test_work.py",
             "tests/solve/test_march.py",
+            "tests/solve/test_iteration.py",
             f"{MECHANICS}/methods/test_heat.py",
             f"{MECHANICS}/elements/test_contact.py",
         ),

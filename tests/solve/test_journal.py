@@ -32,6 +32,7 @@ RUNS = {
     **{f"{name}, at times": {"method": name, "step": 0.01, "save_at": TIMES} for name in ("natural", "natural4")},
     **{f"{name}, at times": {"method": name, "save_at": TIMES, **LOOSE} for name in ("rk87", "radau", "auto")},
     "auto": {**LOOSE},
+    "radau, seven stages": {"method": "radau", "rtol": 1e-7, "atol": 1e-9},
     "folded": {"form": "folded", "method": "natural", "step": 0.01},
     "driven": {"method": "rk54", "inputs": {"joints.bearing": lambda t, state: 1e-3 * np.sin(9.0 * t)}, **LOOSE},
     "driven, radau": {"method": "radau", "inputs": {"joints.bearing": lambda t: 1e-3 * np.sin(9.0 * t)}, **LOOSE},

@@ -17,7 +17,7 @@ from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.marching import FAILING, WINDOW, Rival
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.semi import cheap, semi_implicit
-from ephs.mechanics.methods.stages import costs
+from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
@@ -79,7 +79,7 @@ class Auto(ReducedMethod):
         self.exponent, self.share = self._explicit.exponent, self._explicit.share
         self.name = self._explicit.name
         if self.equations.n > FREEDOMS:
-            factors, solutions = costs(self.equations.n)
+            factors, solutions = costs(self.equations.n, scheme_of(self.equations, self.control).nodes.size)
             self._waits = self._asleep = WINDOW * (factors + SOLUTIONS * solutions) // self._explicit.method.c.size
             self._returns = True
         elif self.name == "rk54" and self.control.rtol.value > LOOSE:

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5 on the reduced form: stiff, adaptive, loops closed after each step.
+"""Radau IIA of order 5, 9 or 13 on the reduced form: stiff, adaptive, loops closed after each step.
 
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8. The stages live in the increments of one step,
 y = (v, r, heats), so that the same collocation serves joints on every group; work is its quadrature,
@@ -6,30 +6,31 @@ heats follow that and the energies, see `Heats`.
 """
 
 from collections.abc import Mapping
-from typing import Any, Final, final
+from typing import Any, final
 
 import numpy as np
 from scipy.linalg import lu_solve
 
 from ephs.mechanics.methods.marching import March, Rival
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.stages import Kept, Stages
+from ephs.mechanics.methods.stages import Kept, Stages, scheme_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
-from ephs.solve.methods.collocation import radau
+from ephs.solve.methods.collocation import Collocation
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
-SCHEME: Final = radau(3)
-_EMBEDDED = SCHEME.defect @ np.linalg.inv(SCHEME.coefficients) / SCHEME.gamma
-ARRAYS: Final[Mapping[str, Any]] = {
-    "a": np.pad(np.vstack([np.zeros(3), SCHEME.coefficients, SCHEME.coefficients[-1]]), ((0, 0), (1, 0))),
-    "error": np.array([1.0, *(SCHEME.defect / SCHEME.gamma), 0.0]),
-    "coarse": np.zeros(5),
-    "eighth": np.zeros(1, dtype=np.int64),
-}
-"""The method as `ephs.solve.march.Tableau`: after the start, the stages; the last leads to the end."""
+
+def tableau(scheme: Collocation) -> Mapping[str, Any]:
+    """A method as `ephs.solve.march.Tableau`: after the start, the stages; the last leads to the end."""
+    stages = scheme.nodes.size
+    return {
+        "a": np.pad(np.vstack([np.zeros(stages), scheme.coefficients, scheme.coefficients[-1]]), ((0, 0), (1, 0))),
+        "error": np.array([1.0, *(scheme.defect / scheme.gamma), 0.0]),
+        "coarse": np.zeros(stages + 2),
+        "eighth": np.zeros(1, dtype=np.int64),
+    }
 
 
 @final
@@ -37,14 +38,16 @@ class Implicit(ReducedMethod):
     """The method on one mechanism; with ``counts`` its own are counted there."""
 
     name = "radau"
-    exponent = 4.0
 
     def __init__(self, equations: Equations, control: Control, counts: dict[str, Any] | None = None) -> None:
         super().__init__(equations, control)
         self.counts = self.counts if counts is None else counts
         self._known: tuple[Array, Array] | None = None
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
-        self._stages = Stages(equations, control, SCHEME, self.counts)
+        self.scheme = scheme_of(equations, control)
+        self.exponent = self.scheme.nodes.size + 1.0
+        self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
+        self._stages = Stages(equations, control, self.scheme, self.counts)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
@@ -59,7 +62,7 @@ class Implicit(ReducedMethod):
         y1[: stages.shape[1]] += stages[-1]
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
-        passed, allowed = h * (SCHEME.coefficients[-1] @ passed), self._stages.allowed(y0, y1)
+        passed, allowed = h * (self.scheme.coefficients[-1] @ passed), self._stages.allowed(y0, y1)
         closed = eq.booking.step(state, closed, passed[2:], float(passed[1]))
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
@@ -71,7 +74,7 @@ class Implicit(ReducedMethod):
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant:
             return None
-        return March(self, ARRAYS, span, kept=Kept(self._stages), rival=rival)
+        return March(self, tableau(self.scheme), span, kept=Kept(self._stages), rival=rival)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""
@@ -84,11 +87,11 @@ class Implicit(ReducedMethod):
     def _closed(
         self, state: ReducedState, end: ReducedState, y0: Array, y1: Array, first: Array, stages: Array, h: float
     ) -> tuple[ReducedState, float]:
-        """The end with its loops closed, and the difference to the embedded method of order 3, filtered by the
-        equations as its stiff part must be, relative to what is allowed."""
+        """The end with its loops closed, and the difference to the embedded method, filtered by the equations as its
+        stiff part must be, relative to what is allowed."""
         eq, size, heat = self.equations, stages.shape[1], self._stages.heat
         real = self._stages.solvers(state, h)[0]
-        rough = _EMBEDDED @ stages / h
+        rough = self._embedded @ stages / h
         allowed = self._stages.allowed(y0, y1)
         found = lu_solve(real, first[:size] + rough, check_finite=False)
         closed = eq.closed(end)

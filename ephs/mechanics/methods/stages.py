@@ -14,11 +14,12 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.stage import PLAIN
 from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
-from ephs.solve.march.newton import ITERATIONS
-from ephs.solve.methods.collocation import Collocation
+from ephs.solve.march.iteration import iterate
+from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.factors import factors
 from ephs.solve.snapshot import Snapshot
 
@@ -30,7 +31,7 @@ KEPT = 0.3
 """As `Stages.enough`, at constant steps: with a kept matrix errors fall by a rate, and not as squares."""
 NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
-PIVOTING = ("swap", "swaps", "end", "ends")
+PIVOTING = ("swaps", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
 FACTORS, FACTORED, SUBSTITUTED = 2, 120, 40
 """Evaluations that cost as much as factors of a matrix of n freedoms, and solutions: 2 + n²/120 and 1 + n/40.
@@ -42,9 +43,16 @@ FAST = 2e-3
 """Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
 
 
-def costs(freedoms: int) -> tuple[int, int]:
-    """Cost of factors and of solutions with them, in evaluations of the rates."""
-    return FACTORS + freedoms * freedoms // FACTORED, 1 + freedoms // SUBSTITUTED
+def costs(freedoms: int, stages: int) -> tuple[int, int]:
+    """Cost of factors for a number of stages and of solutions with them, in evaluations of the rates."""
+    work = freedoms * (2 * stages - 1)  # a complex matrix takes four times as much as a real one
+    return FACTORS + freedoms * work // (5 * FACTORED), 1 + work // (5 * SUBSTITUTED)
+
+
+def scheme_of(equations: Equations, control: Control) -> Collocation:
+    """The stages of radau on a mechanism: by the tolerance, and fewer of them where surfaces may touch."""
+    kinked = bool(equations.reduced.tables.support.any())
+    return radau_for(control.rtol.value if control.step is None else None, kinked=kinked)
 
 
 @final
@@ -161,10 +169,9 @@ class Stages:
         eq, size, count = self.equations, self.jacobian.size, self.scheme.nodes.size
         stages, rates = np.zeros((count, size)), np.zeros((count, eq.size))
         coldest = eq.heats.coldest(y0[self.heat])  # an iterate may overshoot, a solution is not below
-        totals = slice(eq.nv + eq.n + eq.ns, eq.size)
-        worst, before = np.zeros(eq.counted.size), np.inf
-        rate = moved = np.inf
-        for iteration in range(1, ITERATIONS + 1):
+        worst = np.zeros(eq.counted.size)
+
+        def correct(_: Any) -> float:
             for i, node in enumerate(self.scheme.nodes):
                 y = y0.copy()
                 y[:size] += stages[i]
@@ -174,23 +181,13 @@ class Stages:
             change = self._change(state, h, rates[:, :size] - self.inverse @ stages / h)
             reached = np.abs(y0)  # states that start from zero, such as heat, are scaled by their end values
             reached[:size] += np.abs(stages + change).max(axis=0)
-            worst = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
-            moved = float(np.max(worst, initial=0.0))
-            if not np.isfinite(moved):
-                break
-            stages += change
-            if iteration > 1:
-                rate = moved / before
-                # heats are quadratic in rates: their first change is no measure of convergence
-                if rate >= 1.0 and iteration > 2 and moved > max(10.0 * self.enough, self.rough):
-                    break
-            if moved <= self.enough or (iteration > 1 and moved * rate <= self.enough * (1.0 - min(rate, 0.9))):
-                return stages, rates[:, totals], iteration <= 2 or rate < FAST
-            if iteration > 2 and rate > 0.5 and moved <= self.rough:  # only rounding remains
-                return stages, rates[:, totals], False
-            before = moved
-        if moved <= self.rough:  # near a change of rank the matrix is no good, and the iteration slow
-            return stages, rates[:, totals], False
+            worst[:] = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
+            stages[:] += change
+            return float(np.max(worst, initial=0.0))
+
+        found = iterate(PLAIN, correct, self.enough, self.rough, FAST)
+        if found.solved:
+            return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 
@@ -202,27 +199,27 @@ class Kept:
     Parameters
     ----------
     stages
-        The same method step by step, with three stages, whose Jacobian and counts it shares.
+        The same method step by step, whose Jacobian and counts it shares.
     """
 
     def __init__(self, stages: Stages) -> None:
-        eq, m = stages.equations, stages.jacobian.size
+        eq, m, scheme = stages.equations, stages.jacobian.size, stages.scheme
         self._stages, self._counted = stages, [0, 0]
-        (one, pair), (vector, turned) = stages.scheme.values, stages.scheme.back.T
-        out = np.column_stack([np.real(vector), np.real(turned), -np.imag(turned)])
+        # In these coordinates the inverse is (Re μ, −Im μ; Im μ, Re μ) on the pair of each of its eigenvalues μ.
+        out = np.ascontiguousarray(_parts(scheme.back.T, -1.0).T)
+        count, systems = scheme.nodes.size, len(scheme.values)
         self.newton = Newton.table(1)
         n: Any = self.newton[0]
-        n.enough, n.rough, n.stale = stages.enough_kept, stages.rough, 1
-        # In these coordinates the inverse is (growth, −turning; turning, growth) on the pair.
-        n.decay, n.growth, n.turning = 1.0 / one.real, (1.0 / pair).real, (1.0 / pair).imag
+        n.enough, n.rough, n.stale, n.pairs = stages.enough_kept, stages.rough, 1, systems - 1
         shapes: dict[str, tuple[int, ...]] = {
-            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "single": (m, m), "pair": (2 * m, m),
-            "stages": (3, m), "change": (3, m), "part": (m,), "parts": (2 * m,), "right": (2 * eq.n,), "y": (eq.size,),
-            "rate": (eq.size,), "q": (eq.reduced.coordinates,),
+            "matrix": (m, m), "damping": (eq.n, eq.n), "spring": (eq.n, eq.n), "factors": (count * m, m),
+            "right": (2 * eq.n,), "y": (eq.size,), "rate": (eq.size,), "q": (eq.reduced.coordinates,), "part": (count,),
+            **dict.fromkeys(("stages", "change", "parts"), (count, m)),
         }  # fmt: skip
         self.memory: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()} | {
             "newton": self.newton, "inverse": stages.inverse, "into": np.linalg.inv(out), "out": out,
-            **{name: np.zeros(m, dtype=np.int64) for name in PIVOTING},
+            "values": _parts(1.0 / np.array(scheme.values)[:, None], 1.0).ravel(),
+            **{name: np.zeros(systems * m, dtype=np.int64) for name in PIVOTING},
         }  # fmt: skip
 
     def renew(self, state: ReducedState) -> None:
@@ -246,7 +243,7 @@ class Kept:
     def cost(self) -> int:
         """Cost of matrices, factors and solutions so far, in evaluations, roughly."""
         n: Any = self.newton[0]
-        factors, solutions = costs(self._stages.equations.n)
+        factors, solutions = costs(self._stages.equations.n, self._stages.scheme.nodes.size)
         return self._stages.jacobian.cost + solutions * int(n.iterations) + factors * int(n.factorisations)
 
     def fastest(self) -> float:
@@ -278,5 +275,10 @@ class Kept:
     def parts(self) -> list[tuple[str, Any]]:
         """All that the next step depends on, by name."""
         integers, reals = self.newton.arrays
-        names = "matrix", "damping", "spring", "single", "pair", *PIVOTING
+        names = "matrix", "damping", "spring", "factors", *PIVOTING
         return [("newton", integers), ("newton_reals", reals), *((name, self.memory[name]) for name in names)]
+
+
+def _parts(rows: Array, sign: float) -> Array:
+    """Rows in real numbers: the first, which is real, and both parts of each other one, the second times a sign."""
+    return np.array([np.real(rows[0]), *(part for row in rows[1:] for part in (np.real(row), sign * np.imag(row)))])

@@ -6,19 +6,13 @@ Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8.
 from dataclasses import dataclass
 from typing import final
 
-from ephs.semantics.linear.dense import clear, copy
-from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector, staged
+from ephs.semantics.linear.dense import clear, copy, dot
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
 from ephs.solve.march.evaluating import evaluate, place
+from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Control, Motion, Status, Tableau
 from ephs.solve.march.stiff import Solver, Stiff, whole
-
-ITERATIONS = 10
-"""Iterations after which a step is given up."""
-FAST = 0.3
-"""A rate of convergence from which on a new matrix is made: one costs as much as a dozen iterations."""
-BEYOND = 1e300
-"""Bound of numbers: nan is not below it."""
 
 
 @staged
@@ -26,7 +20,7 @@ def newton(
     on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
     errors: Errors, stiff: Stiff, y: Vector, q: Vector,
 ) -> Integer:  # fmt: skip
-    """Solve the three stages of a step of length h from (base, start), k[0] known; their rates go to k.
+    """Solve the stages of a step of length h from (base, start), k[0] known; their rates go to k.
 
     Returns
     -------
@@ -35,8 +29,7 @@ def newton(
     """
     run = _Newton(on, motion, control, start, h, k, stiff)
     n = stiff.newton[0]
-    status, tries, done = on.counter(0), on.counter(0), on.counter(0)
-    before, rate = on.variable(BEYOND), on.variable(BEYOND)
+    status, moved = on.counter(0), on.variable(0.0)
     on.when(on.negate(on.absolute(n.factored - h) <= 0.0), Solver(on, stiff, h).factorise)
     clear(on, whole(stiff.stages))
 
@@ -51,36 +44,26 @@ def newton(
     def rest(i: Integer) -> None:
         copy(on, k.row(0), k.row(i + 1))
 
-    def once() -> Truth:
-        tries.value, n.iterations = tries.value + 1, n.iterations + 1
+    def correct(tries: Integer) -> Real:
+        n.iterations, moved.value = n.iterations + 1, 2.0 * BEYOND
         # The stages begin at the start of the step, whose rates are known.
-        begins = on.same(tries.value, 1)
+        begins = on.same(tries, 1)
         on.when(begins, lambda: on.loop(stiff.stages.rows, rest), lambda: on.loop(stiff.stages.rows, stage))
         on.when(on.same(status.value, 0), go)
-        return on.either(on.negate(on.same(status.value, 0)), done.value > 0)
+        return moved.value
 
     def go() -> None:
         run.solve()
-        moved = run.size(errors, y)
+        moved.value = run.size(errors, y)
         run.move()
-        later = tries.value > 1
-        rate.value = on.select(later, moved / before.value, BEYOND)
-        slow = on.minimum(rate.value, 0.9)
-        close = on.both(later, moved * rate.value <= n.enough * (1.0 - slow))
-        solved = on.either(moved <= n.enough, close)
-        # Rounding, or a poor matrix near a change of rank, ends convergence.
-        stuck = on.both(tries.value > 2, on.both(rate.value > 0.5, moved <= n.rough))
-        rough = on.either(stuck, on.both(tries.value >= ITERATIONS, moved <= n.rough))
-        away = on.both(on.both(tries.value > 2, rate.value >= 1.0), moved > on.maximum(10.0 * n.enough, n.rough))
-        lost = on.either(on.negate(moved < BEYOND), on.either(away, tries.value >= ITERATIONS))
-        fast = on.either(tries.value <= 2, rate.value < FAST)
-        n.stale = on.select(on.both(solved, fast), 0, 1)
-        done.value = on.select(on.either(solved, rough), 1, 0)
-        failed = on.both(lost, on.same(done.value, 0))
-        status.value = on.select(failed, int(Status.UNSETTLED), 0)
-        before.value = moved
 
-    on.repeat(once)
+    found = iterate(on, correct, n.enough, n.rough, FAST)
+
+    def judge() -> None:
+        n.stale = on.select(found.fast, 0, 1)
+        status.value = on.select(found.solved, 0, int(Status.UNSETTLED))
+
+    on.when(on.same(status.value, 0), judge)
     on.when(on.same(status.value, 0), run.rates)
     return status.value
 
@@ -90,12 +73,12 @@ def filtered(
     on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, k: Matrix,
     errors: Errors, stiff: Stiff,
 ) -> Real:  # fmt: skip
-    """Return the error of a step relative to the tolerance, by the embedded method of order 3.
+    """Return the error of a step relative to the tolerance, by the embedded method, of order ``stages``.
 
     The difference is filtered by the equations, as its stiff part must be; where it is too large, once more from where
     it leads, as of stiff parts the first estimate is.
     """
-    m, n = stiff.part, stiff.newton[0]
+    m, n = stiff.parts.row(0), stiff.newton[0]
     worst, solver = on.variable(0.0), Solver(on, stiff, n.factored)
 
     def estimate(first: Vector) -> None:
@@ -153,20 +136,24 @@ class _Newton:
         on, s, size = self.on, self.stiff, self.stiff.matrix.rows
 
         def defect(j: Integer) -> None:
-            rests = [self.k[i + 1, j] - _weighted(s.inverse, i, s.stages, j) / self.h for i in range(3)]
-            for row, out in ((0, s.part), (1, s.parts.part(0, size)), (2, s.parts.part(size, size))):
-                out[j] = s.into[row, 0] * rests[0] + s.into[row, 1] * rests[1] + s.into[row, 2] * rests[2]
+            def rest(i: Integer) -> None:
+                s.part[i] = self.k[i + 1, j] - self._led(i, j)
 
-        def back(j: Integer) -> None:
-            for i in range(3):
-                x = s.out[i, 0] * s.part[j] + s.out[i, 1] * s.parts[j] + s.out[i, 2] * s.parts[size + j]
-                s.change[i, j] = x
+            def turn(i: Integer) -> None:
+                s.parts[i, j] = dot(on, s.into.row(i), s.part)
+
+            on.loop(s.stages.rows, rest)
+            on.loop(s.stages.rows, turn)
+
+        def back(i: Integer) -> None:
+            def entry(j: Integer) -> None:
+                s.change[i, j] = _summed(on, s.out.row(i), s.parts, j)
+
+            on.loop(size, entry)
 
         on.loop(size, defect)
-        solver = Solver(on, s, self.h)
-        solver.one()
-        solver.two()
-        on.loop(size, back)
+        Solver(on, s, self.h).all()
+        on.loop(s.stages.rows, back)
 
     def size(self, errors: Errors, y: Vector) -> Real:
         """Largest change relative to the tolerance at the stages' values, which are written to y.
@@ -178,14 +165,19 @@ class _Newton:
 
         def reach(j: Integer) -> None:
             most = on.variable(0.0)
-            for i in range(3):
+
+            def stage(i: Integer) -> None:
                 most.value = on.maximum(most.value, on.absolute(s.stages[i, j] + s.change[i, j]))
+
+            on.loop(s.stages.rows, stage)
             y[j] = on.absolute(y[j]) + most.value
 
         def compare(j: Integer) -> None:
-            for i in range(3):
+            def stage(i: Integer) -> None:
                 x = on.absolute(s.change[i, place(on, self.motion, j)]) / errors.allowed[j]
                 worst.value = on.select(x <= worst.value, worst.value, x)
+
+            on.loop(s.stages.rows, stage)
 
         on.loop(s.matrix.rows, reach)
         self.motion.sizes(on, self.start, y, errors.allowed)
@@ -205,14 +197,27 @@ class _Newton:
 
     def rates(self) -> None:
         """Rates that lead to the stages, of all that is not summed: these are those of the stages."""
+
+        def stage(i: Integer) -> None:
+            def one(j: Integer) -> None:
+                self.k[i + 1, j] = self._led(i, j)
+
+            self.on.loop(self.motion.summed, one)
+
+        self.on.loop(self.stiff.stages.rows, stage)
+
+    def _led(self, i: Integer, j: Integer) -> Real:
+        """The rate of one number at a stage that leads to the increments of all stages."""
         s = self.stiff
-
-        def one(j: Integer) -> None:
-            for i in range(3):
-                self.k[i + 1, j] = _weighted(s.inverse, i, s.stages, j) / self.h
-
-        self.on.loop(self.motion.summed, one)
+        return _summed(self.on, s.inverse.row(i), s.stages, j) / self.h
 
 
-def _weighted(weights: Matrix, i: int, stages: Matrix, j: Integer) -> Real:
-    return weights[i, 0] * stages[0, j] + weights[i, 1] * stages[1, j] + weights[i, 2] * stages[2, j]
+def _summed(on: Evaluator, weights: Vector, rows: Matrix, j: Integer) -> Real:
+    """One entry of the weighted sum of a matrix's rows."""
+    total = on.variable(0.0)
+
+    def add(i: Integer) -> None:
+        total.value = total.value + weights[i] * rows[i, j]
+
+    on.loop(rows.rows, add)
+    return total.value

@@ -1,14 +1,15 @@
 """Systems of an implicit step: μ/h − J for each eigenvalue μ of the inverse of its coefficients.
 
-The system of three stages falls apart into a real one of the motion's size and one of twice that for the pair. Where
-rates of freedoms depend on increments and rates alone, and sums on nothing but these, each falls to one of the size of
-the degrees of freedom: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
+The system of an odd number of stages falls apart into a real one of the motion's size and complex ones for the pairs.
+Where rates of freedoms depend on increments and rates alone, and sums on nothing but these, each falls to one of the
+size of the degrees of freedom: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, final
 
-from ephs.semantics.linear.dense import clear, copy, dot
+from ephs.semantics.linear.dense import copy, dot
 from ephs.semantics.linear.envelope import envelope_lu, envelope_solve, times
 from ephs.semantics.stage import (
     Evaluator,
@@ -38,8 +39,8 @@ class Newton(Record):
         the iteration gets no further.
     factored
         Step in s for which the matrices are factorised; 0: none.
-    decay, growth, turning
-        The eigenvalues of the coefficients' inverse: the real one, and the pair.
+    pairs
+        Number of pairs of complex eigenvalues.
     stale
         1 where the matrix served badly.
     young
@@ -53,12 +54,10 @@ class Newton(Record):
     enough = real()
     rough = real()
     factored = real()
-    decay = real()
-    growth = real()
-    turning = real()
     stale = integer()
     young = integer()
     split = integer()
+    pairs = integer()
     iterations = integer()
     factorisations = integer()
 
@@ -76,14 +75,18 @@ class Stiff:
         (m, m): ∂ẏ/∂y.
     damping, spring
         (n, n): J_rr + J_vv and J_rr J_vv − J_rv, of increments v and rates r.
-    single, pair
-        (m, m) and, real above imaginary parts, (2 m, m): factors, with `swap` and `end`, and with `swaps` and `ends`.
+    factors
+        (stages · m, m): of the real system, then real above imaginary parts of each complex one.
+    swaps, ends
+        (systems · m,): what belongs to the factors.
+    values
+        (stages,): the eigenvalues of the coefficients' inverse: the real one, then both parts of one of each pair.
     inverse, into, out
-        (3, 3): the coefficients' inverse, and to and from the parts that it falls into.
-    stages, change
-        (3, m): increments of the stages, and what an iteration adds to them.
-    part, parts
-        (m,) and (2 m,).
+        (stages, stages): the coefficients' inverse, and to and from the parts that it falls into.
+    stages, change, parts
+        (stages, m): increments of the stages, what an iteration adds to them, and the right sides of the systems.
+    part
+        (stages,): of one number at all stages.
     right
         (2 n,).
     y, rate, q
@@ -94,19 +97,17 @@ class Stiff:
     matrix: Matrix
     damping: Matrix
     spring: Matrix
-    single: Matrix
-    pair: Matrix
-    swap: Integers
+    factors: Matrix
     swaps: Integers
-    end: Integers
     ends: Integers
+    values: Vector
     inverse: Matrix
     into: Matrix
     out: Matrix
     stages: Matrix
     change: Matrix
+    parts: Matrix
     part: Vector
-    parts: Vector
     right: Vector
     y: Vector
     rate: Vector
@@ -114,10 +115,10 @@ class Stiff:
 
 
 STIFF: Final[dict[str, Any]] = {
-    "newton": table(Newton), "matrix": matrix(), "damping": matrix(), "spring": matrix(), "single": matrix(),
-    "pair": matrix(), "swap": indices(), "swaps": indices(), "end": indices(), "ends": indices(), "inverse": matrix(3),
-    "into": matrix(3), "out": matrix(3), "stages": matrix(), "change": matrix(), "part": vector(), "parts": vector(),
-    "right": vector(), "y": vector(), "rate": vector(), "q": vector(),
+    "newton": table(Newton), "matrix": matrix(), "damping": matrix(), "spring": matrix(), "factors": matrix(),
+    "swaps": indices(), "ends": indices(), "values": vector(), "inverse": matrix(), "into": matrix(), "out": matrix(),
+    "stages": matrix(), "change": matrix(), "parts": matrix(), "part": vector(), "right": vector(), "y": vector(),
+    "rate": vector(), "q": vector(),
 }  # fmt: skip
 
 
@@ -128,97 +129,117 @@ def whole(x: Matrix) -> Vector:
 
 @final
 @dataclass(frozen=True, slots=True)
+class _System:
+    """μ/h − J of an eigenvalue μ, of all numbers or of the freedoms alone; a real one, or both parts of a complex one.
+
+    Attributes
+    ----------
+    factors, parts
+        Memory of its factors, and its right side or solution.
+    by
+        μ/h.
+    """
+
+    factors: list[Matrix]
+    swaps: Integers
+    ends: Integers
+    parts: list[Vector]
+    by: list[Real]
+
+
+@final
+@dataclass(frozen=True, slots=True)
 class Solver:
-    """The matrices μ/h − J for the real eigenvalue μ and for the pair."""
+    """The systems of all eigenvalues."""
 
     on: Evaluator
     stiff: Stiff
     h: Real
 
-    @property
-    def _real(self) -> list[Real]:
-        return [self.stiff.newton[0].decay / self.h]
-
-    @property
-    def _complex(self) -> list[Real]:
-        n = self.stiff.newton[0]
-        return [n.growth / self.h, n.turning / self.h]
-
     def factorise(self) -> None:
-        """Factorise both."""
+        """Factorise all."""
         n = self.stiff.newton[0]
         self.on.when(self.on.same(n.split, 1), self._of_freedoms, self._whole)
         n.factored, n.factorisations = self.h, n.factorisations + 1
 
     def one(self) -> None:
-        """Solve for `part` by the real one."""
+        """Solve for the first row of `parts`, by the real one."""
+        self._solve(0, 1)
+
+    def all(self) -> None:
+        """Solve for all rows of `parts`."""
+        self.one()
+        self.on.loop(self.stiff.newton[0].pairs, lambda pair: self._solve(pair, 2))
+
+    def _each(self, size: Integer, do: Callable[[_System], None]) -> None:
+        do(self._system(0, 1, size))
+        self.on.loop(self.stiff.newton[0].pairs, lambda pair: do(self._system(pair, 2, size)))
+
+    def _system(self, pair: Integer, count: int, size: Integer) -> _System:
+        """The real one, of which count is 1, or that of a pair."""
+        s, m = self.stiff, self.stiff.matrix.rows
+        first = 0 if count == 1 else 2 * pair + 1
+        place = 0 if count == 1 else (pair + 1) * m
+        held, rows = s.factors, [first + k for k in range(count)]
+        return _System(
+            [Matrix(held.cells, held.start + row * (m * m), size, size) for row in rows],
+            s.swaps.part(place, size), s.ends.part(place, size), [s.parts.row(row) for row in rows],
+            [s.values[row] / self.h for row in rows],
+        )  # fmt: skip
+
+    def _solve(self, pair: Integer, count: int) -> None:
         s = self.stiff
-        self._either([s.part], self._real)
+        whole, freedoms = (self._system(pair, count, size) for size in (s.matrix.rows, s.damping.rows))
+        self.on.when(
+            self.on.same(s.newton[0].split, 1), lambda: self._by_freedoms(freedoms),
+            lambda: self._solved(whole, whole.parts),
+        )  # fmt: skip
 
-    def two(self) -> None:
-        """Solve for `parts` by that of the pair."""
-        s, size = self.stiff, self.stiff.matrix.rows
-        parts = [s.parts.part(0, size), s.parts.part(size, size)]
-        self._either(parts, self._complex)
-
-    def _either(self, parts: list[Vector], by: list[Real]) -> None:
-        on, n = self.on, self.stiff.newton[0]
-        on.when(on.same(n.split, 1), lambda: self._by_freedoms(parts, by), lambda: self._solve(parts))
-
-    def _factors(self, count: int, size: Integer) -> list[Matrix]:
-        """Memory of the factors of the real matrix, or of both parts of the complex one."""
-        held = self.stiff.single if count == 1 else self.stiff.pair
-        return [Matrix(held.cells, held.start + k * (size * size), size, size) for k in range(count)]
-
-    def _factorise(self, size: Integer) -> None:
-        s = self.stiff
-        envelope_lu(self.on, self._factors(1, size), s.swap, s.end)
-        envelope_lu(self.on, self._factors(2, size), s.swaps, s.ends)
-
-    def _solve(self, parts: list[Vector]) -> None:
-        s, count = self.stiff, len(parts)
-        swaps, ends = (s.swap, s.end) if count == 1 else (s.swaps, s.ends)
-        envelope_solve(self.on, self._factors(count, parts[0].size), swaps, ends, parts)
+    def _solved(self, system: _System, parts: list[Vector]) -> None:
+        envelope_solve(self.on, system.factors, system.swaps, system.ends, parts)
 
     def _whole(self) -> None:
         """Write and factorise the matrices of all numbers."""
         on, s = self.on, self.stiff
-        size, (decay,), (growth, turning) = s.matrix.rows, self._real, self._complex
-        (single,), (real, imaginary) = self._factors(1, size), self._factors(2, size)
-        clear(on, whole(imaginary))
 
-        def row(i: Integer) -> None:
-            def entry(j: Integer) -> None:
-                single[i, j] = real[i, j] = -s.matrix[i, j]
+        def one(system: _System) -> None:
+            def row(i: Integer) -> None:
+                def entry(j: Integer) -> None:
+                    for k, x in enumerate(system.factors):
+                        x[i, j] = 0.0 if k else -s.matrix[i, j]
 
-            on.loop(size, entry)
-            single[i, i], real[i, i], imaginary[i, i] = single[i, i] + decay, real[i, i] + growth, turning
+                on.loop(s.matrix.rows, entry)
+                for x, by in zip(system.factors, system.by, strict=True):
+                    x[i, i] = x[i, i] + by
 
-        on.loop(size, row)
-        self._factorise(size)
+            on.loop(s.matrix.rows, row)
+            envelope_lu(on, system.factors, system.swaps, system.ends)
+
+        self._each(s.matrix.rows, one)
 
     def _of_freedoms(self) -> None:
         """Write and factorise the matrices of the freedoms."""
-        on, s, n, (decay,), (growth, turning) = self.on, self.stiff, self.stiff.damping.rows, self._real, self._complex
-        (single,), (real, imaginary) = self._factors(1, n), self._factors(2, n)
+        on, s, n = self.on, self.stiff, self.stiff.damping.rows
 
-        def row(i: Integer) -> None:
-            def entry(j: Integer) -> None:
-                single[i, j] = s.spring[i, j] - decay * s.damping[i, j]
-                real[i, j], imaginary[i, j] = s.spring[i, j] - growth * s.damping[i, j], -turning * s.damping[i, j]
+        def one(system: _System) -> None:
+            def row(i: Integer) -> None:
+                def entry(j: Integer) -> None:
+                    for k, (x, by) in enumerate(zip(system.factors, system.by, strict=True)):
+                        x[i, j] = (0.0 if k else s.spring[i, j]) - by * s.damping[i, j]
 
-            on.loop(n, entry)
-            single[i, i] = single[i, i] + decay * decay
-            real[i, i] = real[i, i] + (growth * growth - turning * turning)
-            imaginary[i, i] = imaginary[i, i] + 2.0 * growth * turning
+                on.loop(n, entry)
+                for x, square in zip(system.factors, times(system.by, system.by), strict=True):
+                    x[i, i] = x[i, i] + square
 
-        on.loop(n, row)
-        self._factorise(n)
+            on.loop(n, row)
+            envelope_lu(on, system.factors, system.swaps, system.ends)
 
-    def _by_freedoms(self, parts: list[Vector], by: list[Real]) -> None:
-        """Solve for (δv, δr, δs) in place of (f_v, f_r, f_s): a real right side, or both parts of a complex one."""
-        on, s, n, count = self.on, self.stiff, self.stiff.damping.rows, len(parts)
-        right = [s.right.part(k * n, n) for k in range(count)]
+        self._each(n, one)
+
+    def _by_freedoms(self, system: _System) -> None:
+        """Solve for (δv, δr, δs) in place of (f_v, f_r, f_s)."""
+        on, s, n, by, parts = self.on, self.stiff, self.stiff.damping.rows, system.by, system.parts
+        right = [s.right.part(k * n, n) for k in range(len(parts))]
 
         def project(i: Integer) -> None:
             turned = times(by, [x[i] for x in parts])
@@ -236,7 +257,7 @@ class Solver:
                 x[i] = value
 
         on.loop(n, project)
-        self._solve(right)
+        self._solved(system, right)
         on.loop(n, lift)
         for x, found in zip(parts, right, strict=True):
             copy(on, found, x.part(0, n))

@@ -15,6 +15,11 @@ from numpy.polynomial import Legendre
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import eigen
 
+COARSE, FINE = 3e-3, 3e-7
+"""Relative tolerances above the first are for order 5, those below the second for order 13, the others for order 9.
+
+Where forces have kinks, as between surfaces, an order is as good as the next one down to a tolerance that is finer."""
+
 
 def moments(nodes: Array, theta: "Array | float") -> Array:
     """(…, stages) weights of the stages' values for the integral from 0 to theta (…) of the polynomial through them."""
@@ -89,3 +94,13 @@ def radau(stages: int) -> Collocation:
         nodes, coefficients, tuple(complex(found[k]) for k in kept), np.linalg.inv(vectors)[kept],
         twice * vectors[:, kept], gamma, _weights(nodes, order) - coefficients[-1],
     )  # fmt: skip
+
+
+def radau_for(rtol: float | None, *, kinked: bool = False) -> Collocation:
+    """Radau IIA for steps that are chosen by a relative tolerance; None: for constant steps.
+
+    ``kinked``: whether forces have kinks.
+    """
+    if rtol is None or rtol > (FINE if kinked else COARSE):
+        return radau(3)
+    return radau(5 if kinked or rtol >= FINE else 7)

@@ -11,9 +11,11 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.stage import PLAIN
 from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
-from ephs.solve.methods.collocation import moments, radau, values
+from ephs.solve.march.iteration import FAST, iterate
+from ephs.solve.methods.collocation import moments, radau_for, values
 from ephs.solve.methods.continuous import Instant, Matrices
 from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.passages import Passages
@@ -29,10 +31,8 @@ from ephs.solve.stepping import Attempt, Instants, Row, Span
 
 PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""
-
-ITERATIONS = 10
-COARSE, FINE = 3e-3, 3e-7
-"""Relative tolerances above the first are for order 5, those below the second for order 13, the others for order 9."""
+ENOUGH, ROUGH = 1e-3, 1e-1
+"""Parts of what is allowed to which stages are solved, and that are good enough where the iteration gets no further."""
 ROUNDING = 10.0 * np.finfo(float).eps
 """Part of the terms of an equation by which rounding changes their sum."""
 FARTHEST = 2.0
@@ -102,8 +102,7 @@ class Radau:
         self._passages = Passages(self.model, self.stores, self.equations.conduction)
         self._settling = Settling(self.model, self.stores.components)
         self._chosen = control.step is None
-        rtol = control.rtol.value
-        self.scheme = radau(3 if not self._chosen or rtol > COARSE else 5 if rtol >= FINE else 7)
+        self.scheme = radau_for(control.rtol.value if self._chosen else None)
         self.exponent = self.scheme.nodes.size + 1.0
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.evaluations = self.factorisations = self.iterations = 0
@@ -171,7 +170,6 @@ class Radau:
         end = replace(end, stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
         self.iterations += iterations
-        self._slow = iterations > 4
         least = float(made.min(initial=np.inf)) if made.size else 0.0
         return Attempt(state, end, h, max(error, missed), least, (stages, totals))
 
@@ -332,24 +330,27 @@ class Radau:
 
     def _stages(self, state: RadauState, h: float) -> tuple[Array, int]:
         solvers, scheme, stages, rates = self._solve(h), self.scheme, self._guess(state, h), self._rates
-        parts, before, allowed = np.zeros((1, rates)), np.inf, self._allowed(state.y)
-        for iteration in range(1, ITERATIONS + 1):
+        allowed = self._allowed(state.y)
+        parts, before = np.zeros((scheme.nodes.size, rates)), np.inf
+
+        def correct(tries: Any) -> float:
+            nonlocal before
             ys = state.y + h * scheme.coefficients @ stages[:, :rates]
             inputs = self._inputs(state.t + h * scheme.nodes, ys)
             change = scheme.solved(self.equations.residuals(ys, stages, inputs), solvers)
             self.evaluations += len(stages)
-            stages -= change
-            parts = np.abs(h * scheme.coefficients @ change[:, :rates]) / allowed
+            stages[:] -= change
+            parts[:] = np.abs(h * scheme.coefficients @ change[:, :rates]) / allowed
             moved = float(np.max(parts, initial=0.0))
-            if not np.isfinite(moved):
-                break
-            stalls = iteration > 2 and moved > 0.3 * before
-            solved = self.equations.linear or moved <= 1e-3
-            if solved or (stalls and (moved <= 1e-1 or self._rounded(state, h, stages, change))):
-                return stages, iteration
-            if iteration > 2 and moved > 2.0 * before:
-                break
-            before = moved
+            stalls, before = tries > 2 and moved > 0.3 * before, moved
+            if np.isfinite(moved) and (self.equations.linear or (stalls and self._rounded(state, h, stages, change))):
+                return 0.0  # one iteration solves what is linear, and rounding is no change
+            return moved
+
+        found = iterate(PLAIN, correct, ENOUGH, ROUGH, FAST)
+        if found.solved:
+            self._slow = not found.fast
+            return stages, int(found.tries)
         entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
         raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
 

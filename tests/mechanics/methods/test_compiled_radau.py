@@ -1,5 +1,7 @@
 """Steps of radau in compiled calls: those taken one by one, lawful, and no more of them than its errors ask for."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,10 +10,14 @@ from benchmarks.touching import bouncing
 from ephs.mechanics.methods import auto, stages
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
-from ephs.mechanics.methods.stages import Kept
+from ephs.mechanics.methods.stages import Kept, scheme_of
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import Equations
+from ephs.solve.control import Control, Tolerance
 from tests.mechanics.ball import BALL
 from tests.written import scene_of_text
 
+CHAIN = Path(__file__).resolve().parents[3] / "scenes/chain.toml"
 SCENE = """
 format = 1
 name = "stick"
@@ -85,6 +91,26 @@ def test_compiled_steps_are_those_taken_one_by_one(until, options, error, scene,
     oracle = ephs.simulate(scene, until, save_at=times, **options, **ASKED)
     assert found.stats["steps"] <= 1.1 * oracle.stats["steps"]
     assert motion(found) == pytest.approx(motion(oracle), rel=0.0, abs=error)
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-5, 1e-9])  # three, five and seven stages
+def test_compiled_steps_of_what_is_smooth_are_those_taken_one_by_one(rtol, monkeypatch):
+    options = {"rtol": rtol, "atol": rtol, "save_at": [0.0, 1.0], **ASKED}
+    model = ephs.load(CHAIN)
+    found = ephs.simulate(model, 1.0, **options)
+    stepwise(monkeypatch)
+    oracle = ephs.simulate(model, 1.0, **options)
+    assert abs(found.stats["steps"] - oracle.stats["steps"]) <= 0.1 * oracle.stats["steps"] + 1
+    tip = [sol.body("rod3").position[-1] for sol in (found, oracle)]
+    assert tip[0] == pytest.approx(tip[1], rel=0.0, abs=max(rtol, 1e-12))
+
+
+def test_surfaces_that_may_touch_have_three_stages_at_tolerances_that_are_not_fine(scene):
+    def stages(rtol):
+        control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
+        return scheme_of(Equations(problem_of_scene(scene), 0.0), control).nodes.size
+
+    assert [stages(rtol) for rtol in (1e-3, 1e-6, 1e-8)] == [3, 3, 5]
 
 
 def test_the_freedoms_alone_are_factorised_as_the_whole_is(scene, monkeypatch):
@@ -161,7 +187,7 @@ def test_auto_costs_little_more_than_explicit_steps_where_factors_are_dear(monke
     """The matrix of many bodies takes as long as hundreds of evaluations; counted, not timed."""
     count, options = 24, {"rtol": 1e-5, "audit": "off"}
     scene = scene_of_text(bouncing(count).scene)
-    factors, solutions = stages.costs(6 * count)
+    factors, solutions = stages.costs(6 * count, 3)
 
     def run(method):
         solution = ephs.simulate(scene, 0.2, method=method, **options)

@@ -1,15 +1,18 @@
 """What methods estimate their errors to be, on a linear equation, against the formulas in the literature."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.solve.control import Control, Tolerance
+from ephs.solve.methods.collocation import radau
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.written import scene_of_text
@@ -81,36 +84,51 @@ def test_of_order_eight_two_estimates_are_blended(equations, h):
     assert 0.0 < made.stiffness <= h * float(np.linalg.norm(A, 2))
 
 
-@pytest.mark.parametrize("h", [0.02, 0.1, 0.3])  # far below what is allowed, half above it, far above
-def test_of_radau_it_is_the_filtered_difference_to_the_embedded_method(equations, h):
-    """Hairer and Wanner, IV.8: (γ₀/h − A)⁻¹ (f(y⁰) + e₁z₁ + e₂z₂ + e₃z₃), again from there where it is too large."""
-    root = math.sqrt(6.0)
-    parts = [[360, 1800, 225], [1800, 360, 225], [36, 36, 9]]
-    c = np.array(
-        [
-            [88 - 7 * root, 296 - 169 * root, -2 + 3 * root],
-            [296 + 169 * root, 88 + 7 * root, -2 - 3 * root],
-            [16 - root, 16 + root, 1.0],
-        ]
-    ) / np.array(parts)
-    whole = np.eye(6) - h * np.kron(c, A)
-    z = np.linalg.solve(whole, h * np.kron(c @ np.ones(3), A @ Y)).reshape(3, 2)
-    gamma = 1.0 / ((6.0 + 81.0 ** (1 / 3) - 9.0 ** (1 / 3)) / 30.0)
-    embedded = np.array([-13.0 - 7.0 * root, -13.0 + 7.0 * root, -1.0]) / 3.0 @ z / h
+@pytest.mark.parametrize("stages", [3, 5, 7])
+@pytest.mark.parametrize("h", [0.02, 0.1, 0.3, 1.0])  # with three far below what is allowed, half above it, far above
+def test_of_radau_it_is_the_filtered_difference_to_the_embedded_method(equations, h, stages, monkeypatch):
+    """Hairer and Wanner, IV.8: (γ₀/h − A)⁻¹ (f(y⁰) + Σ eᵢ zᵢ), again from there where it is too large.
+
+    The embedded method has the weight 1/γ₀ of f(y⁰), and integrates polynomials up to the number of stages.
+    """
+    monkeypatch.setattr(implicit, "scheme_of", lambda *_: radau(stages))
+    c, nodes = radau(stages).coefficients, radau(stages).nodes
+    z = np.linalg.solve(np.eye(2 * stages) - h * np.kron(c, A), h * np.kron(c @ np.ones(stages), A @ Y))
+    values = np.linalg.eigvals(c)
+    gamma = 1.0 / float(np.real(values[np.argmin(np.abs(values.imag))]))
+    right = 1.0 / np.arange(1.0, stages + 1.0) - np.eye(stages)[0] / gamma
+    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, right) - c[-1]
+    embedded = gamma * weights @ np.linalg.solve(c, z.reshape(stages, 2)) / h
     matrix = gamma / h * np.eye(2) - A
     found = np.linalg.solve(matrix, A @ Y + embedded)
-    end = (Y + z[2])[1]
+    end = (Y + z[-2:])[1]
     if np.abs(relative(found, end)).max() > 1.0:
         found = np.linalg.solve(matrix, A @ (Y + found) + embedded)
     attempt = stepper(equations, "radau").step(equations.start(0.0), h)
-    assert attempt.error == pytest.approx(np.abs(relative(found, end)).max(), rel=1e-3)
+    assert attempt.error == pytest.approx(np.abs(relative(found, end)).max(), rel=1e-3, abs=1e-4)
     assert attempt.end.r[0] == pytest.approx(end, abs=1e-7)
+
+
+def test_the_estimate_of_radau_is_that_of_the_book_with_three_stages():
+    """Hairer and Wanner, IV.8, (8.19): e = γ₀/3 (−13 − 7√6, −13 + 7√6, −1), here over γ₀."""
+    root, scheme = math.sqrt(6.0), radau(3)
+    found = scheme.defect @ np.linalg.inv(scheme.coefficients) / scheme.gamma
+    assert np.allclose(found, np.array([-13.0 - 7.0 * root, -13.0 + 7.0 * root, -1.0]) / 3.0, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("rtol", "stages"), [(1e-2, 3), (1e-4, 5), (1e-6, 5), (1e-8, 7)])
+def test_radau_has_more_stages_at_finer_tolerances(rtol, stages, equations):
+    control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, math.inf, None)
+    made, _ = METHODS["radau"].make(Setting(equations.problem, 0.0, control, {}, equations))
+    constant, _ = METHODS["radau"].make(Setting(equations.problem, 0.0, replace(control, step=0.1), {}, equations))
+    assert (made.scheme.nodes.size, made.exponent) == (stages, stages + 1.0)
+    assert constant.scheme.nodes.size == 3
 
 
 def test_powers_of_the_step_with_which_estimates_fall(equations):
     found = {}
-    powers = {"rk54": 5, "rk87": 8, "radau": 4}
-    lengths = {"rk54": 0.05, "rk87": 0.2, "radau": 0.02}
+    powers = {"rk54": 5, "rk87": 8, "radau": 6}
+    lengths = {"rk54": 0.05, "rk87": 0.2, "radau": 0.1}
     for method, h in lengths.items():
         made = stepper(equations, method)
         one, two = (made.step(equations.start(0.0), part * h).error for part in (1.0, 0.5))
