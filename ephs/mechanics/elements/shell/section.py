@@ -15,6 +15,8 @@ from ephs.semantics.bundles.errors import StructureError
 
 SHEARED = 5.0 / 6.0
 """Part of a section that carries the transverse force, where its stress is a parabola."""
+ROUNDED = 1e-14
+"""Couplings below this part of what they couple are rounding of layers that are alike above and below."""
 
 
 @final
@@ -136,7 +138,7 @@ class ShellSection:
             plane += np.kron([[zeroth, first], [first, second]], q)
             shear += SHEARED * ply.thickness * slip
             low = high
-        plane[np.abs(plane) <= 1e-14 * np.sqrt(np.outer(np.diag(plane), np.diag(plane)))] = 0.0
+        plane[np.abs(plane) <= ROUNDED * np.sqrt(np.outer(np.diag(plane), np.diag(plane)))] = 0.0
         return cls(2.0 * low, plane, shear, sum(ply.thickness * ply.rho for ply in plies))
 
     def bending(self, along: Array) -> Array:

@@ -59,6 +59,8 @@ class Shell:
         (n, 4, 6) logarithms of the edges without stress: rad, m.
     matrix
         (n, 24, 24) K of the energy ½ Δᵀ K Δ.
+    rows
+        (n, 8, 24) resultants of Δ.
     """
 
     points: Array
@@ -67,6 +69,7 @@ class Shell:
     axes: Array
     rest: Array
     matrix: Array
+    rows: Array
 
     @classmethod
     def of(
@@ -112,9 +115,9 @@ class Shell:
             given = unit(given[cells] if given.ndim == 2 else given)
         frames = section_axes(points, cells, given, None if along is None else np.array(along, dtype=float))
         axes = Rotation.from_matrix(frames.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(-1, 4, 4)
-        made = cls(points, cells, section, axes, np.zeros((len(cells), 4, 6)), np.zeros(0))
+        made = cls(points, cells, section, axes, np.zeros((len(cells), 4, 6)), np.zeros(0), np.zeros(0))
         rest = made.logarithms(made.poses)
-        return cls(points, cells, section, axes, rest, stiffness(rest, section))
+        return cls(points, cells, section, axes, rest, *stiffness(rest, section))
 
     @property
     def poses(self) -> Array:
@@ -169,6 +172,12 @@ class Shell:
         """(n,) strain energy of the elements, J."""
         changes = self.changes(poses)
         return 0.5 * np.sum(changes * self.of_changes(changes), axis=1)
+
+    def resultants(self, poses: Array) -> Array:
+        """(n, 8) in the middle of elements, in their axes: membrane forces 11, 22, 12 in N/m, moments alike in N,
+        transverse forces 1, 2 in N/m.
+        """
+        return np.einsum("nij,nj->ni", self.rows, self.changes(poses))
 
     def slopes(self, poses: Array, stress: Array) -> Slopes:
         """Derivatives at poses (m, 7), those of the forces at a stress (n, 24)."""

@@ -88,7 +88,7 @@ def buckling(shell: Shell, load: Array, free: Truths, count: int = 1) -> Spectru
     inverse = LinearOperator(stiff.shape, factors(stiff).solve, dtype=float)  # pyright: ignore
 
     def lowest(k: int) -> tuple[Array, Array]:
-        values, vectors = eigsh(-geometric, k=k, M=stiff, Minv=inverse, which="LA", v0=_drawn(stiff.shape[0]))
+        values, vectors = eigsh(-geometric, k=k, M=stiff, Minv=inverse, which="LA", v0=_drawn(len(reduced.at)))
         kept = values > 0.0
         return 1.0 / values[kept], vectors[:, kept]
 

@@ -26,6 +26,9 @@ SMALL: Final = 1e-9
 WANTED: Final = 10
 """Iterations that a step along a path should take."""
 SHORTEST: Final = 1e-6
+"""Part of the first step below which a path is lost."""
+PIVOT: Final = 1e-3
+"""Part of a column's largest entry from which on the diagonal serves as the pivot."""
 
 
 class NoEquilibrium(ArithmeticError):
@@ -97,7 +100,7 @@ class Reduced:
 
 def factors(matrix: csc_array) -> Any:
     """Sparse LU factors of a matrix whose pattern is symmetric, pivots on the diagonal where they can be."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=1e-3, options={"SymmetricMode": True})
+    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=PIVOT, options={"SymmetricMode": True})
 
 
 def negative(matrix: csc_array) -> int:

@@ -35,8 +35,12 @@ def jacobians(rest: Array) -> Array:
     return np.einsum("pae,nei->npia", _WEIGHTS, rest[:, :, 3:5])
 
 
-def stiffness(rest: Array, section: ShellSection) -> Array:
-    """(n, 24, 24) K of elements with logarithms ``rest`` (n, 4, 6) of their edges."""
+def stiffness(rest: Array, section: ShellSection) -> tuple[Array, Array]:
+    """K (n, 24, 24) of elements with logarithms ``rest`` (n, 4, 6) of their edges, and resultants (n, 8, 24).
+
+    Resultants are rows of Δ: membrane forces 11, 22, 12 in N/m, moments alike in N, transverse forces 1, 2 in N/m, in
+    the middle of the element.
+    """
     tangents = jacobians(rest)
     inverse, weights = np.linalg.inv(tangents).astype(float), np.linalg.det(tangents)
     centre, area = tangents.mean(axis=1), weights.sum(axis=1)
@@ -44,14 +48,19 @@ def stiffness(rest: Array, section: ShellSection) -> Array:
     (w1, w2), (v1, v2, v3) = (gamma[:, :, i] for i in (0, 1)), (gamma[:, :, i] for i in (3, 4, 5))
     bent = np.stack([w2[:, :, 0], -w1[:, :, 1], w2[:, :, 1] - w1[:, :, 0]], axis=2)
     rows = np.concatenate([_membrane(rest, inverse, area), bent], axis=2)
-    k = _assumed(rows, centre, weights, section.plane)
-    k += np.einsum("np,npai,nab,npbj->nij", weights, v3, _transverse(centre, section), v3, optimize=True)
+    work, flexible = _assumed(rows, centre, weights, section.plane)
+    fitted, slip = np.linalg.solve(flexible, work).astype(float), _transverse(centre, section)
+    k = np.swapaxes(work, 1, 2) @ fitted
+    k += np.einsum("np,npai,nab,npbj->nij", weights, v3, slip, v3, optimize=True)
     drill = DRILL * section.plane[2, 2]
     spin = v2[:, :, 0] - v1[:, :, 1]
     k += drill * np.einsum("np,npi,npj->nij", weights, spin, spin, optimize=True)
     twist = 0.25 * (_SHARE[1, 2] - _SHARE[0, 2] + _SHARE[3, 2] - _SHARE[2, 2])
     k += (drill / 9.0 * area)[:, None, None] * np.outer(twist, twist)
-    return 0.5 * (k + np.swapaxes(k, 1, 2))
+    sheared = np.einsum("np,nab,npbj->naj", weights / area[:, None], slip, v3, optimize=True)
+    resultants = np.concatenate([fitted[:, [0, 1, 2, 5, 6, 7]], sheared], axis=1)
+    whole: Array = 0.5 * (k + np.swapaxes(k, 1, 2))
+    return whole, resultants.astype(float)
 
 
 def _membrane(rest: Array, inverse: Array, area: Array) -> Array:
@@ -66,8 +75,11 @@ def _membrane(rest: Array, inverse: Array, area: Array) -> Array:
     return strains + bulges[:, None]
 
 
-def _assumed(rows: Array, centre: Array, weights: Array, plane: Array) -> Array:
-    """Stiffness of assumed forces and moments: constant ones, and a_ξa_ξᵀ η, a_ηa_ηᵀ ξ of the centre's tangents."""
+def _assumed(rows: Array, centre: Array, weights: Array, plane: Array) -> tuple[Array, Array]:
+    """(n, 10, 24) work of assumed forces and moments on Δ, and their flexibility (n, 10, 10).
+
+    They are five of each: constant ones, and a_ξa_ξᵀ η, a_ηa_ηᵀ ξ of the centre's tangents.
+    """
     modes = np.zeros((*weights.shape, 3, 5))
     modes[..., :3] = np.eye(3)
     x, y = centre[:, 0] / np.linalg.norm(centre, axis=1), centre[:, 1] / np.linalg.norm(centre, axis=1)
@@ -77,7 +89,7 @@ def _assumed(rows: Array, centre: Array, weights: Array, plane: Array) -> Array:
     both[..., :3, :5], both[..., 3:, 5:] = modes, modes
     work = np.einsum("np,npka,npki->nai", weights, both, rows, optimize=True)
     flexible = np.einsum("np,npka,kl,nplb->nab", weights, both, np.linalg.inv(plane), both, optimize=True)
-    return np.swapaxes(work, 1, 2) @ np.linalg.solve(flexible, work)
+    return work, flexible
 
 
 def _transverse(centre: Array, section: ShellSection) -> Array:

@@ -100,6 +100,9 @@ def test_the_energy_of_constant_strains_is_that_of_the_section(seed):
     field[:, WX], field[:, WY] = -(k[1] * y + t * x), k[0] * x + t * y
     found = field.ravel() @ (shell.tangent(shell.poses) @ field.ravel())
     assert found == pytest.approx(strain @ CROSSED.plane @ strain, rel=1e-11)
+    small, stress = 1e-7, CROSSED.plane @ strain
+    resultants = shell.resultants(moved(shell.poses, small * field)) / small
+    assert np.abs(resultants - [*stress, 0.0, 0.0]).max() <= 1e-5 * np.abs(stress).max()  # of order 1 in what is small
 
 
 @settings(max_examples=8)
