@@ -68,6 +68,7 @@ def test_a_hinged_roof_is_followed_through_its_snap_and_is_unstable_while_the_lo
     assert path.unstable[[0, -1]].tolist() == [0, 0] and path.unstable.max() == 1
     falls = np.diff(path.shares) < 0.0
     assert falls.any() and not falls.all()
+    assert (np.diff(path.poses[:, 0, 6]) < 0.0).all()  # it never turns back
 
 
 def test_dead_forces_do_work_that_the_shell_stores():
