@@ -36,7 +36,7 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ),
         ([".solve", ".solve.march", ".solve.methods", ".solve.result", ".solve.auditing", ".solve.exchange"],),
         ([".mechanics.shapes"], [".mechanics.road"], [".modelica"]),
-        ([".mechanics.elements"],),
+        ([".mechanics.elements", ".mechanics.elements.shell"],),
         ([".mechanics.scene", ".mechanics.imports"], [".mechanics.tree", ".mechanics.tree.sweeps"]),
         ([".mechanics.constraints"],),
         ([".mechanics.tree.finding"],),

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.joints import universal_joint as universal_joint
     from ephs.mechanics.elements.motor import armature as armature
     from ephs.mechanics.elements.motor import motor as motor
+    from ephs.mechanics.elements.shell.section import Ply as Ply
+    from ephs.mechanics.elements.shell.section import ShellSection as ShellSection
+    from ephs.mechanics.elements.shell.shell import Shell as Shell
     from ephs.mechanics.elements.tendon import tendon as tendon
     from ephs.mechanics.motion.inside import Inside as Inside
     from ephs.mechanics.rewrite.stabilised import stabilised as stabilised
@@ -49,6 +52,9 @@ _HOME = {
     "joint_pattern": "ephs.mechanics.elements.joints",
     "mbs_pattern": "ephs.mechanics.elements.joints",
     "spring_damper": "ephs.mechanics.elements.joints",
+    "Ply": "ephs.mechanics.elements.shell.section",
+    "Shell": "ephs.mechanics.elements.shell.shell",
+    "ShellSection": "ephs.mechanics.elements.shell.section",
     "tendon": "ephs.mechanics.elements.tendon",
     "thermoelastic": "ephs.mechanics.elements.beam",
     "stabilised": "ephs.mechanics.rewrite.stabilised",

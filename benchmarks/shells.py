@@ -1,0 +1,343 @@
+"""Shells against published values: displacements, large displacements, snaps, frequencies; time beside size.
+
+Linear: Scordelis and Lo's roof, MacNeal and Harder (1985) with Simo's 0.0930 of the hemisphere, Cook. Large: Sze, Liu
+and Lo (2004). Frequencies: NAFEMS FV12 and FV16, Rayleigh's ring. Values are ratios to the published ones.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.report import Report, table_of
+from ephs.mechanics.elements.shell import spectra, statics
+from ephs.mechanics.elements.shell.mesh import grid
+from ephs.mechanics.elements.shell.section import ShellSection
+from ephs.mechanics.elements.shell.shell import Shell
+
+WX, WY, WZ, X, Y, Z = range(6)
+ALL = tuple(range(6))
+COLUMNS = {
+    "problem": ("problem", 1.0), "elements": ("elements", 1.0), "published": ("published", 1.0),
+    "found": ("found", 1.0), "ratio": ("ratio", 1.0), "time [s]": ("seconds", 1.0),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A shell with its loads and holds, and the parameters (m, 2) of its points."""
+
+    shell: Shell
+    at: Any
+    free: Any
+    load: Any
+
+    def hold(self, which: Any, *axes: int) -> None:
+        """Hold coordinates of some nodes."""
+        for axis in axes:
+            self.free[which, axis] = False
+
+    def node(self, u: float, v: float) -> int:
+        """The node nearest to parameters."""
+        return int(np.argmin(np.linalg.norm(self.at - [u, v], axis=1)))
+
+    def side(self, axis: int, value: float) -> Any:
+        """The nodes where a parameter has a value."""
+        return self.at[:, axis] == value
+
+    def edge(self, which: Any, axis: int, whole: float) -> None:
+        """A uniform load along an edge."""
+        share = np.ones(which.sum())
+        share[[0, -1]] = 0.5
+        self.load[which, axis] = whole * share / share.sum()
+
+    def small(self) -> Any:
+        """Small displacements (m, 6)."""
+        return statics.displacements(self.shell, self.load, self.free)
+
+
+def made(
+    surface: Any, elements: Any, section: ShellSection, normals: Any = None, distort: float = 0.0, seed: int = 0,
+    along: Any = None,
+) -> Held:  # fmt: skip
+    """A shell on a surface; inner nodes are displaced by parts of an element."""
+
+    def drawn(u: Any, v: Any) -> Any:
+        rng = np.random.default_rng(seed)
+        inside = (u > 0.0) & (u < 1.0) & (v > 0.0) & (v < 1.0)
+        moves = distort * inside * rng.uniform(-1.0, 1.0, (2, len(u)))
+        return surface(u + moves[0] / elements[0], v + moves[1] / elements[1])
+
+    points, at, cells = grid(drawn, elements)
+    up = None if normals is None else normals(points, at)
+    shell = Shell.of(points, cells, section, up, along=along)
+    return Held(shell, at, np.ones((len(points), 6), dtype=bool), np.zeros((len(points), 6)))
+
+
+def about_y(points: Any, _at: Any) -> Any:
+    """Normals of a cylinder about y."""
+    return points * [1.0, 0.0, 1.0]
+
+
+def outward(points: Any, _at: Any) -> Any:
+    """Normals of a sphere."""
+    return points
+
+
+# ---- small displacements ---------------------------------------------------------------------------------------------
+
+
+def roof(n: int, distort: float = 0.0) -> float:
+    """Scordelis and Lo."""
+    angle = np.radians(40.0)
+    held = made(
+        lambda u, v: (25 * np.sin(angle * u), 25 * v, 25 * np.cos(angle * u)), (n, n),
+        ShellSection.isotropic(0.25, 4.32e8), about_y, distort,
+    )  # fmt: skip
+    held.hold(held.side(1, 0), X, Z)
+    held.hold(held.side(1, 1), Y, WX, WZ)
+    held.hold(held.side(0, 0), X, WY, WZ)
+    held.load[:, Z] = held.shell.shares(-90.0 * held.shell.areas)
+    return -held.small()[held.node(1, 1), Z]
+
+
+def cylinder(n: int, distort: float = 0.0) -> float:
+    """Pinched cylinder with end diaphragms."""
+    held = made(
+        lambda u, v: (300 * np.sin(u * np.pi / 2), 300 * v, 300 * np.cos(u * np.pi / 2)), (n, n),
+        ShellSection.isotropic(3.0, 3e6, 0.3), about_y, distort,
+    )  # fmt: skip
+    held.hold(held.side(1, 0), X, Z)
+    held.hold(held.side(1, 1), Y, WX, WZ)
+    held.hold(held.side(0, 0), X, WY, WZ)
+    held.hold(held.side(0, 1), Z, WX, WY)
+    top = held.node(0, 1)
+    held.load[top, Z] = -0.25
+    return -held.small()[top, Z]
+
+
+def ball(n: int, h: float = 0.04, distort: float = 0.0) -> Held:
+    """A quarter of a hemisphere with a hole of 18°, unit forces."""
+
+    def surface(u: Any, v: Any) -> Any:
+        a, b = u * np.pi / 2, np.radians(72.0) * v
+        return 10 * np.cos(a) * np.cos(b), 10 * np.sin(a) * np.cos(b), 10 * np.sin(b)
+
+    held = made(surface, (n, n), ShellSection.isotropic(h, 6.825e7, 0.3), outward, distort)
+    held.hold(held.side(0, 0), Y, WX, WZ)
+    held.hold(held.side(0, 1), X, WY, WZ)
+    held.hold(held.node(0, 0), Z)
+    held.load[held.node(0, 0), X], held.load[held.node(1, 0), Y] = 1.0, -1.0
+    return held
+
+
+def hemisphere(n: int, h: float = 0.04, distort: float = 0.0) -> float:
+    """Displacement under the force, in the thickness 0.04's size."""
+    held = ball(n, h, distort)
+    return held.small()[held.node(0, 0), X] * (h / 0.04) ** 3
+
+
+def cook(n: int) -> float:
+    """Cook's membrane."""
+    held = made(lambda u, v: (48 * u, 44 * u + v * (44 - 28 * u), 0.0), (n, n), ShellSection.isotropic(1.0, 1.0, 1 / 3))
+    held.hold(held.side(0, 0), *ALL)
+    held.hold(slice(None), Z, WX, WY)
+    held.edge(held.side(0, 1), Y, 1.0)
+    return held.small()[held.node(1, 0.5), Y]
+
+
+def twisted(n: int, h: float = 0.32) -> float:
+    """Twisted beam, 6n × n elements, a unit force in its plane at the tip."""
+
+    def surface(u: Any, v: Any) -> Any:
+        turn, y = u * np.pi / 2, 1.1 * (v - 0.5)
+        return 12 * u, y * np.cos(turn), y * np.sin(turn)
+
+    def normals(_points: Any, at: Any) -> Any:
+        turn, y = at[:, 0] * np.pi / 2, 1.1 * (at[:, 1] - 0.5)
+        return np.stack([y * np.pi / 24, -np.sin(turn), np.cos(turn)], axis=1)
+
+    held = made(surface, (6 * n, n), ShellSection.isotropic(h, 29e6, 0.22), normals)
+    held.hold(held.side(0, 0), *ALL)
+    held.edge(held.side(0, 1), Z, 1.0 if h == 0.32 else 1e-6)
+    load = held.load[:, Z]
+    return load @ held.small()[:, Z] / load.sum()
+
+
+def plate(n: int, ratio: float = 0.01, distort: float = 0.0) -> float:
+    """Centre of a clamped unit square under pressure, in p/D."""
+    held = made(lambda u, v: (u, v, 0.0), (n, n), ShellSection.isotropic(ratio, 1.0, 0.3), None, distort, 3)
+    held.hold(((held.at == 0) | (held.at == 1)).any(axis=1), *ALL)
+    held.load[:, Z] = held.shell.shares(held.shell.areas)
+    return held.small()[held.node(0.5, 0.5), Z] * ratio**3 / 12.0 / 0.91
+
+
+# ---- large displacements ---------------------------------------------------------------------------------------------
+
+
+def cantilever(n: int = 16) -> tuple[float, float]:
+    """Deflection and shortening of a strip under an end shear of 4."""
+    held = made(lambda u, v: (10 * u, v, 0.0), (n, 1), ShellSection.isotropic(0.1, 1.2e6))
+    held.hold(held.side(0, 0), *ALL)
+    held.edge(held.side(0, 1), Z, 4.0)
+    end = statics.follow(held.shell, held.load, held.free, step=0.02).poses[-1, held.node(1, 0)]
+    return end[6], 10.0 - end[4]
+
+
+def rolled(n: int = 4) -> tuple[Held, Any]:
+    """A strip of length 12 that an end moment rolls to a full circle; its poses."""
+    held = made(lambda u, v: (12 * u, v, 0.0), (n, 1), ShellSection.isotropic(0.1, 1.2e6))
+    held.hold(held.side(0, 0), *ALL)
+    held.edge(held.side(0, 1), WY, -50.0 * np.pi / 3.0)
+    poses = held.shell.poses
+    for share in np.arange(1, 9) / 8.0:
+        poses, _ = statics.equilibrium(held.shell, share * held.load, held.free, poses)
+    return held, poses
+
+
+def annulus(across: int = 10, along: int = 80) -> tuple[float, float]:
+    """Lift of the inner and the outer corner of a slit annulus under a line force of 0.8."""
+
+    def surface(u: Any, v: Any) -> Any:
+        r, a = 6 + 4 * u, 2 * np.pi * v
+        return r * np.cos(a), r * np.sin(a), 0.0
+
+    held = made(surface, (across, along), ShellSection.isotropic(0.03, 21e6))
+    held.hold(held.side(1, 0), *ALL)
+    held.edge(held.side(1, 1), Z, 3.2)
+    path = statics.follow(held.shell, held.load, held.free, step=0.002)
+    return tuple(path.poses[-1, held.node(u, 1), 6] for u in (0, 1))  # pyright: ignore[reportReturnType]
+
+
+def ball_large(n: int = 16) -> tuple[float, float]:
+    """Outward and inward displacements of the hemisphere under forces of 400 (200 on a quarter)."""
+    held = ball(n)
+    end = statics.follow(held.shell, 200.0 * held.load, held.free, step=0.02).poses[-1]
+    return end[held.node(0, 0), 4] - 10.0, 10.0 - end[held.node(1, 0), 5]
+
+
+def pulled(across: int = 16, along: int = 24) -> tuple[float, float, Any]:
+    """Displacements of an open cylinder pulled by 40000, an eighth of it; the path."""
+
+    def surface(u: Any, v: Any) -> Any:
+        a = u * np.pi / 2
+        return 4.953 * np.sin(a), 5.175 * v, 4.953 * np.cos(a)
+
+    held = made(surface, (along, across), ShellSection.isotropic(0.094, 10.5e6, 0.3125), about_y)
+    held.hold(held.side(0, 0), X, WY, WZ)
+    held.hold(held.side(0, 1), Z, WX, WY)
+    held.hold(held.side(1, 0), Y, WX, WZ)
+    a, b = held.node(0, 0), held.node(1, 0)
+    held.load[a, Z] = 10000.0
+    path = statics.follow(held.shell, held.load, held.free, step=0.002)
+    return path.poses[-1, a, 6] - 4.953, 4.953 - path.poses[-1, b, 4], path
+
+
+def snapped(n: int = 8, h: float = 12.7) -> statics.ShellPath:
+    """Path of a hinged roof under a force in its middle, a quarter of it; loads in parts of 1 kN in all."""
+
+    def surface(u: Any, v: Any) -> Any:
+        return 2540.0 * np.sin(0.1 * u), 254.0 * v, 2540.0 * np.cos(0.1 * u)
+
+    held = made(surface, (n, n), ShellSection.isotropic(h, 3102.75, 0.3), about_y)
+    held.hold(held.side(0, 0), X, WY, WZ)
+    held.hold(held.side(0, 1), X, Y, Z, WX, WZ)
+    held.hold(held.side(1, 0), Y, WX, WZ)
+    top = held.node(0, 0)
+    held.load[top, Z] = -250.0
+    low = held.shell.points[top, 2] - 30.0
+    return statics.follow(
+        held.shell, held.load, held.free, 1e3, step=0.3, stop=lambda _, poses: bool(poses[top, 6] < low)
+    )
+
+
+# ---- frequencies and critical loads ----------------------------------------------------------------------------------
+
+
+def plate_modes(n: int, kind: str = "FV12", count: int = 6) -> Any:
+    """Frequencies in Hz of NAFEMS's plates FV12 (free) and FV16 (one side clamped)."""
+    h = 0.05
+    held = made(lambda u, v: (10 * u, 10 * v, 0.0), (n, n), ShellSection.isotropic(h, 200e9, 0.3, 8000.0))
+    held.hold(slice(None), X, Y, WZ)
+    if kind == "FV16":
+        held.hold(held.side(0, 0), *ALL)
+    rigid = 3 if kind == "FV12" else 0
+    found = spectra.modes(held.shell, held.free, count + rigid).values
+    return found[rigid:] / (2.0 * np.pi)
+
+
+def compressed(n: int = 8, h: float = 0.01) -> float:
+    """Critical thrust of a hinged square plate of side 1, over π²D, which is 4."""
+    held = made(lambda u, v: (u, v, 0.0), (n, n), ShellSection.isotropic(h, 1.0, 0.3))
+    rim = ((held.at == 0) | (held.at == 1)).any(axis=1)
+    held.hold(rim, Z)
+    held.hold(held.side(0, 0), X)
+    held.hold(held.node(0, 0), Y)
+    held.hold(held.side(0, 0) | held.side(0, 1), WX)
+    held.hold(held.side(1, 0) | held.side(1, 1), WY)
+    held.edge(held.side(0, 1), X, -(np.pi**2) * h**3 / 12.0 / 0.91)
+    return float(spectra.buckling(held.shell, held.load, held.free).values[0])
+
+
+def ring(around: int) -> Any:
+    """Two lowest frequencies of a free short cylinder over Rayleigh's for n = 2, 3 waves."""
+    angle, height = 2 * np.pi * np.arange(around) / around, np.linspace(0.0, 0.2, 3)
+    a, z = (x.ravel() for x in np.meshgrid(angle, height, indexing="ij"))
+    points = np.stack([np.cos(a), np.sin(a), z], axis=1)
+    number = np.arange(len(points)).reshape(around, 3)
+    after = np.roll(number, -1, axis=0)
+    corners = (number[:, :-1], after[:, :-1], after[:, 1:], number[:, 1:])
+    cells = np.stack([corner.ravel() for corner in corners], axis=1)
+    shell = Shell.of(points, cells, ShellSection.isotropic(0.01, 1.0, 0.0, 1.0), points * [1.0, 1.0, 0.0])
+    found = spectra.modes(shell, np.ones((len(points), 6), dtype=bool), 12).values[6:] / (0.01 / np.sqrt(12.0))
+    return [found[np.argmin(np.abs(found - e))] / e for n in (2, 3) if (e := n * (n * n - 1) / np.sqrt(n * n + 1))]
+
+
+PUBLISHED: dict[str, tuple[Callable[[int], float], tuple[int, ...], float]] = {
+    "roof": (roof, (4, 8, 16), 0.3024),
+    "pinched cylinder": (cylinder, (4, 8, 16), 1.8248e-5),
+    "hemisphere": (hemisphere, (4, 8, 16), 0.0930),
+    "Cook's membrane": (cook, (2, 4, 8), 23.96),
+    "twisted beam": (twisted, (1, 2, 4), 5.424e-3),
+    "twisted beam, thin": (lambda n: twisted(n, 0.0032), (1, 2, 4), 5.256e-3),
+    "clamped plate, h/L = 1e-4": (lambda n: plate(n, 1e-4), (8, 16), 0.00126532),
+}
+LARGE: dict[str, tuple[Callable[[], tuple[float, ...]], tuple[float, ...]]] = {
+    "cantilever 16 × 1": (cantilever, (6.698, 3.286)),
+    "slit annulus 10 × 80": (annulus, (13.891, 17.528)),
+    "hemisphere, forces 400, 16 × 16": (ball_large, (4.067, 8.178)),
+    "pull-out 16 × 24": (lambda: pulled()[:2], (2.768, 4.551)),
+    "hinged roof, limit in kN, 8 × 8": (lambda: (limit(snapped()),), (2.2,)),
+    "FV12 in Hz, 16 × 16": (lambda: tuple(plate_modes(16)), (1.622, 2.360, 2.922, 4.233, 4.233, 7.416)),
+    "FV16 in Hz, 16 × 16": (lambda: tuple(plate_modes(16, "FV16")), (0.421, 1.029, 2.582, 3.306, 3.753, 6.555)),
+    "ring over Rayleigh, 32 around": (lambda: tuple(ring(32)), (1.0, 1.0)),
+    "thrust of a hinged plate over π²D, 16 × 16": (lambda: (compressed(16),), (4.0,)),
+}
+
+
+def limit(path: statics.ShellPath) -> float:
+    """The first largest share of a path."""
+    falls = np.flatnonzero(np.diff(path.shares) < 0.0)
+    return float(path.shares[falls[0] if falls.size else -1])
+
+
+def report() -> Report:
+    """All of them."""
+    rows: list[dict[str, Any]] = []
+    for name, (problem, sizes, known) in PUBLISHED.items():
+        for n in sizes:
+            start = time.perf_counter()
+            found = problem(n)
+            seconds = time.perf_counter() - start
+            row = {"problem": name, "elements": n, "published": known, "found": float(found), "seconds": seconds}
+            rows.append(row | {"ratio": float(found) / known})
+    for name, (run, known) in LARGE.items():
+        start = time.perf_counter()
+        found = run()
+        seconds = time.perf_counter() - start
+        for have, want in zip(found, known, strict=False):  # of equal frequencies all are found
+            row = {"problem": name, "published": want, "found": float(have), "ratio": float(have) / want}
+            rows.append(row | {"seconds": seconds})
+    return Report(table_of(rows, COLUMNS), rows)
