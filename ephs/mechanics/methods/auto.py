@@ -131,12 +131,11 @@ class Auto(ReducedMethod):
         contest = self._contest
         if contest is not None:
             self._take(self._names[contest.at])
-            self._moved(contest, span)
-        active = self._active
-        if not isinstance(active, Explicit):
-            return active.many(span, contest)
-        limit = self._limit if active is self._explicit else np.inf if contest is not None else 0.0
-        return active.many(span, limit, self._switch, contest)
+        left = self._switch if contest is None else self._moved
+        if not isinstance(self._active, Explicit):
+            return self._active.many(span, contest, left)
+        limit = self._limit if self._active is self._explicit else np.inf if contest is not None else 0.0
+        return self._active.many(span, limit, left, contest)
 
     def _forward(self, forward: bool) -> None:
         """Take no semi-implicit steps backward in time: losses gain energy then, which implicit steps do not see."""
@@ -149,14 +148,16 @@ class Auto(ReducedMethod):
             self._contest = self._begun(serves=False)
             self.name = self.counts["chosen"] = self._active.name
 
-    def _moved(self, contest: Contest, span: Span[ReducedState]) -> None:
-        """Write down which method is that of the run, if that is another one."""
-        name, known = self._names[contest.home], self.counts["switches"]
-        if name != (known[-1]["to"] if known else self._explicit.name):
-            reason = "its steps cost least per second of motion"
-            known.append({"t": float(span.state.t), "to": name, "step": float(span.h), "reason": reason})
-            self.name = ", ".join(dict.fromkeys([*self.name.split(", "), name]))
-        self.counts["tries"] = contest.tries
+    def _moved(self, t: float, h: float, reason: str) -> None:
+        """Write down which method won the contest."""
+        assert self._contest is not None
+        name = self._names[self._contest.home]
+        self.name = ", ".join(dict.fromkeys([*self.name.split(", "), name]))
+        self.counts["switches"].append({"t": float(t), "to": name, "step": float(h), "reason": reason})
+
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics; among them that of tries in a contest."""
+        return super().stats() | ({} if self._contest is None else {"tries": self._contest.tries})
 
     def _switch(self, t: float, h: float, reason: str) -> None:
         """Go on with radau."""

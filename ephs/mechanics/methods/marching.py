@@ -28,6 +28,8 @@ LAGGED = 4
 """Evaluations that cost as much as the factors of the masses in a semi-implicit step."""
 FAILING = "its steps fail"
 """The reason to leave explicit steps that have no solution."""
+CHEAPEST = "its steps cost least per second of motion"
+"""The reason to take a method that won a contest."""
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
 
@@ -74,7 +76,8 @@ class March:
     arrays
         Coefficients, by the names of `ephs.solve.march.Tableau`.
     limit, left
-        Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look.
+        Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look. In a
+        contest it calls ``left`` where another method wins.
     kept
         The matrix of implicit steps, and memory for these; None: steps are explicit or iterated.
     contest
@@ -224,7 +227,9 @@ class March:
             elif found == Ending.PAUSED and self._contest is not None and not self._unweighed(self._contest):
                 (tries, cost), (_, known, since) = self._spent(), self._weighed
                 self._weighed[:] = tries, cost, self.control.time
+                home = self._contest.home
                 self.left = self._contest.weigh(float(cost - known), float(self.control.time - since))
+                self._tell(home)
                 if self.left or tries >= most:
                     return found
             else:
@@ -236,15 +241,24 @@ class March:
 
     def _yield(self, *, failing: bool) -> None:
         """Leave explicit steps that have no solution, or that stability holds back, to others."""
-        if self._contest is None and self._leave is not None:
-            reason = FAILING if failing else f"h·|λ| = {self.control.stiff:.1f} holds its steps"
-            self._leave(self.time, float(self.control.step), reason)
-            self.left = True
-        elif self._contest is not None and failing:
+        reason = FAILING if failing else f"h·|λ| = {self.control.stiff:.1f} holds its steps"
+        if self._contest is None:
+            if self._leave is not None:
+                self._leave(self.time, float(self.control.step), reason)
+                self.left = True
+            return
+        home = self._contest.home
+        if failing:
             self._contest.fail()
             self.left = True
-        elif self._contest is not None:
+        else:
             self.control.held, self.left = 0, self._contest.stiff()
+        self._tell(home, reason)
+
+    def _tell(self, home: int, reason: str = CHEAPEST) -> None:
+        """Say that the method of the run is another one."""
+        if self._contest is not None and self._leave is not None and self._contest.home != home:
+            self._leave(self.time, float(self.control.step), reason)
 
     def _refused(self, status: int) -> None:
         eq = self.method.equations

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import lu_solve
 
 from ephs.mechanics.methods.contest import Contest
-from ephs.mechanics.methods.marching import March
+from ephs.mechanics.methods.marching import Leave, March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import Kept, Stages
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -66,13 +66,15 @@ class Implicit(ReducedMethod):
         self._stages.keep(fast=fast)
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))
 
-    def many(self, span: Span[ReducedState], contest: Contest | None = None) -> Leg[ReducedState] | None:
+    def many(
+        self, span: Span[ReducedState], contest: Contest | None = None, left: Leave | None = None
+    ) -> Leg[ReducedState] | None:
         """Steps of trees, many in one compiled call, if no step needs Python, until another method wins a contest."""
         eq = self.equations
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant:
             return None
-        return March(self, ARRAYS, span, kept=Kept(self._stages), contest=contest)
+        return March(self, ARRAYS, span, left=left, kept=Kept(self._stages), contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""
