@@ -1,5 +1,6 @@
 """The pages say all public names, and are all reached."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -14,6 +15,27 @@ def test_the_list_of_names_is_whole():
     listed = set(re.findall(r"^\.\. auto\w+:: ephs\.(\w+)$", (DOCS / "api.md").read_text("utf-8"), re.MULTILINE))
     assert set(ephs.__all__) - ROOMS <= listed
     assert {"library", "show", "testing"} <= listed and "Nesting" in operad.__all__
+
+
+def there(name):
+    """Whether a module has what a name of the list says."""
+    parts = name.split(".")
+    heads = [k for k in range(len(parts), 0, -1) if (DOCS.parent / Path(*parts[:k])).is_dir()]
+    heads = [
+        k for k in range(len(parts), 0, -1) if (DOCS.parent / Path(*parts[:k])).with_suffix(".py").is_file()
+    ] + heads
+    found = importlib.import_module(".".join(parts[: heads[0]]))
+    for part in parts[heads[0] :]:
+        found = getattr(found, part, None)
+    return found is not None
+
+
+def test_the_names_of_the_list_are_there():
+    """A name that is gone ends the making of the pages."""
+    names = re.findall(r"^\.\. auto\w+:: ([\w.]+)$", (DOCS / "api.md").read_text("utf-8"), re.MULTILINE)
+    assert len(names) > 100
+    assert not [name for name in names if not there(name)]
+    assert not there("ephs.exporting.image.Nothing")
 
 
 def test_every_page_is_in_the_contents():

@@ -1,6 +1,6 @@
 """Syntax: names, quantities, interconnection patterns, the operad that they form, its algebras, and their laws."""
 
-from ephs.operad.algebra import Algebra, AlgebraMap, Element, Lax
+from ephs.operad.algebra import Algebra, AlgebraMap, Composable, Lax
 from ephs.operad.directory import Directory
 from ephs.operad.equations import Equation, Law
 from ephs.operad.errors import PatternError
@@ -20,8 +20,8 @@ __all__ = [
     "Algebra",
     "AlgebraMap",
     "Box",
+    "Composable",
     "Directory",
-    "Element",
     "Equation",
     "Interface",
     "Junction",

@@ -144,8 +144,8 @@ class AlgebraMap(Generic[S, T]):
         return self.name or f"AlgebraMap({self.source}, {self.target})"
 
 
-class Element(Protocol):
-    """Filling of a box when a pattern is called: it names its algebra."""
+class Composable(Protocol):
+    """Composable of a box when a pattern is called: it names its algebra."""
 
     @property
     def algebra(self) -> Algebra[Any]:

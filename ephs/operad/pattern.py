@@ -21,7 +21,7 @@ from ephs.operad.quantities import Interface, PortType
 if TYPE_CHECKING:
     import networkx as nx
 
-    from ephs.operad.algebra import Algebra, Element
+    from ephs.operad.algebra import Algebra, Composable
     from ephs.operad.isomorphism import Renaming
     from ephs.operad.lint import Diagnostic
     from ephs.semantics.meaning import LinearRelation
@@ -204,9 +204,9 @@ class Pattern:
 
     def __call__(
         self,
-        mapping: "Mapping[Path, Element] | Mapping[str, Element] | None" = None,
+        mapping: "Mapping[Path, Composable] | Mapping[str, Composable] | None" = None,
         /,
-        **fillings: "Element",
+        **fillings: "Composable",
     ) -> Any:
         """Fill all boxes, in the most general algebra of the fillings; names as in `substitute`.
 

@@ -115,7 +115,7 @@ def test_a_run_that_goes_from_method_to_method_goes_on_too(copies, tmp_path):
     file.write_text(BALL.format(slip=1e-4), encoding="utf-8")
     model, options = ephs.load(file), {"until": 0.8, "rtol": 1e-4}
     whole = simulate(model, options)
-    assert [switch["to"] for switch in whole.stats["switches"]][:3] == ["radau", "rk54", "radau"]
+    assert {"semi", "radau"} <= {switch["to"] for switch in whole.stats["switches"]}
     assert same(simulate(model, options, journal=tmp_path / "run.journal"), whole)
     for copy in copies[:: max(1, len(copies) // 12)]:
         again = simulate(model, options, journal=copy)

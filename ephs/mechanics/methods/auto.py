@@ -1,21 +1,21 @@
 """Automatic choice of the method: one without damping until stability limits the steps, then radau.
 
-Where surfaces may touch and tolerances are coarse, steps are semi-implicit: losses alone limit explicit ones there.
+Where surfaces may touch, steps are semi-implicit at coarse tolerances, as losses alone limit explicit ones there; at
+others the methods compete, see `ephs.mechanics.methods.contest`: contacts are stiff for a while.
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.
-Contacts are stiff for a while: compiled steps of radau end where explicit ones would have cost less. Many bodies, whose
-surfaces may touch, try radau when explicit steps have cost as much as a trial does, which grows with the cube of the
-freedoms; after a trial in vain, when they have cost twice as much as before.
 """
 
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.explicit import Explicit, tableau
-from ephs.mechanics.methods.marching import FAILING, WINDOW, Rival
+from ephs.mechanics.methods.marching import FAILING, LAGGED
 from ephs.mechanics.methods.method import ReducedMethod
+from ephs.mechanics.methods.semi import NAME as SEMI
 from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 LIMITS = {"rk54": 3.25, "rk87": 6.1}
 """h·|λ| at the limit of stability."""
-FREEDOMS = 64
-"""Degrees of freedom up to which a trial of radau costs little."""
 TRIAL = 400
-"""Explicit steps between surfaces that may touch, after which radau is tried: a stop at slip 0 hides its stiffness."""
-SOLUTIONS = 6
-"""Solutions with the factors of a matrix that a step of radau takes, about."""
+"""Steps of rk54 between surfaces that may touch, after which others are tried: a stop at slip 0 hides its stiffness."""
+ITERATIONS, MATRICES = 4, 32
+"""Iterations that a step of radau takes, about, and what its derivatives cost."""
+CHANGE = 8000
+"""Evaluations of a single freedom that take as long as it takes to go to another method and back, about."""
 LOOSE = 1e-2
 """Tolerances above this are for radau where surfaces may touch: explicit steps may gain more than is mended."""
 COARSE = 3e-4
@@ -48,7 +48,7 @@ DIGITS = 1e-5
 
 @final
 class Auto(ReducedMethod):
-    """rk54 or rk87 by the tolerance, and radau from where the problem shows itself stiff."""
+    """rk54 or rk87 by the tolerance, and radau from where the problem shows itself stiff; a contest among surfaces."""
 
     name = "auto"
 
@@ -56,47 +56,57 @@ class Auto(ReducedMethod):
         super().__init__(equations, control)
         name = "rk87" if control.rtol.value < DIGITS else "rk54"
         self._explicit, self._limit = Explicit(equations, control, tableau(name)), LIMITS[name]
-        self._implicit: Implicit | None = None
-        self._begun: Implicit | None = None
-        self._held = self._free = self._failures = 0
-        self._trial: int | None = None
-        self._waits = self._asleep = 0
-        self._returns, touches = False, _touches(equations)
         self._semi: Explicit | None = None
+        self._implicit: Implicit | None = None
+        self._active: Explicit | Implicit = self._explicit
+        self._contest: Contest | None = None
+        self._held = self._free = self._failures = 0
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
-        self.name, self.exponent, self.share = name, self._explicit.exponent, self._explicit.share
-        self.counts: dict[str, Any] = {"chosen": name, "switches": []}
-        if touches and name == "rk54" and control.rtol.value > COARSE and cheap(equations):
-            self._semi = semi_implicit(equations, control)
-            self.name = self.counts["chosen"] = self._semi.name
-            self.exponent, self.share = self._semi.exponent, self._semi.share
-        elif touches:
-            self._begin()
+        self.counts: dict[str, Any] = {"switches": []}
+        touches, rtol = _touches(equations), control.rtol.value
+        serves = touches and cheap(equations)
+        if serves and rtol > COARSE:
+            self._take(SEMI)
+        elif touches and rtol > LOOSE:
+            self._take("radau")
+        else:
+            self._take(name)
+            self._contest = self._begun(serves) if touches else None
+        self.name = self.counts["chosen"] = self._active.name
 
-    def _begin(self) -> None:
-        """Begin without semi-implicit steps, as tolerances ask for where surfaces may touch."""
-        self._semi = None
-        self.exponent, self.share = self._explicit.exponent, self._explicit.share
-        self.name = self._explicit.name
-        if self.equations.n > FREEDOMS:
-            factors, solutions = costs(self.equations.n, scheme_of(self.equations, self.control).nodes.size)
-            self._waits = self._asleep = WINDOW * (factors + SOLUTIONS * solutions) // self._explicit.method.c.size
-            self._returns = True
-        elif self.name == "rk54" and self.control.rtol.value > LOOSE:
-            self._go_implicit()
-            self.name = "radau"
-        elif self.name == "rk54":
-            self._trial, self._returns = TRIAL, True
-        self.counts["chosen"] = self.name
+    def _begun(self, serves: bool) -> Contest:
+        """A contest of the explicit method, semi-implicit steps, where these serve, and radau."""
+        stages, n = self._explicit.method.c.size, self.equations.n
+        count = scheme_of(self.equations, self.control).nodes.size
+        factors, solutions = costs(n, count)
+        radau = ITERATIONS * (count + solutions) + factors + MATRICES
+        self._names = [self._explicit.name, *([SEMI] if serves else []), "radau"]
+        prices = [stages, *([LAGGED + 3] if serves else []), radau]
+        return Contest(prices, CHANGE / max(n, 1), TRIAL * stages if self._explicit.name == "rk54" else np.inf)
+
+    def _take(self, name: str) -> None:
+        """Let a method take the steps that follow."""
+        if name == SEMI:
+            self._semi = self._active = self._semi or semi_implicit(self.equations, self.control)
+        elif name == "radau":
+            self._active = self._implicit = self._implicit or self._made()
+        else:
+            self._active = self._explicit
+        self.exponent, self.share = self._active.exponent, self._active.share
+
+    def _made(self) -> "Implicit":
+        from ephs.mechanics.methods.radau import Implicit  # with derivatives, which explicit runs do not need
+
+        known = dict(self.counts)
+        made = Implicit(self.equations, self.control, self.counts)
+        self.counts |= known  # of the part of a run that is resumed
+        return made
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
-        if self._semi is not None and h >= 0.0:
-            return self._semi.step(state, h)
-        if self._semi is not None:  # losses gain energy backward in time, which implicit steps do not see
-            self._begin()
-        if self._implicit is not None:
-            return self._implicit.step(state, h)
+        self._forward(h >= 0.0)
+        if self._active is not self._explicit:
+            return self._active.step(state, h)
         try:
             found = self._explicit.step(state, h)
         except SolveError as error:
@@ -106,9 +116,7 @@ class Auto(ReducedMethod):
             raise
         if found.error <= 1.0:
             self._failures = 0
-            if self._asleep:
-                self._asleep -= 1
-            elif self._explicit.stiffness > self._limit:
+            if self._explicit.stiffness > self._limit:
                 self._held, self._free = self._held + 1, 0
                 if self._held == HELD:
                     self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
@@ -120,66 +128,69 @@ class Auto(ReducedMethod):
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
         """Explicit steps, many in one compiled call, until stiffness is detected; then implicit ones while they pay."""
-        if self._semi is not None and span.until >= span.t0:
-            return self._semi.many(span)
-        if self._semi is not None:
-            self._begin()
-        if self._implicit is not None:
-            rival = Rival(self._limit, self._explicit.method.c.size, self._return) if self._returns else None
-            return self._implicit.many(span, rival)
-        if self._asleep:
-            return self._explicit.many(span, np.inf, self._wake, self._asleep)
-        return self._explicit.many(span, self._limit, self._switch, self._trial)
+        self._forward(span.until >= span.t0)
+        contest = self._contest
+        if contest is not None:
+            self._take(self._names[contest.at])
+        left = self._switch if contest is None else self._moved
+        if not isinstance(self._active, Explicit):
+            return self._active.many(span, contest, left)
+        limit = self._limit if self._active is self._explicit else np.inf if contest is not None else 0.0
+        return self._active.many(span, limit, left, contest)
 
-    def _wake(self, t: float, h: float, reason: str) -> None:
-        """Heed stiffness from here on: a trial of radau costs less than the steps so far did."""
-        self._asleep = 0
-        if reason == FAILING:
-            self._switch(t, h, reason)
+    def _forward(self, forward: bool) -> None:
+        """Take no semi-implicit steps backward in time: losses gain energy then, which implicit steps do not see."""
+        if forward or not _touches(self.equations):
+            return
+        if self._contest is not None and SEMI in self._names:
+            self._contest.without(self._names.index(SEMI))
+        elif self._active is self._semi:
+            self._take(self._explicit.name)
+            self._contest = self._begun(serves=False)
+            self.name = self.counts["chosen"] = self._active.name
 
-    def _switch(self, t: float, h: float, reason: str) -> None:
-        self._go_implicit()
-        self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
-
-    def _return(self, t: float, h: float, reason: str, vain: bool) -> None:
-        self._implicit = None
-        if self._trial is not None:
-            self._trial = 2 * self._trial if vain else TRIAL
-        self._asleep = self._waits = 2 * self._waits if vain else self._waits
-        self.exponent, self.share = self._explicit.exponent, self._explicit.share
-        name = self._explicit.name
+    def _moved(self, t: float, h: float, reason: str) -> None:
+        """Write down which method won the contest."""
+        assert self._contest is not None
+        name = self._names[self._contest.home]
+        self.name = ", ".join(dict.fromkeys([*self.name.split(", "), name]))
         self.counts["switches"].append({"t": float(t), "to": name, "step": float(h), "reason": reason})
 
-    def _go_implicit(self) -> "Implicit":
-        from ephs.mechanics.methods.radau import Implicit  # with derivatives, which explicit runs do not need
+    def stats(self) -> dict[str, Any]:
+        """Counts, for the solution's statistics; among them that of tries in a contest."""
+        return super().stats() | ({} if self._contest is None else {"tries": self._contest.tries})
 
-        if self._begun is None:
-            known = dict(self.counts)
-            self._begun = Implicit(self.equations, self.control, self.counts)
-            self.counts |= known  # of the part of a run that is resumed
-        self._implicit = self._begun
-        self.exponent, self.share = self._implicit.exponent, self._implicit.share
+    def _switch(self, t: float, h: float, reason: str) -> None:
+        """Go on with radau."""
+        self._contest = None
+        self._take("radau")
         self.name = f"{self._explicit.name}, radau"
-        return self._implicit
+        self.counts["switches"].append({"t": float(t), "to": "radau", "step": float(h), "reason": reason})
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """Memory of its present method, and its distance to a switch."""
+        """Memory of its methods, and what their choice depends on."""
         return {
             "explicit": self._explicit.taken(state),
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
-            "nearness": [self._held, self._free, self._failures, self._trial, self._waits, self._asleep],
+            "nearness": [self._held, self._free, self._failures],
+            "contest": None if self._contest is None else self._contest.state(),
+            "active": self._active.name,
             "name": self.name,
-            "semi": self._semi is not None,
         }
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        if self._semi is not None and not own["semi"]:
-            self._begin()
         self._explicit.take(own["explicit"], state)
         if own["implicit"] is not None:
-            self._go_implicit().restore(own["implicit"], state)
-        self._held, self._free, self._failures, self._trial, self._waits, self._asleep = own["nearness"]
+            self._take("radau")
+            assert self._implicit is not None
+            self._implicit.restore(own["implicit"], state)
+        if own["contest"] is None:
+            self._contest = None
+        elif self._contest is not None:
+            self._contest.restore(own["contest"])
+        self._take(own["active"])
+        self._held, self._free, self._failures = own["nearness"]
         self.name = own["name"]
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.methods import tableaux as t
+from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -182,13 +183,13 @@ class Explicit(ReducedMethod):
         span: Span[ReducedState],
         limit: float = 0.0,
         left: Callable[[float, float, str], None] | None = None,
-        most: int | None = None,
+        contest: Contest | None = None,
     ) -> Leg[ReducedState] | None:
         """Many steps in one compiled call, if no step needs Python.
 
-        The leg calls left(t, h, reason) and ends after ``most`` steps, or when stability limits the steps: h·|λ| is
-        ``limit`` then.
+        The leg ends when stability limits the steps, h·|λ| is ``limit`` then, and calls left(t, h, reason); in a
+        contest it ends where that has another method go on.
         """
         if not self.equations.constant:
             return None
-        return March(self, self.method.arrays, span, limit, left, most=most, lagged=self.lagged)
+        return March(self, self.method.arrays, span, limit, left, contest=contest, lagged=self.lagged)

@@ -21,8 +21,8 @@ from ephs.solve.snapshot import Snapshot, like, parts
 RELATIVE = 2e-8
 """Relative length of the differences by which inputs that are Python functions of the state are differentiated."""
 
-TANGENT = 8
-"""Evaluations that cost as much as one along several directions."""
+TANGENT, MADE = 8, 100
+"""Evaluations that cost as much as one along several directions, and as all else that a matrix takes."""
 
 
 @final
@@ -48,7 +48,9 @@ class Jacobian:
     @property
     def cost(self) -> int:
         """Cost of all matrices of compiled rates so far, in evaluations."""
-        return 0 if self._slopes is None else TANGENT * self._slopes.calls * self._counts["jacobians"]
+        if self._slopes is None:
+            return 0
+        return (MADE + TANGENT * self._slopes.calls) * self._counts["jacobians"]
 
     def fresh(self, state: ReducedState) -> bool:
         """Whether the matrix was made at this state."""

@@ -1,17 +1,16 @@
 """Many steps of a mechanism in one compiled call, if no step needs Python."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, final
 
 import numpy as np
 
+from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.stages import Kept
 from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.spaces.rank import TINY
 from ephs.solve.control import Proportional
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.march import STEPS, Account, Ending, Status
@@ -25,35 +24,14 @@ if TYPE_CHECKING:
 
 ROWS = 1024
 """Capacity of the buffer of rows."""
-WINDOW, LATEST = 10, 30
-"""Steps of implicit legs, rejected ones included, that are weighed against those of a rival: at a new matrix, and
-after so many without one."""
-
-
+LAGGED = 4
+"""Evaluations that cost as much as the factors of the masses in a semi-implicit step."""
 FAILING = "its steps fail"
 """The reason to leave explicit steps that have no solution."""
+CHEAPEST = "its steps cost least per second of motion"
+"""The reason to take a method that won a contest."""
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Rival:
-    """An explicit method that may take over from an implicit one.
-
-    Parameters
-    ----------
-    limit
-        h·|λ| at its limit of stability.
-    stages
-        Evaluations of its steps.
-    left
-        Called where the steps end for it; with whether they had not paid before.
-    """
-
-    limit: float
-    stages: int
-    left: Callable[[float, float, str, bool], None]
 
 
 class Marching(Protocol):
@@ -98,13 +76,12 @@ class March:
     arrays
         Coefficients, by the names of `ephs.solve.march.Tableau`.
     limit, left
-        Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look.
+        Where stability, whose limit is h·|λ|, holds steps back, it calls ``left`` and ends; 0: it does not look. In a
+        contest it calls ``left`` where another method wins.
     kept
         The matrix of implicit steps, and memory for these; None: steps are explicit or iterated.
-    rival
-        Of implicit steps.
-    most
-        Explicit steps after which ``left`` is called, too.
+    contest
+        It weighs the steps, window by window, and tells where another method takes those that follow.
     lagged
         Memory of semi-implicit steps.
 
@@ -124,18 +101,16 @@ class March:
         limit: float = 0.0,
         left: Leave | None = None,
         kept: Kept | None = None,
-        rival: Rival | None = None,
-        most: int | None = None,
+        contest: Contest | None = None,
         lagged: "Semi | None" = None,
     ) -> None:
         eq, start = method.equations, method.equations.accounts.opened(span.state)
         self.own, eq.accounts.kept = eq.accounts.own, True
         summed = start.account.size - self.own
         self.method, self.span, self.left, self._leave = method, span, False, left
-        self._handed, self._kept, self._rival = 0, kept, rival
-        # Tries when last weighed, cost then in evaluations; time of the matrix, its |λ|, ∫|λ| dt; 1 where steps paid;
-        # the number of steps to end at.
-        self._weighed = np.array([0.0] * 6 + [np.inf if most is None else span.counts.steps + most])
+        self._handed, self._kept = 0, kept
+        self._contest, self._lagged = contest, lagged is not None
+        self._weighed = np.zeros(3)  # where the window began: tries, cost in evaluations, time
         size, q, times = eq.size, span.state.q, span.save_at
         rows = ROWS if times is None else max(times.size, 1)
         self.times = np.zeros(0) if times is None else np.abs(times - span.t0)
@@ -171,7 +146,7 @@ class March:
         c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
         c.saved = -1 if times is None else span.saved
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
-        self._weighed[:3] = *self._spent(), c.time
+        self._weighed[:] = *self._spent(), c.time
 
     @property
     def explicit(self) -> bool:
@@ -198,15 +173,7 @@ class March:
         """
         eq, c = self.method.equations, self.control
         before, sound = c.evaluations, float(c.time)
-        steps = int(min(steps, self._weighed[-1] - c.steps))
-        if self._rival is not None:
-            steps = min(steps, self._unweighed)
-        found = int(self.march(steps))
-        while found == Ending.STALE and self._kept is not None and not self.left:
-            self._kept.renew(self.state)
-            self._weigh(self._kept.fastest() if self._rival is not None else 0.0)
-            if not self.left:
-                found = int(self.march(steps))
+        found = self._marched(steps)
         eq.evaluations += c.evaluations - before
         if self._kept is not None:
             self._kept.count()
@@ -214,16 +181,8 @@ class March:
         self.method.stiffness = float(c.stiff)
         if found == Ending.CAREFUL or (self._kept is not None and found >= Ending.REFUSED):
             self._step()
-        elif self._leave is not None and found in (Ending.STIFF, Ending.REFUSED + Status.UNSETTLED):
-            failing = found != Ending.STIFF or c.refusals > PATIENCE
-            reason = FAILING if failing else f"h·|λ| = {c.stiff:.1f} holds its steps"
-            self._leave(self.time, float(c.step), reason)
-            self.left = True
-        elif found == Ending.PAUSED and self._rival is not None and not self._unweighed:
-            self._weigh(float(self._weighed[3]))
-        elif found == Ending.PAUSED and self._leave is not None and c.steps >= self._weighed[-1]:
-            self._leave(self.time, float(c.step), "its steps are many")
-            self.left = True
+        elif found in (Ending.STIFF, Ending.REFUSED + Status.UNSETTLED) and c.limit > 0.0:
+            self._yield(failing=found != Ending.STIFF or c.refusals > PATIENCE)
         elif found == Ending.SHORT:
             raise SolveError(Outcome.TINY, "", f"{c.step:.3g} s")
         elif found >= Ending.REFUSED:
@@ -252,33 +211,54 @@ class March:
         raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
 
     def _spent(self) -> tuple[int, int]:
-        """Tries of implicit steps so far, and their cost in evaluations."""
+        """Steps tried so far, and their cost in evaluations."""
         c, cost = self.control, 0 if self._kept is None else self._kept.cost
-        return int(c.steps + c.rejected), int(c.evaluations) + cost
+        tries = int(c.steps + c.rejected)
+        return tries, int(c.evaluations) + cost + LAGGED * tries * self._lagged
 
-    @property
-    def _unweighed(self) -> int:
-        """Tries until steps are weighed at the latest."""
-        return max(0, int(self._weighed[0]) + LATEST - self._spent()[0])
+    def _marched(self, steps: int) -> int:
+        """Try up to ``steps`` steps, with new matrices where these are old, while no other method wins; the ending."""
+        most = self._spent()[0] + steps
+        while True:
+            rest = most - self._spent()[0]
+            found = int(self.march(rest if self._contest is None else min(rest, self._unweighed(self._contest))))
+            if found == Ending.STALE and self._kept is not None:
+                self._kept.renew(self.state)
+            elif found == Ending.PAUSED and self._contest is not None and not self._unweighed(self._contest):
+                (tries, cost), (_, known, since) = self._spent(), self._weighed
+                self._weighed[:] = tries, cost, self.control.time
+                home = self._contest.home
+                self.left = self._contest.weigh(float(cost - known), float(self.control.time - since))
+                self._tell(home)
+                if self.left or tries >= most:
+                    return found
+            else:
+                return found
 
-    def _weigh(self, fastest: float) -> None:
-        """End the steps where those of a rival, as long as its stability allows, would have cost less.
+    def _unweighed(self, contest: Contest) -> int:
+        """Tries until steps are weighed."""
+        return max(0, int(self._weighed[0]) + contest.length - self._spent()[0])
 
-        ``fastest`` is the largest |λ| at the state.
-        """
-        rival = self._rival
-        if rival is None:
+    def _yield(self, *, failing: bool) -> None:
+        """Leave explicit steps that have no solution, or that stability holds back, to others."""
+        reason = FAILING if failing else f"h·|λ| = {self.control.stiff:.1f} holds its steps"
+        if self._contest is None:
+            if self._leave is not None:
+                self._leave(self.time, float(self.control.step), reason)
+                self.left = True
             return
-        (tries, cost), before, c, w = self._spent(), self._weighed[0], self.control, self._weighed
-        w[2:5] = c.time, fastest, w[4] + (float(c.time) - w[2]) * max(fastest, w[3])
-        if tries - before < WINDOW:
-            return
-        if cost - w[1] > rival.stages * w[4] / rival.limit:
-            c.step = min(float(c.step), rival.limit / max(fastest, TINY))
-            reason = f"steps that |λ| = {fastest:.2g} 1/s limits cost less"
-            rival.left(self.time, float(c.step), reason, not w[5])
+        home = self._contest.home
+        if failing:
+            self._contest.fail()
             self.left = True
-        w[0], w[1], w[4], w[5] = tries, cost, 0.0, 1.0
+        else:
+            self.control.held, self.left = 0, self._contest.stiff()
+        self._tell(home, reason)
+
+    def _tell(self, home: int, reason: str = CHEAPEST) -> None:
+        """Say that the method of the run is another one."""
+        if self._contest is not None and self._leave is not None and self._contest.home != home:
+            self._leave(self.time, float(self.control.step), reason)
 
     def _refused(self, status: int) -> None:
         eq = self.method.equations

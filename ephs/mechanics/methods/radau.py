@@ -11,7 +11,8 @@ from typing import Any, final
 import numpy as np
 from scipy.linalg import lu_solve
 
-from ephs.mechanics.methods.marching import March, Rival
+from ephs.mechanics.methods.contest import Contest
+from ephs.mechanics.methods.marching import Leave, March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import Kept, Stages, scheme_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -68,13 +69,15 @@ class Implicit(ReducedMethod):
         self._stages.keep(fast=fast)
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))
 
-    def many(self, span: Span[ReducedState], rival: Rival | None = None) -> Leg[ReducedState] | None:
-        """Steps of trees, many in one compiled call, if no step needs Python; they end where a rival costs less."""
+    def many(
+        self, span: Span[ReducedState], contest: Contest | None = None, left: Leave | None = None
+    ) -> Leg[ReducedState] | None:
+        """Steps of trees, many in one compiled call, if no step needs Python, until another method wins a contest."""
         eq = self.equations
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant:
             return None
-        return March(self, tableau(self.scheme), span, kept=Kept(self._stages), rival=rival)
+        return March(self, tableau(self.scheme), span, left=left, kept=Kept(self._stages), contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""

@@ -21,6 +21,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.irreversible import Irreversible
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
+from ephs.semantics.systems.kept import once
 from ephs.solve.control import Control
 from ephs.solve.march import Control as Steering
 from ephs.solve.march import Status
@@ -74,7 +75,7 @@ class Semi:
 
     def __init__(self, equations: Equations) -> None:
         self._equations = equations
-        self.onsager = {number: onsager(one).compiled()["value"].address for number, one in _relations(equations)}
+        self.onsager = once(equations.reduced, "programs of friction", lambda: _programs(equations))
         self._made: tuple[Engine, dict[str, Any], Bound] | None = None
         coordinates, size = equations.engine.sizes
         self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), Steering.table(1)
@@ -139,6 +140,11 @@ def cheap(equations: Equations) -> bool:
     reach = chains(links_of(equations.reduced).parts)["reach"]
     narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
     return bool(narrow) and strikes(equations.problem.descriptor) is None
+
+
+def _programs(equations: Equations) -> dict[int, int]:
+    """Addresses of M/θ₀ of the components of friction, by their numbers."""
+    return {number: onsager(one).compiled()["value"].address for number, one in _relations(equations)}
 
 
 def _relations(equations: Equations) -> Iterator[tuple[int, Irreversible]]:

@@ -33,12 +33,11 @@ NOTHING = 1e-14
 """Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 PIVOTING = ("swaps", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
-FACTORS, FACTORED, SUBSTITUTED = 2, 120, 40
-"""Evaluations that cost as much as factors of a matrix of n freedoms, and solutions: 2 + n²/120 and 1 + n/40.
+FACTORS, FACTORED, SUBSTITUTED = 2, 500, 40
+"""Evaluations that cost as much as factors of a matrix of n freedoms, and solutions: 2 + n²/500 and 1 + n/40.
 
-An evaluation takes some 400 n operations, factors of a real and a complex matrix 10 n³/3, solutions with them 10 n²."""
-POWERS = 12
-"""Powers of a matrix after which its largest eigenvalue shows, and over which it is averaged."""
+An evaluation takes some 400 n operations, factors of a real and a complex matrix 10 n³/3, four times as many of them in
+the same time, as their inner loops are long; solutions with them take 10 n²."""
 FAST = 2e-3
 """Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
 
@@ -245,19 +244,6 @@ class Kept:
         n: Any = self.newton[0]
         factors, solutions = costs(self._stages.equations.n, self._stages.scheme.nodes.size)
         return self._stages.jacobian.cost + solutions * int(n.iterations) + factors * int(n.factorisations)
-
-    def fastest(self) -> float:
-        """The largest |λ| of the matrix in 1/s, roughly: by its powers."""
-        matrix, size = self.memory["matrix"], 1.0
-        x = np.ones(len(matrix))
-        for k in range(2 * POWERS):
-            x = matrix @ x
-            found = float(np.linalg.norm(x))
-            if not found > 0.0:
-                return 0.0
-            x /= found
-            size *= found if k >= POWERS else 1.0
-        return size ** (1.0 / POWERS)
 
     def count(self) -> None:
         """Add the steps' costs since the last call to the method's counts."""
