@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Self, final
 
 import numpy as np
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ephs.mechanics.elements.shell.mesh import Indices, Truths
@@ -27,6 +27,8 @@ WANTED: Final = 10
 """Iterations that a step along a path should take."""
 SHORTEST: Final = 1e-6
 """Part of the first step below which a path is lost."""
+SHIFTS: Final = (0.0, 1e-15, 3e-15, 1e-14)
+"""Parts of a matrix's largest entry by which it is shifted until no pivot is exactly zero."""
 PIVOT: Final = 1e-3
 """Part of a column's largest entry from which on the diagonal serves as the pivot."""
 
@@ -104,12 +106,23 @@ def factors(matrix: csc_array) -> Any:
 
 
 def negative(matrix: csc_array) -> int:
-    """How many negative eigenvalues a symmetric sparse matrix has: the signs of its pivots (Sylvester)."""
-    symmetric = csc_array(0.5 * (matrix + matrix.T))
-    found = splu(symmetric, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    if not np.array_equal(found.perm_r, found.perm_c):  # a pivot was exactly zero: rows were exchanged
-        return negative(csc_array(symmetric * (1.0 + 1e-15)))
-    return int((found.U.diagonal() < 0.0).sum())
+    """How many negative eigenvalues a symmetric sparse matrix has: the signs of its pivots (Sylvester).
+
+    Where a pivot on the diagonal is exactly zero, the matrix is shifted by what is rounding beside its largest entry.
+    """
+    symmetric: Any = csc_array(0.5 * (matrix + matrix.T))
+    unit = eye_array(symmetric.shape[0], format="csc") * float(abs(symmetric).max())
+    for shift in SHIFTS:
+        try:
+            found = splu(
+                csc_array(symmetric + shift * unit), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )  # fmt: skip
+        except RuntimeError:  # exactly singular
+            continue
+        if np.array_equal(found.perm_r, found.perm_c):
+            return int((found.U.diagonal() < 0.0).sum())
+    raise NoEquilibrium("the tangent is singular, so that its negative eigenvalues cannot be counted")
 
 
 def displacements(shell: Shell, load: Array, free: Truths) -> Array:

@@ -1,7 +1,10 @@
 """Shells at rest, their snaps, critical loads and modes: published values, closed forms, laws."""
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from scipy.sparse import csc_array
 
 from benchmarks import shells
 from benchmarks.shells import ALL, X, Z, made
@@ -117,6 +120,22 @@ def test_a_ring_vibrates_by_rayleigh():
     off = [np.abs(np.array(shells.ring(n)) - 1.0) for n in (32, 64)]
     assert off[1].max() < 0.01
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.25)
+
+
+@given(st.integers(1, 12), st.data())
+def test_negative_eigenvalues_are_counted_where_pivots_are_zero(size, data):
+    part = st.lists(st.integers(-2, 2), min_size=size, max_size=size)
+    full = np.array(data.draw(st.lists(part, min_size=size, max_size=size)), dtype=float)
+    full = full + full.T
+    values = np.linalg.eigvalsh(full)
+    assume(np.abs(values).min() > 1e-9)
+    assert statics.negative(csc_array(full)) == (values < 0.0).sum()
+
+
+def test_a_matrix_of_zeros_has_no_count():
+    assert statics.negative(csc_array(np.array([[0.0, 1.0], [1.0, 0.0]]))) == 1  # no pivot on the diagonal at first
+    with pytest.raises(statics.NoEquilibrium, match="cannot be counted"):
+        statics.negative(csc_array(np.zeros((2, 2))))
 
 
 def test_critical_loads_are_counted_and_end_the_vibration():
