@@ -26,6 +26,7 @@ SHIPPED: Final = (
     "ephs.mechanics.tree.engine.residuals:point_program",
     "ephs.mechanics.tree.sweeps.balances:network_program",
     "ephs.mechanics.sensitivity.implicit:tangent_program",
+    "ephs.mechanics.elements.shell.edges:edge_program",
     "ephs.solve.methods.residuals:evaluation_program",
     "ephs.solve.methods.newton:natural_programs",
     "ephs.solve.methods.integral:integral_program",

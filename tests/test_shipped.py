@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks import families
+from ephs.mechanics.elements.shell.edges import SIZE
 from ephs.mechanics.road.loops import ARGUMENTS as LOOPS
 from ephs.mechanics.road.programs import ARGUMENTS as SWEEPS
 from ephs.mechanics.runs.simulate import problem_of_scene
@@ -183,6 +184,16 @@ def reading(run: Heard, rows: int, seed: int) -> None:
     run["back"](counters, places.ravel(), rng.standard_normal(3 * rows), bars)
 
 
+def shell_edges(run: Heard, edges: int, seed: int) -> None:
+    """Logarithms of drawn edges of shells, and their derivatives at drawn stresses."""
+    rng = np.random.default_rng(seed)
+    turns = rng.standard_normal((2, edges, 4))
+    poses = np.dstack([turns / np.linalg.norm(turns, axis=2, keepdims=True), rng.standard_normal((2, edges, 3))])
+    starts, ends, logs = poses[0].copy(), poses[1].copy(), np.zeros((edges, 6))
+    run["logarithms"](starts, ends, logs)
+    run["slopes"](logs, rng.standard_normal((edges, 6)), np.zeros((edges, SIZE)), np.zeros((edges, SIZE)))
+
+
 NUMBERS = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(EDGES), st.floats())
 SIZES = [0.0, 1e-9, 1e-3, 1.0, 9.0]
 MECHANISMS = st.tuples(st.integers(1, 2), st.integers(0, 2**32 - 1))
@@ -193,6 +204,7 @@ USES: dict[str, tuple[Callable[..., None], st.SearchStrategy[Any]]] = {
     "constraint_rows": (constraint_rows, st.tuples(problems())),
     "linear": (linear, st.tuples(*[st.integers(1, 4), *[st.integers(0, 3)] * 2, st.integers(0, 2**32 - 1)])),
     "sparse_lu": (sparse, st.tuples(st.integers(1, 8), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.1, 0.9]))),
+    "shell_edges": (shell_edges, st.tuples(st.integers(1, 4), st.integers(0, 2**32 - 1))),
     "sweeps_planar_turn_trees": (swept("planar-chain", SWEEPS), MECHANISMS),
     "sweeps_planar_turn_loops": (swept("four-bar-windows", SWEEPS), MECHANISMS),
     "sweeps_planar_slide_turn_loops": (swept("slider-crank", SWEEPS), MECHANISMS),
@@ -220,7 +232,7 @@ def test_programs_are_used_or_reach_others():
 def test_all_ways_to_run_a_program_give_the_same_bits(name, run, data):
     use, strategy = USES[name]
     drawn = data.draw(strategy)
-    signed = not name.startswith(("sweeps", "loops", "differentials"))
+    signed = not name.startswith(("sweeps", "loops", "differentials", "shell"))
     plain, found = Heard(calls(name, "plain"), [], signed), Heard(calls(name, run), [], signed)
     use(plain, *drawn)
     use(found, *drawn)
