@@ -333,6 +333,16 @@ stiffness = 1.0
 """
 
 
+@pytest.mark.parametrize("method", ["auto", *(name for name in OF_SCENES if not METHODS[name].posed)])
+@pytest.mark.parametrize("form", ["scene", "system"])
+def test_where_nothing_is_nothing_moves(method, form):
+    scene = scene_of_text('format = 1\nname = "nothing"\n')
+    sol = ephs.simulate(
+        scene if form == "scene" else scene.system(), 0.1, **(setting(method) if method in METHODS else {})
+    )
+    assert not sol.states and sol.t[-1] == 0.1
+
+
 def test_auto_changes_to_radau_where_a_scene_is_stiff():
     scene = scene_of_text(STIFF)
     sol = ephs.simulate(scene, 10.0)

@@ -295,7 +295,7 @@ def _constant(model: Model) -> Any:
     """(components,) whether a component's equations are linear with constant coefficients."""
     n = model.descriptor.numbering
     of = [one.kernel is not None and one.kernel.name in LINEAR for one in n.primitives]
-    return np.array(of)[n.primitive] & np.isin(model.tables.kind, (STORING, REVERSIBLE))
+    return np.array(of, dtype=bool)[n.primitive] & np.isin(model.tables.kind, (STORING, REVERSIBLE))
 
 
 def _by_rows(a: csr_array) -> tuple[Index, Index, Array]:

@@ -164,6 +164,8 @@ class Solvers:
             raise self._singular(-1) from error
 
     def _dense(self, whole: Array) -> Solver:
+        if not whole.size:
+            return lambda right: right  # LAPACK takes no empty matrix
         factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
         factors, pivots, info = factorise(whole, overwrite_a=True)
         if info > 0 or not np.isfinite(factors).all():
