@@ -49,9 +49,10 @@ def costs(freedoms: int, stages: int) -> tuple[int, int]:
 
 
 def scheme_of(equations: Equations, control: Control) -> Collocation:
-    """The stages of radau on a mechanism: by the tolerance, and fewer of them where surfaces may touch."""
+    """The stages of radau on a mechanism: by the tolerance, fewer where surfaces may touch or loops lose rank."""
     kinked = bool(equations.reduced.tables.support.any())
-    return radau_for(control.rtol.value if control.step is None else None, kinked=kinked)
+    rtol = control.rtol.value if control.step is None else None
+    return radau_for(rtol, kinked=kinked, looped=equations.engine.looped)
 
 
 @final

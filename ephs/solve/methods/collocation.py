@@ -19,6 +19,9 @@ COARSE, FINE = 3e-3, 3e-7
 """Relative tolerances above the first are for order 5, those below the second for order 13, the others for order 9.
 
 Where forces have kinks, as between surfaces, an order is as good as the next one down to a tolerance that is finer."""
+ROUNDED = 3e-9
+"""Relative tolerance below which constraints that may lose rank are for order 5: near there, rounding is more than what
+stages of a higher order may be off by."""
 
 
 def moments(nodes: Array, theta: "Array | float") -> Array:
@@ -96,11 +99,11 @@ def radau(stages: int) -> Collocation:
     )  # fmt: skip
 
 
-def radau_for(rtol: float | None, *, kinked: bool = False) -> Collocation:
+def radau_for(rtol: float | None, *, kinked: bool = False, looped: bool = False) -> Collocation:
     """Radau IIA for steps that are chosen by a relative tolerance; None: for constant steps.
 
-    ``kinked``: whether forces have kinks.
+    ``kinked``: whether forces have kinks; ``looped``: whether there are constraints that may lose rank.
     """
-    if rtol is None or rtol > (FINE if kinked else COARSE):
+    if rtol is None or rtol > (FINE if kinked else COARSE) or (looped and rtol < ROUNDED):
         return radau(3)
     return radau(5 if kinked or rtol >= FINE else 7)

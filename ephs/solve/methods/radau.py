@@ -31,7 +31,7 @@ from ephs.solve.stepping import Attempt, Instants, Row, Span
 
 PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""
-ENOUGH, ROUGH = 1e-3, 1e-1
+ENOUGH, ROUGH = 1e-5, 1e-1
 """Parts of what is allowed to which stages are solved, and that are good enough where the iteration gets no further."""
 ROUNDING = 10.0 * np.finfo(float).eps
 """Part of the terms of an equation by which rounding changes their sum."""
