@@ -117,7 +117,7 @@ def test_a_run_that_goes_from_method_to_method_goes_on_too(copies, tmp_path):
     whole = simulate(model, options)
     assert {"semi", "radau"} <= {switch["to"] for switch in whole.stats["switches"]}
     assert same(simulate(model, options, journal=tmp_path / "run.journal"), whole)
-    for copy in copies[:: max(1, len(copies) // 12)]:
+    for copy in copies[:: max(1, len(copies) // 6)]:
         again = simulate(model, options, journal=copy)
         assert same(again, whole) and counts(again) == counts(whole)
 

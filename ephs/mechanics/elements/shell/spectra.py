@@ -11,6 +11,7 @@ from ephs.mechanics.elements.shell.mesh import Truths
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.statics import Reduced, displacements, factors, negative
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 
 SHIFT: Final = 1e-9
 """Distance below 0, in parts of the largest frequency's square, from which eigenvalues are looked for."""
@@ -60,7 +61,7 @@ def modes(shell: Shell, free: Truths, count: int, poses: Array | None = None) ->
 
     def lowest(k: int) -> tuple[Any, Any]:
         _, vectors = eigsh(scaled, k=k, sigma=shift, v0=_drawn(len(root)))
-        values, turn = np.linalg.eigh(vectors.T @ (scaled @ vectors))  # those of the inverse lose digits
+        values, turn = symmetric_eigen(vectors.T @ (scaled @ vectors))  # those of the inverse lose digits
         return values, vectors @ turn
 
     values, vectors = _complete(lowest, counted, count, len(root) - 1, SHIFT * size)
