@@ -63,26 +63,30 @@ class Auto(ReducedMethod):
         self._held = self._free = self._failures = 0
         self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.counts: dict[str, Any] = {"switches": []}
-        touches, rtol = _touches(equations), control.rtol.value
+        touches = _touches(equations)
         serves = touches and cheap(equations)
-        if serves and rtol > COARSE:
+        if serves and control.rtol.value > COARSE:
             self._take(SEMI)
-        elif touches and rtol > LOOSE:
-            self._take("radau")
+        elif touches:
+            self._compete(serves)
         else:
             self._take(name)
-            self._contest = self._begun(serves) if touches else None
         self.name = self.counts["chosen"] = self._active.name
 
-    def _begun(self, serves: bool) -> Contest:
-        """A contest of the explicit method, semi-implicit steps, where these serve, and radau."""
+    def _compete(self, serves: bool) -> None:
+        """Begin a contest of the explicit method, semi-implicit steps, where these serve, and radau; or radau alone."""
+        if self.control.rtol.value > LOOSE:
+            self._take("radau")
+            return
+        self._take(self._explicit.name)
         stages, n = self._explicit.method.c.size, self.equations.n
         count = scheme_of(self.equations, self.control).nodes.size
         factors, solutions = costs(n, count)
         radau = ITERATIONS * (count + solutions) + factors + MATRICES
         self._names = [self._explicit.name, *([SEMI] if serves else []), "radau"]
         prices = [stages, *([LAGGED + 3] if serves else []), radau]
-        return Contest(prices, CHANGE / max(n, 1), TRIAL * stages if self._explicit.name == "rk54" else np.inf)
+        wakes = TRIAL * stages if self._explicit.name == "rk54" else np.inf
+        self._contest = Contest(prices, CHANGE / max(n, 1), wakes)
 
     def _take(self, name: str) -> None:
         """Let a method take the steps that follow."""
@@ -145,8 +149,7 @@ class Auto(ReducedMethod):
         if self._contest is not None and SEMI in self._names:
             self._contest.without(self._names.index(SEMI))
         elif self._active is self._semi:
-            self._take(self._explicit.name)
-            self._contest = self._begun(serves=False)
+            self._compete(serves=False)
             self.name = self.counts["chosen"] = self._active.name
 
     def _moved(self, t: float, h: float, reason: str) -> None:
