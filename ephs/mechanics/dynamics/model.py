@@ -45,7 +45,7 @@ class Dynamics:
     Attributes
     ----------
     problem
-        What it was made of.
+        The problem whose bodies and joints these are.
     state0
         The initial state, its loops closed.
     weights

@@ -1,7 +1,8 @@
 """Automatic choice of the method: one without damping until stability limits the steps, then radau.
 
-Where surfaces may touch, steps are semi-implicit at coarse tolerances, as losses alone limit explicit ones there; at
-others the methods compete, see `ephs.mechanics.methods.contest`: contacts are stiff for a while.
+Where surfaces may touch, the choice depends on the tolerance. Coarse tolerances have semi-implicit steps, since losses
+alone limit explicit steps there. At fine tolerances the methods compete (`ephs.mechanics.methods.contest`), since a
+contact is stiff only while it is closed.
 
 Stiffness is what Hairer and Wanner test in DOPRI5 and DOP853: the last two stages of a step show how fast its fastest
 mode is, and a step that this holds at the limit of stability again and again serves stability, not accuracy.

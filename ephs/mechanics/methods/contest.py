@@ -1,9 +1,10 @@
-"""Which of several methods takes the steps of a run: the one whose last steps cost least per second of motion.
+"""Contest of integration methods within one run: the method with the least cost per second of motion goes on.
 
-Costs are counted in evaluations of the rates, not timed, so that results do not depend on the machine. Methods differ
-by what holds their steps back, which changes as surfaces meet and part; which one pays is found by steps of each, which
-are steps of the run. The method of the run tells its rate window by window; another one is tried for a window where the
-rate has grown or where tries have cost little beside all else, and stays where it costs less.
+The cost is a number of evaluations of the rates, not a time, so that results do not depend on the machine. Stability
+limits an explicit method, losses do not limit a semi-implicit one, and the stiffest method has the dearest steps; the
+order changes as surfaces meet and part. So each method takes some steps of the run itself. The cost per second of the
+present method is measured in windows of 12 steps. Other methods are tried for a window when this cost has grown, or
+when earlier tries were a small part of the cost of the run; a cheaper method stays.
 """
 
 from collections.abc import Sequence

@@ -29,7 +29,7 @@ def grid(surface: Callable[[Any, Any], Any], elements: tuple[int, int]) -> tuple
         Function of two parameters between 0 and 1, called with arrays (m,), that gives three coordinates in m; its
         normal is that of ∂u × ∂v.
     elements
-        How many along each parameter; nodes are numbered along the second one first.
+        Number of elements along each parameter; consecutive nodes lie along the second parameter.
     """
     across, along = elements
     if min(elements) < 1:

@@ -44,7 +44,7 @@ def modes(shell: Shell, free: Truths, count: int, poses: Array | None = None) ->
     free
         (m, 6) which coordinates move.
     count
-        How many; multiple ones are complete, so that there may be more.
+        Number of frequencies; there are more where the last one is multiple, since all of its shapes are given.
     """
     reduced = Reduced.of(shell.tangent(shell.poses if poses is None else poses), free)
     root = 1.0 / np.sqrt(shell.inertia.ravel()[reduced.at])
@@ -56,7 +56,7 @@ def modes(shell: Shell, free: Truths, count: int, poses: Array | None = None) ->
     def counted(value: float) -> int:
         return negative(csc_array(scaled - value * ones))
 
-    while counted(shift):
+    while counted(shift):  # ends at the largest column sum, below which there is no eigenvalue (Gershgorin)
         shift *= 10.0
 
     def lowest(k: int) -> tuple[Any, Any]:

@@ -106,9 +106,14 @@ def factors(matrix: csc_array) -> Any:
 
 
 def negative(matrix: csc_array) -> int:
-    """How many negative eigenvalues a symmetric sparse matrix has: the signs of its pivots (Sylvester).
+    """Number of negative eigenvalues of a symmetric sparse matrix: that of its negative pivots (Sylvester's law).
 
-    Where a pivot on the diagonal is exactly zero, the matrix is shifted by what is rounding beside its largest entry.
+    If a pivot is exactly zero, a multiple of the unit matrix of the size of rounding is added.
+
+    Raises
+    ------
+    NoEquilibrium
+        The matrix is singular with each of these multiples.
     """
     symmetric: Any = csc_array(0.5 * (matrix + matrix.T))
     unit = eye_array(symmetric.shape[0], format="csc") * float(abs(symmetric).max())
