@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 import ephs
+from benchmarks.peers.measure import work_precision
 from benchmarks.report import Report, table_of
 from ephs.show.charts import draw_work_precision, tight_reference
-from ephs.show.charts.measure import Point, work_precision
+from ephs.show.charts.measure import Point
 from ephs.show.charts.reference import shipped_reference
 from ephs.show.charts.runs import RunEnding
 

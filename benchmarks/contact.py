@@ -23,11 +23,11 @@ import numpy as np
 
 import ephs
 from benchmarks import contact_drake
+from benchmarks.peers.mujoco import silent
 from benchmarks.report import Report, table_of
 from benchmarks.touching import SCENES
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.scene.parameters import varied
-from ephs.show.charts.peer_mujoco import silent
 
 MODELS = ("hopper", "half_cheetah", "ant", "walker2d", "humanoid")
 UNTIL = 0.5

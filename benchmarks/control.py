@@ -16,10 +16,10 @@ import numpy as np
 
 import ephs
 from benchmarks import families
+from benchmarks.peers.mujoco import mujoco_model
+from benchmarks.peers.scene import peer_scene
 from benchmarks.report import Report, table_of
 from ephs.mechanics.scene.model import Scene
-from ephs.show.charts.peer_mujoco import mujoco_model
-from ephs.show.charts.peer_scene import peer_scene
 
 __all__ = ["measure", "report"]
 

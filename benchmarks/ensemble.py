@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 import ephs
+from benchmarks.peers.mujoco import mujoco_model, silent
+from benchmarks.peers.scene import peer_scene
 from benchmarks.report import Report, table_of
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
-from ephs.show.charts.peer_mujoco import mujoco_model, silent
-from ephs.show.charts.peer_scene import peer_scene
 
 __all__ = ["report"]
 

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks import families
+from benchmarks.peers.mujoco import mujoco_model
+from benchmarks.peers.scene import peer_scene
 from benchmarks.report import Report, table_of
 from ephs.exporting.environment import Environment, Environments, Task
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
-from ephs.show.charts.peer_mujoco import mujoco_model
-from ephs.show.charts.peer_scene import peer_scene
 
 __all__ = ["measure", "report"]
 

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks import families
+from benchmarks.peers.mujoco import mujoco_model, silent
+from benchmarks.peers.pinocchio import PinModel
+from benchmarks.peers.scene import PeerError, peer_scene
 from benchmarks.report import Report, table_of
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import Equations
-from ephs.show.charts.peer_mujoco import mujoco_model, silent
-from ephs.show.charts.peer_pin import PinModel
-from ephs.show.charts.peer_scene import PeerError, peer_scene
 
 __all__ = ["ENGINES", "own", "report"]
 

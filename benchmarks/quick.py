@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import process
+from benchmarks.peers.scene import PeerError
 from benchmarks.quick_cases import CASES, OTHERS, Work
 from benchmarks.verdict import EVERYTHING, Timing, Verdict, compare, in_both, timing
-from ephs.show.charts.peer_scene import PeerError
 
 __all__ = ["main", "measure"]
 

@@ -16,8 +16,9 @@ from typing import Any, final
 import numpy as np
 
 from benchmarks import families
+from benchmarks.peers.measure import work_precision
 from benchmarks.report import Report, table_of
-from ephs.show.charts.measure import Point, work_precision
+from ephs.show.charts.measure import Point
 from ephs.show.charts.reference import shipped_reference
 from ephs.show.charts.runs import RunEnding
 

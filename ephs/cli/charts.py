@@ -41,7 +41,7 @@ def work_precision(
     method: list[str] | None = None,
     reference: Path | None = None,
 ) -> int:
-    """Draw error against wall time and against evaluations, for every method and for other programs.
+    """Draw error against wall time and against evaluations, for every method.
 
     Parameters
     ----------
@@ -52,16 +52,15 @@ def work_precision(
     until
         End of the simulated time in seconds. Default: 1 s, or the reference's earliest time.
     method
-        Method or program to measure; may be given several times. Default: all.
+        Method to measure; may be given several times. Default: all.
     reference
         JSON with the bodies' states at some times. Default: a run with tight tolerances.
     """
     if not scenes:
         raise BadInput(_TEXTS["none"])
     from ephs.mechanics.methods.registry import METHODS
-    from ephs.show.charts.peers import PEERS
 
-    known = [name for name, entry in METHODS.items() if entry.scenes] + list(PEERS)
+    known = [name for name, entry in METHODS.items() if entry.scenes]
     for name in method or []:
         if name not in known:
             raise BadInput(_TEXTS["method"].format(found=name, expected=", ".join(known)))

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import textwrap
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -15,7 +16,6 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts.families import Family
 from ephs.show.charts.measure import Point
 from ephs.show.charts.outcomes import SILENT, Outcome
-from ephs.show.charts.peers import PEERS
 from ephs.show.charts.reasons import Key, Reason, letter_of, reasons, reasons_table
 from ephs.show.charts.runs import RunEnding, RunSetting
 from ephs.show.charts.stability import Cell
@@ -244,8 +244,8 @@ def _look(method: str) -> tuple[str, str]:
     if method in METHODS:
         at = list(METHODS).index(method)
         return _COLOURS[at % len(_COLOURS)], _MARKERS[(at + at // len(_COLOURS)) % len(_MARKERS)]
-    at = list(PEERS).index(method) if method in PEERS else 0
-    return _PEER_COLOURS[at % len(_PEER_COLOURS)], _PEER_MARKERS[at % len(_PEER_MARKERS)]
+    at = zlib.crc32(method.encode())  # another program's, whose names this room does not know
+    return _PEER_COLOURS[at % len(_PEER_COLOURS)], _PEER_MARKERS[at // len(_PEER_COLOURS) % len(_PEER_MARKERS)]
 
 
 def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: str) -> None:
@@ -291,7 +291,7 @@ def _defects(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) ->
 
 
 def _both(method: str) -> bool:
-    found = METHODS.get(method) or PEERS.get(method)
+    found = METHODS.get(method)
     return found is not None and found.adaptive and found.fixed
 
 

@@ -2,21 +2,29 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Protocol, final
 
 import numpy as np
 
 from ephs.mechanics.methods.registry import AUTO, METHODS
 from ephs.mechanics.scene.model import Scene
-from ephs.show.charts.peers import PEERS, PeerError, PeerRun
 from ephs.show.charts.reference import PosesInTime, Reference, tight_reference
-from ephs.show.charts.runs import Array, RunEnding, RunSetting, attempt
+from ephs.show.charts.runs import RunEnding, RunSetting, attempt
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 STEPS = tuple(20 * 2**k for k in range(11))
 """Into how many steps the time is divided."""
 FLOOR = 100.0
 """Errors below this many cross-checks of the reference are not resolved."""
+
+
+class Measurable(Protocol):
+    """A method of this package or of another program: whether it chooses its steps, and takes constant ones."""
+
+    @property
+    def adaptive(self) -> bool: ...
+    @property
+    def fixed(self) -> bool: ...
 
 
 @final
@@ -27,7 +35,7 @@ class Point:
     Parameters
     ----------
     method
-        Its name; a peer's starts with that of its program.
+        Its name; that of another program's method starts with the program's.
     setting
         Tolerance or step.
     error
@@ -74,7 +82,6 @@ def work_precision(
     limit: float = 20.0,
     tolerances: Sequence[float] = TOLERANCES,
     steps: Sequence[int] = STEPS,
-    peers: bool = True,
     note: Callable[[str], None] | None = None,
     enough: Callable[[Point], bool] | None = None,
 ) -> list[Point]:
@@ -83,41 +90,38 @@ def work_precision(
     Parameters
     ----------
     methods
-        Names of `METHODS` or of `PEERS`, or ``"auto"``; all but that unless given. Methods that can do both run over
-        tolerances and over steps.
+        Names of `METHODS`, or ``"auto"``; all but that unless given. Methods that can do both run over tolerances and
+        over steps.
     reference
         What is true at ``until``; a tight run unless given.
     repeats
         Runs of which the median time is taken.
     limit
         Wall time in s for a method: one whose run took a quarter of it is not refined further.
-    peers
-        Whether other programs that are installed are measured too, where they can do the scene.
     note
         Called with the name of each method before it is measured.
     enough
         Called with each point: whether the method need not be refined further.
     """
     truth = tight_reference(scene, until) if reference is None else reference
-    everything = [*(name for name, method in METHODS.items() if method.scenes), *(PEERS if peers else ())]
+    everything = [name for name, method in METHODS.items() if method.scenes]
     points: list[Point] = []
     for name in everything if methods is None else methods:
         if note is not None:
             note(name)
-        for settings in _settings(name, until, tolerances, steps):
-            if name in PEERS:
-                found = _foreign(scene, until, name, settings, truth, repeats, limit, told=methods is not None)
-            else:
-                found = _own(scene, until, name, settings, truth, repeats, limit)
-            for point in found:
+        method = AUTO if name == "auto" else METHODS[name]
+        for settings in settings_over(method, until, tolerances, steps):
+            for point in _refined(scene, until, name, settings, truth, repeats, limit):
                 points.append(point)
                 if enough is not None and enough(point):
                     break
     return points
 
 
-def _settings(name: str, until: float, tolerances: Sequence[float], steps: Sequence[int]) -> list[list[RunSetting]]:
-    method = AUTO if name == "auto" else METHODS.get(name) or PEERS[name]
+def settings_over(
+    method: Measurable, until: float, tolerances: Sequence[float], steps: Sequence[int]
+) -> list[list[RunSetting]]:
+    """Settings of a method from coarse to fine: a list over tolerances, a list over steps, as far as it has them."""
     found: list[list[RunSetting]] = []
     if method.adaptive:
         found.append([RunSetting("tolerance", value) for value in tolerances])
@@ -126,7 +130,7 @@ def _settings(name: str, until: float, tolerances: Sequence[float], steps: Seque
     return found
 
 
-def _own(
+def _refined(
     scene: Scene, until: float, name: str, settings: list[RunSetting], truth: Reference, repeats: int, limit: float
 ) -> Iterator[Point]:
     both = np.array([0.0, until])
@@ -143,68 +147,25 @@ def _own(
                 return
         rest = [
             attempt(scene, until, name, setting, limit=limit, save_at=both)
-            for _ in range(_more(repeats, first.wall, limit))
+            for _ in range(repeats_after(repeats, first.wall, limit))
         ]
         runs = [run.solution.stats["integrate_s"] for run in [*rest, first] if run.solution is not None]
         stats, error = first.solution.stats, float(PosesInTime.of(first.solution).off(truth.motion)[-1])
         count = int(stats.get("evaluations", stats.get("iterations", 0)))
         defect = float(first.solution.energy_error[-1])
-        point = _point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)
+        point = measured_point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)
         audit = first.solution.audit
         yield point if audit.passed else replace(point, flagged=str(audit))
         if first.wall > limit / 4.0:
             return
 
 
-def _foreign(
-    scene: Scene,
-    until: float,
-    name: str,
-    settings: list[RunSetting],
-    truth: Reference,
-    repeats: int,
-    limit: float,
-    *,
-    told: bool,
-) -> Iterator[Point]:
-    try:
-        run = PEERS[name].prepare(scene, until)
-    except PeerError as error:  # of all programs those that can are shown; of the one that was asked for, why not
-        if told:
-            yield Point(name, settings[0], np.nan, np.nan, 0, 0, RunEnding.REFUSED, str(error))
-        return
-    for setting in settings:
-        try:
-            first: PeerRun = run(setting, limit)
-            rest = [run(setting, limit) for _ in range(_more(repeats, first.seconds, limit))]
-        except PeerError as error:
-            yield Point(name, setting, np.nan, np.nan, 0, 0, error.ending, str(error))
-            if error.ending is not RunEnding.FAILED:
-                return
-            continue
-        seconds = float(np.median([each.seconds for each in [*rest, first]]))
-        still: Array = np.zeros(1)
-        end = PosesInTime(truth.motion.t[-1:], first.position[None], first.rotation[None], still, np.zeros((1, 2)), 0.0)
-        error = float(end.off(_end(truth.motion))[0])
-        yield _point(name, setting, error, seconds, first.evaluations, first.steps, first.defect, truth)
-        if first.seconds > limit / 4.0:
-            return
-
-
-def _end(motion: PosesInTime) -> PosesInTime:
-    last = slice(-1, None)
-    t, position, rotation, balance, totals = (
-        each[last] for each in (motion.t, motion.position, motion.rotation, motion.balance, motion.totals)
-    )
-    return PosesInTime(t, position, rotation, balance, totals, motion.turnover, motion.size)
-
-
-def _more(repeats: int, wall: float, limit: float) -> int:
-    """Number of further runs: none if the first took most of the available time."""
+def repeats_after(repeats: int, wall: float, limit: float) -> int:
+    """Number of further runs: none if the first took a quarter of the time of its method."""
     return 0 if wall > limit / 4.0 else repeats - 1
 
 
-def _point(
+def measured_point(
     name: str,
     setting: RunSetting,
     error: float,
@@ -214,6 +175,7 @@ def _point(
     defect: float,
     truth: Reference,
 ) -> Point:
+    """The point of a finished run; a failure if its error is not finite."""
     floor = error < FLOOR * truth.cross_check
     if not np.isfinite(error):
         return Point(name, setting, np.nan, seconds, evaluations, steps, RunEnding.FAILED, "the result is not finite")

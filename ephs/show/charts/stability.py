@@ -12,7 +12,6 @@ from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import CONDITION, SILENT, Outcome, horizon, judge, right
 from ephs.show.charts.reference import PosesInTime, Reference, condition, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, ChartRun, RunEnding, RunSetting, attempt
-from ephs.show.charts.specimens import SPECIMENS
 from ephs.show.errors import ShowError
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ def stability(
     Parameters
     ----------
     methods
-        Names of `METHODS` and `SPECIMENS`; all for scenes unless given.
+        Names of `METHODS`; all for scenes unless given.
     quick
         Only the easiest and the most difficult value, and the largest step.
     limit
@@ -97,8 +96,7 @@ def stability(
     kept
         Cells that are known, to which new ones are added.
     """
-    everything = {**METHODS, **SPECIMENS}
-    chosen = [m for m in everything.values() if m.scenes and (methods is None or m.name in methods)]
+    chosen = [m for m in METHODS.values() if m.scenes and (methods is None or m.name in methods)]
     values = (family.values[0], family.values[-1]) if quick else family.values
     cells: list[Cell] = []
     for value in values:

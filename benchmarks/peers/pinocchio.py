@@ -7,10 +7,10 @@ from typing import Any, final
 
 import numpy as np
 
+from benchmarks.peers.scene import Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.show.charts.peer_scene import Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, RunEnding, RunSetting
 
 SOLVED = 1e-13

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
-from ephs.show.charts.peer_scene import Branch, Energies, Go, PeerError, PeerRun, PeerScene, peer_scene, start
 from ephs.show.charts.runs import Array, RunEnding, RunSetting
 
 REACHED = 1e-6

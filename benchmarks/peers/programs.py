@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import final
 
+from benchmarks.peers import mujoco, pinocchio
+from benchmarks.peers.scene import Go, PeerError
 from ephs.mechanics.scene.model import Scene
-from ephs.show.charts import peer_mujoco, peer_pin
-from ephs.show.charts.peer_scene import Go, PeerError, PeerRun
 
-__all__ = ["PEERS", "Peer", "PeerError", "PeerRun"]
+__all__ = ["PEERS", "Peer"]
 
 
 @final
@@ -41,12 +41,12 @@ class Peer:
 PEERS = {
     peer.name: peer
     for peer in (
-        Peer("pin DOP853", True, False, "pinocchio", peer_pin.integrator("DOP853")),
-        Peer("pin LSODA", True, False, "pinocchio", peer_pin.integrator("LSODA")),
-        Peer("pin Radau", True, False, "pinocchio", peer_pin.integrator("Radau")),
-        Peer("pin soft DOP853", True, False, "pinocchio", peer_pin.integrator("DOP853", proximal=peer_pin.SOFT)),
-        Peer("mujoco RK4", False, True, "mujoco", peer_mujoco.integrator("RK4")),
-        Peer("mujoco Euler", False, True, "mujoco", peer_mujoco.integrator("Euler")),
-        Peer("mujoco implicitfast", False, True, "mujoco", peer_mujoco.integrator("implicitfast")),
+        Peer("pin DOP853", True, False, "pinocchio", pinocchio.integrator("DOP853")),
+        Peer("pin LSODA", True, False, "pinocchio", pinocchio.integrator("LSODA")),
+        Peer("pin Radau", True, False, "pinocchio", pinocchio.integrator("Radau")),
+        Peer("pin soft DOP853", True, False, "pinocchio", pinocchio.integrator("DOP853", proximal=pinocchio.SOFT)),
+        Peer("mujoco RK4", False, True, "mujoco", mujoco.integrator("RK4")),
+        Peer("mujoco Euler", False, True, "mujoco", mujoco.integrator("Euler")),
+        Peer("mujoco implicitfast", False, True, "mujoco", mujoco.integrator("implicitfast")),
     )
 }
