@@ -32,7 +32,6 @@ VERSIONS = {
 DATA = (
     "ephs/py.typed",
     "ephs/operad/pattern.schema.json",
-    "ephs/operad/rewriting/derivation.schema.json",
     "ephs/semantics/system.schema.json",
     "ephs/mechanics/references.bib",
     *(f"ephs/show/assets/{file.name}" for file in sorted((ROOT / "ephs/show/assets").iterdir())),

@@ -15,7 +15,6 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
     tuple(frozenset(f"ephs{room}" for room in rooms) for rooms in storey)
     for storey in (
         ([".operad"],),
-        ([".operad.rewriting"],),
         ([".semantics.stage"],),
         ([".semantics.spaces", ".semantics.linear"],),
         ([".semantics.derive"],),

@@ -60,7 +60,7 @@ DERIVATIVES = (
 
 GROUPS = {
     "operad": Group(
-        ("ephs/operad/*.py", "ephs/operad/rewriting/*.py"),
+        ("ephs/operad/*.py", "examples/rewriting/*.py"),
         ("tests/operad", "tests/semantics/test_stacked.py"),
     ),
     "spaces": Group(

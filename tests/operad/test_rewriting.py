@@ -13,14 +13,14 @@ from ephs.operad import Path, Pattern, PatternError, Renaming, junction, quantit
 from ephs.operad.canonical import canonical
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
 from ephs.operad.parts import Junction, Port
-from ephs.operad.rewriting import Derivation, Fragment, Rule
-from ephs.operad.rewriting.derivation import SCHEMA_FILE
 from ephs.testing import fresh_names, patterns
+from examples.rewriting import Derivation, Fragment, Rule
+from examples.rewriting.derivation import SCHEMA_FILE
 
 Q = quantity.displacement
 GLUING = {"identification", "dangling", "bare", "match", "link-quantity"}
 PATTERN = Resource.from_contents(json.loads(PATTERN_SCHEMA.read_text(encoding="utf-8")))
-REGISTRY = Registry().with_resource("../pattern.schema.json", PATTERN)
+REGISTRY = Registry().with_resource("../../ephs/operad/pattern.schema.json", PATTERN)
 VALID = jsonschema.Draft202012Validator(json.loads(SCHEMA_FILE.read_text(encoding="utf-8")), registry=REGISTRY)
 
 

@@ -10,9 +10,9 @@ from ephs.operad.isomorphism import Renaming
 from ephs.operad.names import Path
 from ephs.operad.parts import Port
 from ephs.operad.pattern import Pattern
-from ephs.operad.rewriting.elements import Elements
-from ephs.operad.rewriting.gluing import require_gluing
-from ephs.operad.rewriting.rules import Rule
+from examples.rewriting.elements import Elements
+from examples.rewriting.gluing import require_gluing
+from examples.rewriting.rules import Rule
 
 
 def matches(rule: Rule, pattern: Pattern, *, injective: bool = True) -> Iterator[Renaming]:

@@ -5,8 +5,8 @@ from typing import NoReturn
 from ephs.operad.errors import PatternError
 from ephs.operad.isomorphism import Renaming
 from ephs.operad.names import Path
-from ephs.operad.rewriting.elements import Elements
-from ephs.operad.rewriting.rules import Rule
+from examples.rewriting.elements import Elements
+from examples.rewriting.rules import Rule
 
 
 def require_morphism(rule: Rule, match: Renaming, host: Elements) -> None:

@@ -13,7 +13,7 @@ from ephs.operad.isomorphism import Renaming
 from ephs.operad.names import Path
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Quantity
-from ephs.operad.rewriting.rules import Fragment, Rule
+from examples.rewriting.rules import Fragment, Rule
 
 Item = tuple[str, Any, Any]
 """Owner of a state: a junction, an outer state port, a state port of a box."""

@@ -17,7 +17,7 @@ from ephs.operad.text import statements
 from ephs.operad.wellformed import read_boxes, read_junctions, read_links, require_one_quantity
 
 if TYPE_CHECKING:
-    from ephs.operad.rewriting.derivation import Derivation
+    from examples.rewriting.derivation import Derivation
 
 
 @final
@@ -172,7 +172,7 @@ class Rule:
             Names of the left side -> names in the pattern. A junction that stands for a state only is named like the
             least junction of that state in the canonical pattern.
         """
-        from ephs.operad.rewriting.matching import matches
+        from examples.rewriting.matching import matches
 
         return matches(self, pattern, injective=injective)
 
@@ -190,7 +190,7 @@ class Rule:
             The match is none, fails the gluing condition, or would leave a junction or a state that is kept without a
             port.
         """
-        from ephs.operad.rewriting.derivation import apply
+        from examples.rewriting.derivation import apply
 
         return apply(self, pattern, match)
 

@@ -13,9 +13,9 @@ from ephs.operad.isomorphism import Renaming
 from ephs.operad.names import Path
 from ephs.operad.pattern import Pattern
 from ephs.operad.reading import Reader
-from ephs.operad.rewriting.elements import Elements, Place, State
-from ephs.operad.rewriting.gluing import require_gluing, require_morphism
-from ephs.operad.rewriting.rules import Rule, rule_from
+from examples.rewriting.elements import Elements, Place, State
+from examples.rewriting.gluing import require_gluing, require_morphism
+from examples.rewriting.rules import Rule, rule_from
 
 FORMAT = 1
 SCHEMA_FILE = FilePath(__file__).with_name("derivation.schema.json")
@@ -51,7 +51,7 @@ class Derivation:
         PatternError
             It is no double pushout; the message says what is not.
         """
-        from ephs.operad.rewriting.replay import replay
+        from examples.rewriting.replay import replay
 
         replay(self.rule, self.source, self.target, self.match, self.comatch)
 
@@ -83,7 +83,7 @@ class Derivation:
         return Derivation(rule_from(_READ, "rule", found["rule"]), source, target, match, comatch)
 
     def to_json(self) -> str:
-        """The document as JSON text, by the schema ``ephs/operad/rewriting/derivation.schema.json``."""
+        """The document as JSON text, by the schema ``examples/rewriting/derivation.schema.json``."""
         return json.dumps(self.to_dict(), ensure_ascii=False, indent=1, allow_nan=False) + "\n"
 
     @staticmethod

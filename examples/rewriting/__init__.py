@@ -1,6 +1,6 @@
 """Rewriting of patterns as data: rules, matches up to renaming, derivations that can be checked."""
 
-from ephs.operad.rewriting.derivation import Derivation
-from ephs.operad.rewriting.rules import Fragment, Rule
+from examples.rewriting.derivation import Derivation
+from examples.rewriting.rules import Fragment, Rule
 
 __all__ = ["Derivation", "Fragment", "Rule"]
