@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import networkx as nx
 import pygraphviz
 
-from tests.rooms import DOORS, PLACE, SOURCES, STOREYS, Import, house, module_name, room_of
+from tests.rooms import DOORS, PLACE, ROOT, SOURCES, STOREYS, Import, house, module_name, room_of, size_of
 
 STYLES = {
     "down": {"color": "#55606b"},
@@ -69,3 +69,17 @@ def doors() -> str:
     """The ways up, as a Markdown table."""
     rows = (f"| `{module}` | `{room}` | {why} |\n" for (module, room), why in DOORS.items())
     return "| module | imports | why |\n| --- | --- | --- |\n" + "".join(rows)
+
+
+def readings(files: dict[str, tuple[str, ...]]) -> str:
+    """Readings with their files, what these are by their first line, and their tokens, as a table."""
+    rows, whole = ["| reading | files | tokens |", "| --- | --- | ---: |"], 0
+    for reading, names in files.items():
+        texts = [(ROOT / f"ephs/{name}.py").read_text(encoding="utf-8") for name in names]
+        said = [
+            f"`{name}.py`: {(ast.get_docstring(ast.parse(text)) or '').splitlines()[0]}"
+            for name, text in zip(names, texts, strict=True)
+        ]
+        whole += (tokens := sum(map(size_of, texts)))
+        rows.append(f"| {reading} | {'<br>'.join(said)} | {tokens} |")
+    return "\n".join([*rows, f"| | | {whole} |"])
