@@ -12,6 +12,7 @@ from ephs.solve.result.temperatures import heated
 
 MOVES = 1e-9
 """Least relative change of a drawn value."""
+ANGLE = "joint angle [rad]"
 
 
 def thinned(t: Array, values: Array, most: int = 2000) -> tuple[Array, Array]:
@@ -71,17 +72,35 @@ def freedom_lines(
             yield name if len(labels.names) == 1 else f"{name} {freedom}", labels.units[k], values[:, k]
 
 
+def within_a_turn(angles: Array) -> Array:
+    """Angles (n,) in rad, moved by whole turns to between −π and π; NaN where the line would jump."""
+    turns = np.round(angles / (2.0 * np.pi))
+    out = angles - 2.0 * np.pi * turns
+    out[1:][np.diff(turns) != 0.0] = np.nan
+    return out
+
+
+def _turns(lines: list[tuple[str, Array]]) -> bool:
+    """Whether an angle goes round more than once, so that its line would flatten the others."""
+    return any(float(np.nanmax(np.abs(values), initial=0.0)) > 2.0 * np.pi for _, values in lines)
+
+
 def motion_lines(sol: Any) -> dict[str, list[tuple[str, Array]]]:
-    """Joint angles and distances, positions of bodies and temperatures, one panel for each unit and direction."""
+    """Joint angles and distances, positions of bodies and temperatures, one panel for each unit and direction.
+
+    Where an angle goes round more than once, all angles are drawn between −π and π.
+    """
     bodies = () if sol.outline is None else sol.outline.all_bodies()
     panels: dict[str, list[tuple[str, Array]]] = {}
     places: Callable[[str], Any] = lambda joint: sol.joint(joint).coordinate  # noqa: E731 - it is read twice
     for name, unit, column in freedom_lines(sol.freedoms, places, places):
-        panel = "joint distance [m]" if unit == "m" else "joint angle [rad]"
+        panel = "joint distance [m]" if unit == "m" else ANGLE
         panels.setdefault(panel, []).append((name, column))
     for name, _ in bodies:
         for axis, column in zip("xyz", np.asarray(sol.body(name).position, dtype=float).T, strict=True):
             panels.setdefault(f"position {axis} [m]", []).append((name, column))
+    if angles := panels.get(ANGLE):
+        panels[ANGLE] = [(name, within_a_turn(column)) for name, column in angles] if _turns(angles) else angles
     if warm := temperatures(sol):
         panels["temperature [K]"] = list(warm.items())
     # Constant directions are omitted.

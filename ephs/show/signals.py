@@ -77,13 +77,14 @@ def _panel(t: Array, panel: Panel, *, shown: bool) -> dict[str, Any]:
 
 
 def _kept(columns: list[Array], length: int) -> Any:
-    """Instants of a panel: evenly spaced ones, and extremes of each curve between them."""
+    """Instants of a panel: evenly spaced ones, extremes of each curve between them, and gaps of lines."""
     if length <= MOST:
         return slice(None)
     edges = np.linspace(0, length, MOST // 2 + 1).astype(int)[:-1]
     found = [edges, np.array([length - 1])]
     stretches = np.linspace(0, length, max(2, MOST // (2 * len(columns)))).astype(int)[:-1]
     for values in columns:
+        found.append(np.flatnonzero(np.isnan(values)))
         safe = np.nan_to_num(values)
         found += [np.array(_places(safe, stretches, reduce)) for reduce in (np.argmin, np.argmax)]
     return np.unique(np.concatenate(found))

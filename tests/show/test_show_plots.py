@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ephs
 from ephs.show import (
     plot_constraints,
     plot_energy,
@@ -20,9 +22,10 @@ from ephs.show import (
     write_report,
 )
 from ephs.show.panels import Curve, Panel
-from ephs.show.series import thinned
+from ephs.show.series import ANGLE, motion_lines, thinned, within_a_turn
 from ephs.show.signals import MOST, PanelGroup, packed
 
+ROOT = Path(__file__).resolve().parents[2]
 PLOTS = (plot_motion, plot_energy, plot_exergy, plot_entropy, plot_constraints)
 
 
@@ -111,6 +114,29 @@ def test_packed_signals_are_the_solution(length, seed, shorter, count):
         at = np.searchsorted(t[len(t) - n :], times)
         assert np.array_equal(values, curve.values[at].astype("f4")) and found["name"] == curve.name
         assert values.max() == np.float32(curve.values.max()) and values.min() == np.float32(curve.values.min())
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 40.0))
+def test_angles_within_a_turn_differ_by_whole_turns_and_lines_end_where_they_jump(seed, speed):
+    angles = np.cumsum(np.random.default_rng(seed).uniform(-1.0, 1.0, 200)) + np.linspace(0.0, speed, 200)
+    found = within_a_turn(angles)
+    there = ~np.isnan(found)
+    turns = (angles - found)[there] / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-12)
+    assert there[0] and np.abs(found[there]).max() <= np.pi + 1e-12
+    whole = there[1:] & there[:-1]
+    np.testing.assert_allclose(np.diff(found)[whole], np.diff(angles)[whole], atol=1e-12)
+    jumps = np.diff(np.round(angles / (2.0 * np.pi))) != 0.0
+    assert np.array_equal(~there[1:], jumps)
+
+
+@pytest.mark.parametrize(("until", "round"), [(5.0, True), (0.2, False)])
+def test_only_angles_that_go_round_are_drawn_within_a_turn(until, round):
+    sol = ephs.simulate(ephs.load(ROOT / "scenes/slider-crank.toml"), until)
+    angles = dict(motion_lines(sol)[ANGLE])
+    whole = sol.joint("bearing").coordinate[:, 0]
+    assert (np.abs(whole).max() > 2.0 * np.pi) == round
+    np.testing.assert_array_equal(angles["bearing"], within_a_turn(whole) if round else whole)
 
 
 def test_residuals_of_rounding_are_not_drawn():
