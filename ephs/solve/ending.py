@@ -3,6 +3,7 @@
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -106,7 +107,7 @@ def audited(
     ends: list[Record],
     trials: Callable[[Solution], Tests | None],
 ) -> Solution:
-    """Kept part of a run, with the audit from its start to the present time.
+    """Kept part of a run, with the audit from its start to the present time, which is made when it is asked for.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def audited(
     first, last = ends
     if not (len(solution) and record.t[0] == first.t[0] and record.t[-1] == last.t[0]):
         whole = solution_of(problem, joined([first, record, last]) or record, stats)
-    solution.stats = {**solution.stats, "audit": audit(whole, bounds, trials(whole)).record()}
+    solution.audited = cache(lambda: audit(whole, bounds, trials(whole)))
     return solution
 
 

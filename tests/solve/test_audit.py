@@ -12,6 +12,7 @@ import ephs
 from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.state import Snapshot
+from ephs.solve import ending
 from ephs.solve.auditing import audit as auditing
 from ephs.solve.auditing import rounding
 from ephs.solve.auditing.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
@@ -154,6 +155,24 @@ def test_a_run_beyond_stability_does_not_end_well():
     assert warned.audit == kept.audit == error.partial.audit
     assert fine.audit.passed
     assert fine.summary()["audit"] == {"passed": True, "findings": []}
+
+
+@pytest.mark.parametrize("policy", ["fail", "off"])
+def test_an_audit_that_is_off_is_made_once_it_is_asked_for(policy, monkeypatch):
+    made = []
+    monkeypatch.setattr(ending, "audit", lambda *given: made.append(1) or audit(*given))
+    sol = ephs.simulate(brake(), 0.2, step=0.01, method="rk54", audit=policy)
+    assert len(made) == (policy == "fail")
+    later = sol[1:]
+    assert sol.audit == later.audit and sol.audit.passed
+    assert len(made) == 1
+
+
+def test_an_audit_that_is_off_is_in_the_file(tmp_path):
+    run = ephs.simulate(brake(), 2.0, method="rk54", step=0.1, audit="off")
+    run.save(tmp_path / "run.nc")
+    found = ephs.load_solution(tmp_path / "run.nc").audit
+    assert not found.passed and found == run.audit
 
 
 @pytest.mark.parametrize("times", [[2.0], [1.9, 2.0], [0.0, 2.0], []])

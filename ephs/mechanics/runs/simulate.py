@@ -139,7 +139,7 @@ def simulate(
         File that records the run; after an interruption the same call resumes it, to the same numbers.
     audit
         Treatment of findings of the run's audit: ``"fail"`` raises an `AuditError`, ``"warn"`` gives an
-        `AuditWarning`, ``"off"`` only records them in ``sol.audit`` and the summary.
+        `AuditWarning`, ``"off"`` only makes them when ``sol.audit`` or the summary is asked for.
 
     Raises
     ------

@@ -110,8 +110,7 @@ def judged(solution: "Solution", policy: str) -> "Solution":
     AuditError
         It breaks a law, and the policy is ``"fail"``.
     """
-    found = solution.audit
-    if found.passed or policy == "off":
+    if policy == "off" or (found := solution.audit).passed:
         return solution
     if policy == "fail":
         raise AuditError(found, solution)

@@ -106,7 +106,7 @@ def content(solution: "Solution", *, wrenches: bool = True) -> Content:
         "ephs_format": FORMAT,
         "name": solution.name,
         "reference_temperature": solution.ledgers.temperature,
-        "stats": json.dumps(dict(solution.stats)),
+        "stats": json.dumps({**solution.stats, "audit": solution.audit.record()}),
         "model": solution.problem.document() if solution.problem is not None else "",
     }
     return Content(solution.t, variables, attributes)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
+from ephs.solve.auditing.findings import Audit
 from ephs.solve.problem import Problem
 from ephs.solve.result.dataset import FORMAT, TIME, Content, Variable, content
 from ephs.solve.result.durable import durable
@@ -103,7 +104,10 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         first = Solution(attributes["name"], t, known, books, {}, problem, labels, inputs).state_at(0)
         problem = replace(problem, initial=first)
     stats = _stats(json.loads(attributes["stats"]), problem)
-    return Solution(attributes["name"], t, known, books, stats, problem, labels, inputs)
+    found = Audit.of_record(stats.pop("audit", Audit().record()))
+    solution = Solution(attributes["name"], t, known, books, stats, problem, labels, inputs)
+    solution.audited = lambda: found
+    return solution
 
 
 @final

@@ -1,6 +1,6 @@
 """Solutions: the motion of a system with its ledgers."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from functools import cached_property
@@ -52,6 +52,11 @@ class Solution:
         Names and units of the components of each state.
     inputs
         Prescribed values at outer ports, for solutions from files; None if the problem has them.
+
+    Attributes
+    ----------
+    audited
+        Makes or reads the audit of the run; None without one.
     """
 
     def __init__(
@@ -67,6 +72,7 @@ class Solution:
     ) -> None:
         self.name, self.t, self.states, self.ledgers = name, t, states, ledgers
         self.stats, self.problem, self.labels, self._inputs = stats, problem, labels, inputs
+        self.audited: Callable[[], Audit] | None = None
 
     @overload
     def __getitem__(self, path: str | Path) -> Array: ...
@@ -99,7 +105,9 @@ class Solution:
         inputs = {path: replace(given, values=given.values[where]) for path, given in self.inputs.items()}
         states = {path: values[where] for path, values in self.states.items()}
         ledgers = replace(self.ledgers, **totals)
-        return Solution(self.name, self.t[where], states, ledgers, self.stats, self.problem, self.labels, inputs)
+        part = Solution(self.name, self.t[where], states, ledgers, self.stats, self.problem, self.labels, inputs)
+        part.audited = self.audited
+        return part
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -124,7 +132,7 @@ class Solution:
     @cached_property
     def audit(self) -> Audit:
         """Findings of the audit; empty for a solution without one."""
-        return Audit.of_record(self.stats.get("audit", Audit().record()))
+        return Audit() if self.audited is None else self.audited()
 
     @cached_property
     def inputs(self) -> Mapping[Path, Variable]:

@@ -11,7 +11,7 @@ from ephs.mechanics.shapes.impact import Meeting
 from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
 from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
 from ephs.mechanics.tree.finding.network import Network
-from ephs.mechanics.tree.finding.parts import Acting, Parts, parts_of
+from ephs.mechanics.tree.finding.parts import Acting, Parts, determined_by, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
 from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Node
@@ -25,8 +25,7 @@ from ephs.semantics.systems.kept import Kept, once
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import PLAIN, exponential_law
 from ephs.solve.model import Model
-from ephs.solve.motion_law import MotionLaw
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index
 
 
@@ -121,20 +120,10 @@ def reduce_system(problem: Problem, model: Model) -> Reduced:
     OptionError
         A loop of prescribed joints.
     """
-    d = problem.descriptor
-    where = d.pack(problem.initial).tobytes()
-    motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
-    key = "reduced", model.reference, where, motions, tuple(problem.names.items())
     if model.callbacks:
         return _reduced(problem, model)  # tables hold addresses of functions that go with their model
-    return once(d, key, lambda: _reduced(problem, model))
-
-
-def _prescribed(signal: Signal) -> MotionLaw | bytes | None:
-    """A prescribed motion; None where it is a function, or where a force is given."""
-    if not signal.effort or isinstance(signal.value, MotionLaw):
-        return signal.value if isinstance(signal.value, MotionLaw) else None
-    return None if callable(signal.value) else np.asarray(signal.value, dtype=float).tobytes()
+    key = "reduced", model.reference, determined_by(problem)
+    return once(problem.descriptor, key, lambda: _reduced(problem, model))
 
 
 def _reduced(problem: Problem, model: Model) -> Reduced:

@@ -3,7 +3,7 @@
 Whatever has no place among them is refused by its path.
 """
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from typing import final
 
@@ -19,8 +19,9 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
+from ephs.semantics.systems.kept import once
 from ephs.solve.motion_law import MotionLaw, PolynomialMotion
-from ephs.solve.problem import Problem
+from ephs.solve.problem import Problem, Signal
 
 FREE = pair("free")
 OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")
@@ -78,14 +79,27 @@ class Parts:
 
 
 def parts_of(problem: Problem) -> Parts:
-    """The parts of a problem's system.
+    """The parts of a problem's system; found once for each configuration, and kept with the descriptor form.
 
     Raises
     ------
     Unplaced
         A component, or what is prescribed at a port, has no place in joint coordinates.
     """
-    return _Reader(problem).parts()
+    return once(problem.descriptor, ("parts", determined_by(problem)), lambda: _Reader(problem).parts())
+
+
+def determined_by(problem: Problem) -> Hashable:
+    """What the parts depend on beside the system: the initial states, names, and prescribed motions."""
+    motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
+    return problem.descriptor.pack(problem.initial).tobytes(), motions, tuple(problem.names.items())
+
+
+def _prescribed(signal: Signal) -> MotionLaw | bytes | None:
+    """A prescribed motion; None where it is a function, or where a force is given."""
+    if not signal.effort or isinstance(signal.value, MotionLaw):
+        return signal.value if isinstance(signal.value, MotionLaw) else None
+    return None if callable(signal.value) else np.asarray(signal.value, dtype=float).tobytes()
 
 
 @final
