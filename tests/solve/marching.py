@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
-from ephs.semantics.stage import Entry, Program, group, integer, table, vector
+from ephs.semantics.stage import Entry, Program, integer, kind_of, table, vector
 from ephs.solve.control import Proportional
-from ephs.solve.march import MEMORY, TABLEAU, Account, Control, Ending, Field, Memory, Tableau, march
+from ephs.solve.march import Account, Control, Ending, Field, Memory, Tableau, march
 
 
 def program(motion):
@@ -16,7 +16,7 @@ def program(motion):
     def run(on, parameters, control, tableau, memory, account, steps):
         return march(on, motion(parameters, memory.y.size), tableau, memory, control[0], account[0], steps)
 
-    kinds = {"tableau": group(Tableau, **TABLEAU), "memory": group(Memory, **MEMORY)}
+    kinds = {"tableau": kind_of(Tableau), "memory": kind_of(Memory)}
     kinds |= {"account": table(Account), "steps": integer()}
     return Program("march", run=Entry(run, parameters=vector(), control=table(Control), **kinds))
 

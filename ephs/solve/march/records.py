@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final, final
+from typing import Annotated, Any, final
 
 from ephs.semantics.stage import (
     Evaluator,
@@ -14,11 +14,8 @@ from ephs.semantics.stage import (
     Real,
     Record,
     Vector,
-    indices,
     integer,
-    matrix,
     real,
-    vector,
 )
 from ephs.solve.march.account import Account
 
@@ -254,15 +251,7 @@ class Tableau:
     a: Matrix
     error: Vector
     coarse: Vector
-    eighth: Integers
-
-
-TABLEAU: Final[dict[str, Any]] = {
-    "a": matrix(),
-    "error": vector(),
-    "coarse": vector(),
-    "eighth": indices(1),
-}
+    eighth: Annotated[Integers, 1]
 
 
 class Control(Record):
