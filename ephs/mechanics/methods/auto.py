@@ -20,7 +20,6 @@ from ephs.mechanics.methods.semi import NAME as SEMI
 from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.loop import FINAL
@@ -62,7 +61,6 @@ class Auto(ReducedMethod):
         self._active: Explicit | Implicit = self._explicit
         self._contest: Contest | None = None
         self._held = self._free = self._failures = 0
-        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.counts: dict[str, Any] = {"switches": []}
         touches = _touches(equations)
         serves = touches and cheap(equations)

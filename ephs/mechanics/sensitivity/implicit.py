@@ -25,7 +25,7 @@ from ephs.solve.methods.moves import settle
 from ephs.solve.methods.natural import Natural, NaturalState
 from ephs.solve.methods.records import Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
-from ephs.solve.methods.stored import stored_energies
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
@@ -235,4 +235,4 @@ class NaturalTangent:
         return x
 
     def _row(self, model: Model, x: Array, sums: Array) -> Row:
-        return Row(x, np.where(self._makers, sums[4:], stored_energies(model, x)), sums[:4])
+        return Row(x, np.where(self._makers, sums[4:], Stored(model).energies(x)), sums[:4])

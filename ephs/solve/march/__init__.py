@@ -6,7 +6,6 @@ from ephs.solve.march.memory import Memory as Memory
 from ephs.solve.march.memory import Totals as Totals
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending
-from ephs.solve.march.records import Field as Field
 from ephs.solve.march.records import Motion as Motion
 from ephs.solve.march.records import Status as Status
 from ephs.solve.march.records import Tableau as Tableau

@@ -4,6 +4,7 @@ from functools import cache
 from typing import Final
 
 from ephs.semantics.descriptor.kernel_table import SIGNATURE
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -15,7 +16,7 @@ from ephs.semantics.stage import (
     staged,
 )
 from ephs.semantics.stage.reaching import Reached
-from ephs.solve.methods.places import Part, add_to, copy, fill
+from ephs.solve.methods.places import Part, add_to
 from ephs.solve.methods.records import (
     COMPONENT,
     IRREVERSIBLE,
@@ -44,8 +45,8 @@ def evaluated(
     """
     fault = on.counter(0)
     copy(on, t.template, m.data)
-    fill(on, m.residual, 0.0)
-    fill(on, m.scale, 0.0)
+    clear(on, m.residual)
+    clear(on, m.scale)
 
     def component(i: Integer) -> None:
         def sound() -> None:

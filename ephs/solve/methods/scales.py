@@ -6,8 +6,9 @@ their own: then it is measured by what its neighbours could make of it.
 
 from typing import Final
 
+from ephs.semantics.linear.dense import clear
 from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
-from ephs.solve.methods.places import Part, fill, raise_to
+from ephs.solve.methods.places import Part, raise_to
 from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
 NOTHING = 1e-200
@@ -57,7 +58,7 @@ def reach(on: Evaluator, t: Columns, m: Scratch) -> None:
         raise_to(on, flow, t.row[entry] - n_rate, on.absolute(m.data[entry]) * whole[t.column[entry] - n_rate])
 
     on.loop(n_effort, begin)
-    fill(on, block, 0.0)
+    clear(on, block)
     on.loop(largest.size, gather)
     on.loop(t.constraining.size, size)
     on.loop(t.constraining.size, share)
@@ -160,8 +161,8 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
 
     Not a number where a residual is none. The largest of the dropped ones goes into m.defect.
     """
-    fill(on, m.block, 0.0)
-    fill(on, m.group, 0.0)
+    clear(on, m.block)
+    clear(on, m.group)
     worst, defect, largest = on.variable(0.0), on.variable(0.0), on.variable(0.0)
 
     def gather(i: Integer) -> None:

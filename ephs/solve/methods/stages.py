@@ -18,13 +18,13 @@ stages it is 4).
 
 from typing import Final
 
+from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.spaces.vectors import apply, dot
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
 from ephs.solve.methods.corrections import bend, correct_joints, correct_storages, rest
 from ephs.solve.methods.moves import retract, somewhere
-from ephs.solve.methods.places import copy
 from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, row_of
 from ephs.solve.methods.residuals import evaluated
 from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
