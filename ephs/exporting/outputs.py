@@ -1,11 +1,11 @@
 """The program that reads a mechanism's state: coordinates, rates, poses of bodies, energy."""
 
 from functools import cache
-from typing import Any
+from typing import Annotated
 
 from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.engine.states import Ends, Source, Stored, Walked, energies, rows
-from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import (
     Entry,
@@ -16,11 +16,6 @@ from ephs.semantics.stage import (
     Program,
     Table,
     Vector,
-    group,
-    indices,
-    matrix,
-    table,
-    vector,
 )
 
 
@@ -30,8 +25,9 @@ def _row(x: Vector) -> Matrix:
 
 def _read(
     on: Evaluator, tables: Tables, work: Work, bodies: Table[Walked], springs: Table[Ends], plan: Table[Source],
-    poses: Matrix, twists: Matrix, storages: Table[Stored], reads: Integers, parameters: Vector, turning: Integers,
-    momentum: Vector, s: Matrix, x: Matrix, stored: Matrix, q: Vector, y: Vector, out: Vector,
+    poses: Annotated[Matrix, 7], twists: Annotated[Matrix, 6], storages: Table[Stored], reads: Integers,
+    parameters: Vector, turning: Integers, momentum: Vector, s: Matrix, x: Matrix, stored: Matrix, q: Vector, y: Vector,
+    out: Vector,
 ) -> Integer:  # fmt: skip
     """Write (q, r, poses of bodies, energy in J) at a state to ``out``; return a status."""
     increments, freedoms, nodes = tables.drive.size, work.force.size, tables.node.size
@@ -74,11 +70,4 @@ def _read(
 @cache
 def outputs_program() -> Program:
     """Return the program."""
-    of: dict[str, Any] = {
-        "tables": group(Tables, **TABLES), "work": group(Work, **WORK), "bodies": table(Walked),
-        "springs": table(Ends), "plan": table(Source), "poses": matrix(7), "twists": matrix(6),
-        "storages": table(Stored), "reads": indices(), "parameters": vector(),
-        "turning": indices(), "momentum": vector(), "s": matrix(), "x": matrix(),
-        "stored": matrix(), "q": vector(), "y": vector(), "out": vector(),
-    }  # fmt: skip
-    return Program("outputs", read=Entry(_read, **of))
+    return Program("outputs", read=Entry(_read))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, final
+from typing import TypeAlias, final
 
 import numpy as np
 
@@ -234,29 +234,6 @@ class Advance:
         self._steps, self._t = steps, t
 
 
-class Policy(Protocol):
-    """Verdict on a step by its estimated error relative to the tolerance."""
-
-    finest: float
-    """Least step as a fraction of the run."""
-
-    def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
-        """(whether it is accepted, the length of the next one or of the next try); span is that of the whole run."""
-        ...
-
-    def wanted(self, h: float, error: float, span: float) -> float:
-        """Length of the step whose error would equal the aim, by the order of the estimate, without a lower limit."""
-        ...
-
-    def snapshot(self) -> Snapshot:
-        """Memory of earlier steps."""
-        ...
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot."""
-        ...
-
-
 @final
 class Proportional:
     """Proportional-integral control: the next step by this error and the last one.
@@ -279,6 +256,7 @@ class Proportional:
 
     STRICT, NEAR = 30.0, 0.93
     finest = 0.0
+    """Least step as a fraction of the run."""
 
     def __init__(
         self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, damping: float = 0.4,
@@ -288,7 +266,9 @@ class Proportional:
         self._failed, self._hold = False, hold
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
-        """Accept errors of at most 1; a step after a failure does not grow.
+        """Whether a step is accepted, and the length of the next one or of the next try.
+
+        Errors of at most 1 are accepted; a step after a failure does not grow; ``span`` is that of the whole run.
 
         What is accepted knows the share up to a limit only: where rates jump, no step would be short enough.
         """
@@ -374,3 +354,7 @@ class Symmetric:
     def restore(self, snapshot: Snapshot) -> None:
         """Restore a snapshot."""
         self._tries = snapshot["tries"]
+
+
+Policy: TypeAlias = Proportional | Symmetric
+"""What chooses the steps of a run by their estimated errors relative to the tolerance."""

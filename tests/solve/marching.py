@@ -1,13 +1,97 @@
 """A march of a plain right-hand side, run with floats and as machine code; what tests and benchmarks share."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
-from ephs.semantics.stage import Entry, Program, group, integer, table, vector
+from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Vector, integer, kind_of, table, vector
 from ephs.solve.control import Proportional
-from ephs.solve.march import MEMORY, TABLEAU, Account, Control, Ending, Field, Memory, Tableau, march
+from ephs.solve.march import Account, Control, Ending, Memory, Motion, Tableau, march
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Field(Motion):
+    """A plain right-hand side ẏ = f(y) on ℝⁿ.
+
+    Parameters
+    ----------
+    function
+        Called with the evaluator, y, the vector for ẏ and the parameters; returns a status.
+    parameters
+        Memory that it reads.
+    size
+        n.
+    """
+
+    function: Callable[[Evaluator, Vector, Vector, Any], Integer]
+    parameters: Any
+    size: Integer
+
+    @property
+    def increments(self) -> Integer:
+        return 0
+
+    @property
+    def freedoms(self) -> Integer:
+        return 0
+
+    @property
+    def summed(self) -> Integer:
+        return self.size
+
+    @property
+    def counted(self) -> Integer:
+        return self.size
+
+    @property
+    def closes(self) -> bool:
+        return False
+
+    def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
+        return self.function(on, y, out, self.parameters), 0
+
+    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
+        return 0
+
+    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
+        return 0.0
+
+    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
+        return 0
+
+    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
+        """There is no heat."""
+
+    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
+        """There is no heat."""
+
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
+        """There are no sums."""
+
+    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+        return 0
+
+    def correct(
+        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
+    ) -> Integer:
+        account.moved, account.rest, account.size = 0.0, 0.0, 0.0
+        return 0
+
+    def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
+        def one(j: Integer) -> None:
+            out[j] = on.maximum(on.absolute(y0[j]), on.absolute(y1[j]))
+
+        on.loop(self.size, one)
+
+    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
+        """There are no constraints."""
+
+    def least(self, on: Evaluator, change: Vector) -> Real:
+        return 0.0
 
 
 def program(motion):
@@ -16,7 +100,7 @@ def program(motion):
     def run(on, parameters, control, tableau, memory, account, steps):
         return march(on, motion(parameters, memory.y.size), tableau, memory, control[0], account[0], steps)
 
-    kinds = {"tableau": group(Tableau, **TABLEAU), "memory": group(Memory, **MEMORY)}
+    kinds = {"tableau": kind_of(Tableau), "memory": kind_of(Memory)}
     kinds |= {"account": table(Account), "steps": integer()}
     return Program("march", run=Entry(run, parameters=vector(), control=table(Control), **kinds))
 

@@ -12,9 +12,9 @@ import ephs
 from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
 from ephs.solve.control import Proportional
-from ephs.solve.march import STEPS, Control, Ending, Field, Motion
+from ephs.solve.march import STEPS, Control, Ending, Motion
 from ephs.solve.march.control import HELD, held_back, length
-from tests.solve.marching import field, program, start
+from tests.solve.marching import Field, field, program, start
 
 
 def kepler(on, y, out, parameters):

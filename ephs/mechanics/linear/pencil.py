@@ -19,7 +19,7 @@ from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, r
 from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.methods.continuous import Continuous
-from ephs.solve.methods.stored import guessed_efforts
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index
@@ -145,7 +145,7 @@ class Pencil:
         SolveError
             There are none near by.
         """
-        z = guessed_efforts(self.model, x)
+        z = Stored(self.model).efforts(x)
         for _ in range(30):
             residual = self.equations.residual(x, z, self._given)
             matrices = self.equations.matrices(x, z, self._given)

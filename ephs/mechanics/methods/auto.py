@@ -20,11 +20,12 @@ from ephs.mechanics.methods.semi import NAME as SEMI
 from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
-from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.stage import PLAIN
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.loop import FINAL
-from ephs.solve.march.control import HELD, PATIENCE
+from ephs.solve.march import Control as Steering
+from ephs.solve.march.control import PATIENCE, held_back
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
 
@@ -61,8 +62,8 @@ class Auto(ReducedMethod):
         self._implicit: Implicit | None = None
         self._active: Explicit | Implicit = self._explicit
         self._contest: Contest | None = None
-        self._held = self._free = self._failures = 0
-        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
+        self._nearness, self._failures = Steering.table(1), 0
+        self._nearness[0].limit = self._limit
         self.counts: dict[str, Any] = {"switches": []}
         touches = _touches(equations)
         serves = touches and cheap(equations)
@@ -120,15 +121,11 @@ class Auto(ReducedMethod):
                 self._switch(state.t, h, FAILING)
             raise
         if found.error <= 1.0:
+            near: Any = self._nearness[0]
             self._failures = 0
-            if self._explicit.stiffness > self._limit:
-                self._held, self._free = self._held + 1, 0
-                if self._held == HELD:
-                    self._switch(found.end.t, h, f"h·|λ| = {self._explicit.stiffness:.1f} holds its steps")
-            else:
-                self._free += 1
-                if self._free == 6:
-                    self._held = 0
+            near.stiff = self._explicit.stiffness
+            if held_back(PLAIN, near):
+                self._switch(found.end.t, h, f"h·|λ| = {near.stiff:.1f} holds its steps")
         return found
 
     def many(self, span: Span[ReducedState]) -> Leg[ReducedState] | None:
@@ -176,7 +173,7 @@ class Auto(ReducedMethod):
         return {
             "explicit": self._explicit.taken(state),
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
-            "nearness": [self._held, self._free, self._failures],
+            "nearness": [int(self._nearness[0].held), int(self._nearness[0].free), self._failures],
             "contest": None if self._contest is None else self._contest.state(),
             "active": self._active.name,
             "name": self.name,
@@ -194,7 +191,8 @@ class Auto(ReducedMethod):
         elif self._contest is not None:
             self._contest.restore(own["contest"])
         self._take(own["active"])
-        self._held, self._free, self._failures = own["nearness"]
+        near: Any = self._nearness[0]
+        near.held, near.free, self._failures = own["nearness"]
         self.name = own["name"]
 
 

@@ -102,8 +102,6 @@ class Explicit(ReducedMethod):
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
         self._known: tuple[Array, Array] | None = None
-        self.stiffness = 0.0
-        self.rough: tuple[Array, ...] = ()
         self._low: tuple[ReducedState, float, Array] | None = None
         compiled = STEPS.compiled()
         self._fine, self._coarse, self._allowed = np.zeros((3, self.atol.size))

@@ -1,14 +1,15 @@
 """Many steps of a mechanism in one compiled call, if no step needs Python."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from ephs.mechanics.methods.contest import Contest
+from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import Kept
 from ephs.mechanics.tree.equations.accounts import OWN
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Proportional
@@ -17,7 +18,7 @@ from ephs.solve.march import STEPS, Account, Ending, Status
 from ephs.solve.march import Control as Steering
 from ephs.solve.march.control import PATIENCE
 from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Counts, Span, Taken
+from ephs.solve.stepping import Counts, Span, Taken
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.semi import Semi
@@ -32,39 +33,6 @@ CHEAPEST = "its steps cost least per second of motion"
 """The reason to take a method that won a contest."""
 Leave = Callable[[float, float, str], None]
 """Callback with the time, the next step in s, and the reason for its limit."""
-
-
-class Marching(Protocol):
-    """Interface of methods for compiled steps.
-
-    Attributes
-    ----------
-    atol, rtol
-        (counted,) of what counts in an error.
-    exponent, share
-        See `ephs.mechanics.methods.method.ReducedMethod`.
-    stiffness
-        h·|λ| of the fastest mode, as the last step showed it; 0 of methods that do not look.
-    rough
-        Elements of the last step's start and end, each where constraints nearly repeat each other: rates there carry
-        rounding over the least singular value, so that drift says nothing.
-    """
-
-    equations: Equations
-    atol: Array
-    rtol: Array
-    exponent: float
-    share: float
-    stiffness: float
-    rough: tuple[Array, ...]
-
-    def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """One step of h seconds."""
-        ...
-
-    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
-        """The state at a time within a step."""
-        ...
 
 
 @final
@@ -95,7 +63,7 @@ class March:
 
     def __init__(
         self,
-        method: Marching,
+        method: ReducedMethod,
         arrays: Mapping[str, Any],
         span: Span[ReducedState],
         limit: float = 0.0,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.result.record import Record
@@ -35,6 +36,13 @@ class ReducedMethod(ABC):
         The power of the step with which its estimate of the error falls.
     share
         How a step's part of the tolerance depends on its length, see `Proportional`.
+    atol, rtol
+        (counted,) of what counts in an error.
+    stiffness
+        h·|λ| of the fastest mode, as the last step showed it; 0 of methods that do not look.
+    rough
+        Elements of the last step's start and end, each where constraints nearly repeat each other: rates there carry
+        rounding over the least singular value, so that drift says nothing.
     counts
         Its own counts, for the solution's statistics.
     """
@@ -42,6 +50,8 @@ class ReducedMethod(ABC):
     name: str
     exponent: float
     share: float = 0.0
+    stiffness: float = 0.0
+    rough: tuple[Array, ...] = ()
 
     def __init__(self, equations: Equations, control: Control) -> None:
         self.equations, self.control = equations, control

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any, final
 
 import numpy as np
-from scipy.linalg import lu_solve
 
 from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.marching import Leave, March
@@ -44,7 +43,6 @@ class Implicit(ReducedMethod):
         super().__init__(equations, control)
         self.counts = self.counts if counts is None else counts
         self._known: tuple[Array, Array] | None = None
-        self.stiffness, self.rough = 0.0, tuple[Array, ...]()
         self.scheme = scheme_of(equations, control)
         self.exponent = self.scheme.nodes.size + 1.0
         self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
@@ -96,14 +94,14 @@ class Implicit(ReducedMethod):
         real = self._stages.solvers(state, h)[0]
         rough = self._embedded @ stages / h
         allowed = self._stages.allowed(y0, y1)
-        found = lu_solve(real, first[:size] + rough, check_finite=False)
+        found = real(first[:size] + rough)
         closed = eq.closed(end)
         error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
         if error > 1.0:  # again from the corrected state: the first estimate is far too large for stiff parts
             moved = y0.copy()
             moved[:size] += found
             moved[heat] = np.maximum(moved[heat], eq.heats.coldest(y0[heat]))
-            found = lu_solve(real, eq.rates(state.t, state.q, moved)[:size] + rough, check_finite=False)
+            found = real(eq.rates(state.t, state.q, moved)[:size] + rough)
             closed = eq.closed(end)
             error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
         return closed, error

@@ -4,11 +4,9 @@ Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8: the syste
 the mechanism's size for each eigenvalue of the method's coefficients, complex ones in pairs.
 """
 
-from functools import partial
 from typing import Any, final
 
 import numpy as np
-from scipy.linalg import lu_solve
 
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import Equations, ReducedState
@@ -20,7 +18,7 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
 from ephs.solve.march.iteration import iterate
 from ephs.solve.methods.collocation import Collocation, radau_for
-from ephs.solve.methods.factors import factors
+from ephs.solve.methods.solvers import Solver, dense
 from ephs.solve.snapshot import Snapshot
 
 SOLVED = 1e-13
@@ -88,7 +86,7 @@ class Stages:
         else:  # to rounding, and near changes of rank as far as it converges
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
-        self._solvers: tuple[float, list[Any]] | None = None
+        self._solvers: tuple[float, list[Solver]] | None = None
         # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
         self._separation, self._stale = equations.separation(), False
         self.counts = counts
@@ -118,12 +116,12 @@ class Stages:
         """Renew the matrix at the next step's start, if convergence was slow or constraints have rotated."""
         self._stale = not fast or self._turned()
 
-    def solvers(self, state: ReducedState, h: float) -> list[Any]:
-        """Factors of 1/(h μ) − J for the eigenvalues μ of the coefficients, the real one first."""
+    def solvers(self, state: ReducedState, h: float) -> list[Solver]:
+        """Solvers with 1/(h μ) − J for the eigenvalues μ of the coefficients, the real one first."""
         if self._solvers is None or self._solvers[0] != h:
             matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
             real, *pairs = self.scheme.values
-            self._solvers = h, [factors(unit / (h * mu) - matrix) for mu in (real.real, *pairs)]
+            self._solvers = h, [dense(unit / (h * mu) - matrix, _singular) for mu in (real.real, *pairs)]
             self.counts["factorisations"] += 1
         return self._solvers[1]
 
@@ -162,8 +160,7 @@ class Stages:
 
     def _change(self, state: ReducedState, h: float, defect: Array) -> Array:
         """(stages, size) Newton corrections of the stages' increments."""
-        solvers = [partial(lu_solve, solver, check_finite=False) for solver in self.solvers(state, h)]
-        return self.scheme.solved(defect, solvers)
+        return self.scheme.solved(defect, self.solvers(state, h))
 
     def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
         eq, size, count = self.equations, self.jacobian.size, self.scheme.nodes.size
@@ -264,6 +261,10 @@ class Kept:
         integers, reals = self.newton.arrays
         names = "matrix", "damping", "spring", "factors", *PIVOTING
         return [("newton", integers), ("newton_reals", reals), *((name, self.memory[name]) for name in names)]
+
+
+def _singular(_: int) -> SolveError:
+    return SolveError(Outcome.SINGULAR, "", "")
 
 
 def _parts(rows: Array, sign: float) -> Array:

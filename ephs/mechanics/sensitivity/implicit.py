@@ -8,7 +8,7 @@ step's own functions over dual numbers.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
@@ -19,13 +19,13 @@ from ephs.semantics.primitives.primitives import Irreversible
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
-from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector, vector
+from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector
 from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.methods.moves import settle
 from ephs.solve.methods.natural import Natural, NaturalState
-from ephs.solve.methods.records import MEMORY, TABLES, Columns, Scratch, parts_of
+from ephs.solve.methods.records import Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
-from ephs.solve.methods.stored import stored_energies
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
@@ -75,11 +75,7 @@ def tangent_program() -> Program:
     def end(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, m: Scratch) -> None:
         settle(on, t, x, scal[0], z, m.v)
 
-    point: dict[str, Any] = {"t": TABLES, "x": vector(), "z": vector(), "scal": vector(3)}
-    entries = {
-        "whole": Entry(whole, **point, inputs=vector(), m=MEMORY, sums=vector()),
-        "end": Entry(end, **point, m=MEMORY),
-    }
+    entries = {"whole": Entry(whole), "end": Entry(end)}
     return Program("natural_along", **{name: entry.tangent(directions=DIRECTIONS) for name, entry in entries.items()})
 
 
@@ -239,4 +235,4 @@ class NaturalTangent:
         return x
 
     def _row(self, model: Model, x: Array, sums: Array) -> Row:
-        return Row(x, np.where(self._makers, sums[4:], stored_energies(model, x)), sums[:4])
+        return Row(x, np.where(self._makers, sums[4:], Stored(model).energies(x)), sums[:4])

@@ -21,11 +21,8 @@ from ephs.semantics.stage import (
     Real,
     Truth,
     Vector,
-    indices,
-    integer,
-    matrix,
+    members,
     staged,
-    vector,
 )
 
 
@@ -236,19 +233,12 @@ def _whole(on: Evaluator, a: Matrix, factor: Matrix) -> Integer:
 @cache
 def row_program() -> Program:
     """Return the program of these functions; rows are handed over as the fields of `Rows`, in order."""
-    rows = {
-        "row": matrix(), "terms": vector(), "factor": matrix(), "scaled": matrix(), "plain": matrix(),
-        "triangle": matrix(), "chosen": indices(),
-    }  # fmt: skip
+    rows = members(Rows)
 
-    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
-        return Entry.bundled(function, {**rows, **kinds}, (rows, Rows))
+    def entry(function: Callable[..., Any]) -> Entry:
+        return Entry.bundled(function, rows, (rows, Rows))
 
     return Program(
-        "constraint_rows",
-        cholesky=Entry(_whole, a=matrix(), factor=matrix()),
-        solve=Entry(solve, factor=matrix(), x=vector()),
-        orthonormalise=entry(orthonormalise, count=integer()),
-        correct=entry(correct, rank=integer(), target=vector(), step=vector(), out=vector()),
-        multipliers=entry(multipliers, count=integer(), rank=integer(), step=vector(), out=vector()),
-    )
+        "constraint_rows", cholesky=Entry(_whole), solve=Entry(solve), orthonormalise=entry(orthonormalise),
+        correct=entry(correct), multipliers=entry(multipliers),
+    )  # fmt: skip

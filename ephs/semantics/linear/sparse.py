@@ -6,7 +6,7 @@ its diagonal at diagonal[i]. U's diagonal holds reciprocal pivots.
 
 from functools import cache
 
-from ephs.semantics.stage import Entry, Evaluator, Integer, Integers, Program, Truth, Vector, indices, vector
+from ephs.semantics.stage import Entry, Evaluator, Integer, Integers, Program, Truth, Vector
 
 
 def factorise(
@@ -251,18 +251,4 @@ def fill(
 @cache
 def sparse_lu() -> Program:
     """Return the program of these functions."""
-    pattern = {"start": indices(), "column": indices(), "diagonal": indices()}
-    return Program(
-        "sparse_lu",
-        factorise=Entry(
-            factorise, place=indices(), **pattern, data=vector(), value=vector(), row=vector(), floor=vector(),
-            ratio=vector(),
-        ),
-        solve=Entry(
-            solve, rows=indices(), columns=indices(), **pattern, value=vector(), right=vector(), x=vector(),
-            row=vector(),
-        ),
-        fill=Entry(
-            fill, first=indices(), column=indices(), start=indices(), out=indices(), link=indices(), mark=indices()
-        ),
-    )  # fmt: skip
+    return Program("sparse_lu", factorise=Entry(factorise), solve=Entry(solve), fill=Entry(fill))

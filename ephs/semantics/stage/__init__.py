@@ -7,7 +7,9 @@ from ephs.semantics.stage.evaluator import Evaluator as Evaluator
 from ephs.semantics.stage.evaluator import staged as staged
 from ephs.semantics.stage.kinds import group as group
 from ephs.semantics.stage.kinds import indices as indices
+from ephs.semantics.stage.kinds import kind_of as kind_of
 from ephs.semantics.stage.kinds import matrix as matrix
+from ephs.semantics.stage.kinds import members as members
 from ephs.semantics.stage.kinds import signature_of as signature_of
 from ephs.semantics.stage.kinds import table as table
 from ephs.semantics.stage.kinds import vector as vector

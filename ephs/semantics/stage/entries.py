@@ -10,7 +10,7 @@ from typing import Any, Final, cast, final
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator
-from ephs.semantics.stage.kinds import Kind, described, dual, of_field, pointer, signature_of, taped
+from ephs.semantics.stage.kinds import Kind, described, dual, kind_of, of_field, pointer, signature_of, taped
 from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField
 from ephs.semantics.stage.taped import Tape, Taped
@@ -27,19 +27,19 @@ class Entry:
         A staged function. Its result is None, a real number, an integer or a condition.
     **kinds
         Its arguments after the evaluator, in order: `real()`, `integer()`, `vector()`, `indices()`, `matrix()`,
-        `table(Record)`.
+        `table(Record)`; but those whose annotations say their kind, see `ephs.semantics.stage.kind_of`.
     """
 
     def __init__(self, function: Callable[..., Any], **kinds: Kind | RealField | IntegerField) -> None:
         self.function = function
-        self.kinds = {name: of_field(kind) for name, kind in kinds.items()}
+        names = list(inspect.signature(function).parameters)[1:]
+        given = _completed(function, kinds)
+        self.kinds = {name: given.pop(name) for name in names if name in given} | given
+        if names != list(self.kinds):
+            found = ", ".join(self.kinds) or "none"
+            raise StageError("parameters", where=self.name, expected=", ".join(names) or "none", found=found)
         self.atoms: list[tuple[str, Atom]] = [(name, atom) for name, kind in self.kinds.items() for atom in kind.atoms]
         """The atoms of all arguments, each with the name of its argument."""
-        names = list(inspect.signature(function).parameters)[1:]
-        if names != list(kinds):
-            raise StageError(
-                "parameters", where=self.name, expected=", ".join(names) or "none", found=", ".join(kinds) or "none"
-            )
 
     @staticmethod
     def bundled(
@@ -51,11 +51,12 @@ class Entry:
         Parameters
         ----------
         function
-            Takes after the evaluator what is made of arguments, then the other arguments, in order.
+            Takes after the evaluator what is made of arguments, then the other arguments, in order; last those whose
+            kinds its annotations say.
         *made
             Names of arguments, and what makes one thing of them.
         """
-
+        kinds = _completed(function, kinds, 1 + len(made))
         names, bundles = tuple(kinds), tuple((tuple(names), make) for names, make in made)
 
         def run(on: Evaluator, *arguments: Any) -> Any:
@@ -199,6 +200,15 @@ class Entry:
     def _known(self, names: tuple[str, ...]) -> None:
         if unknown := [name for name in names if name not in self.kinds]:
             raise StageError("unknown", where=self.name, found=", ".join(unknown), expected=", ".join(self.kinds))
+
+
+def _completed(function: Callable[..., Any], kinds: Mapping[str, Any], known: int = 1) -> dict[str, Kind]:
+    """Kinds, and then those that the annotations of a function's arguments say, but for the first so many."""
+    found = {name: of_field(kind) for name, kind in kinds.items()}
+    for name, parameter in list(inspect.signature(function).parameters.items())[known:]:
+        if name not in found and (kind := kind_of(parameter.annotation)) is not None:
+            found[name] = kind
+    return found
 
 
 def _taking(run: Callable[..., Any], name: str, names: Iterable[str]) -> Callable[..., Any]:

@@ -1,14 +1,15 @@
 """Kinds of arguments: arrays and numbers passed to a program, and their views while staging."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Final, TypeAlias, cast, final
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Annotated, Any, Final, TypeAlias, cast, final, get_args, get_origin
 
 import numpy as np
 
 from ephs.semantics.stage.duals import Dual, DualCells
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, RealCells, Vector
+from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField, Record, Table
 from ephs.semantics.stage.taped import Taped, TapedCells
@@ -178,6 +179,34 @@ def group(cls: Callable[..., Any], **kinds: "Kind | Any") -> Kind:
         f"a mapping with the names {', '.join(parts)}", atoms, split, join,
         lambda change: group(cls, **{name: change(kind) for name, kind in parts.items()}),
     )  # fmt: skip
+
+
+_SIZED: Final[dict[Any, Callable[..., Kind]]] = {Vector: vector, Integers: indices, Matrix: matrix}
+
+
+def kind_of(annotation: Any) -> Kind | None:
+    """Return the kind of an argument by its annotation; None where that says none.
+
+    Numbers, `Vector`, `Integers`, `Matrix` and `Table[Record]` have their kinds, dataclasses are groups of their
+    fields. ``Annotated[Matrix, 6]`` has six columns, ``Annotated[…, kind]`` the kind that is named there.
+    """
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        of, mark = arguments
+        return mark if isinstance(mark, Kind) else _SIZED[of](mark)
+    if origin is Table:
+        return table(arguments[0])
+    if annotation in (Real, Integer):
+        return REAL if annotation == Real else INTEGER
+    if annotation in _SIZED:
+        return _SIZED[annotation]()
+    return group(cast("Callable[..., Any]", annotation), **members(annotation)) if is_dataclass(annotation) else None
+
+
+def members(cls: Any) -> dict[str, Kind]:
+    """Return the kinds of a dataclass's fields that their annotations say."""
+    found = {each.name: kind_of(each.type) for each in fields(cls)}
+    return {name: kind for name, kind in found.items() if kind is not None}
 
 
 def of_field(kind: "Kind | RealField | IntegerField") -> Kind:

@@ -2,18 +2,13 @@
 
 from ephs.solve.march.account import Account as Account
 from ephs.solve.march.march import march as march
-from ephs.solve.march.memory import MEMORY as MEMORY
-from ephs.solve.march.memory import TOTALS as TOTALS
 from ephs.solve.march.memory import Memory as Memory
 from ephs.solve.march.memory import Totals as Totals
-from ephs.solve.march.records import TABLEAU as TABLEAU
 from ephs.solve.march.records import Control as Control
 from ephs.solve.march.records import Ending as Ending
-from ephs.solve.march.records import Field as Field
 from ephs.solve.march.records import Motion as Motion
 from ephs.solve.march.records import Status as Status
 from ephs.solve.march.records import Tableau as Tableau
 from ephs.solve.march.steps import STEPS as STEPS
-from ephs.solve.march.stiff import STIFF as STIFF
 from ephs.solve.march.stiff import Newton as Newton
 from ephs.solve.march.stiff import Stiff as Stiff

@@ -51,11 +51,6 @@ def march(
     return on.select(run.ended, run.ending.value, reached)
 
 
-def _set(on: Evaluator, flag: Integer) -> Truth:
-    """Tell whether a flag is 1."""
-    return on.same(flag, 1)
-
-
 @final
 @dataclass(frozen=True, slots=True)
 class _Run:
@@ -133,7 +128,7 @@ class _Run:
         """Request a new matrix if the present one converged slowly."""
         if self.stiff is not None:
             known = self.stiff.newton[0]
-            stale = self.on.both(_set(self.on, known.stale), self.on.negate(_set(self.on, known.young)))
+            stale = self.on.both(self.on.same(known.stale, 1), self.on.negate(self.on.same(known.young, 1)))
             self.on.when(stale, lambda: self.end(Ending.STALE))
 
     def _try(self, h: Real, rest: Real) -> None:
@@ -180,7 +175,7 @@ class _Run:
                     known.stale, c.step = 1, h
                     self.end(Ending.STALE)
 
-                on.when(on.both(unsettled, on.negate(_set(on, known.young))), renew)
+                on.when(on.both(unsettled, on.negate(on.same(known.young, 1))), renew)
 
         on.when(self.sound, weigh, refused)
         taken = on.same(self.accepted.value, 1)

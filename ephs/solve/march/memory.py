@@ -1,9 +1,9 @@
 """Memory of a march: state, next step, accumulated sums, records."""
 
 from dataclasses import dataclass
-from typing import Any, Final, final
+from typing import Annotated, final
 
-from ephs.semantics.stage import Matrix, Vector, matrix, vector
+from ephs.semantics.stage import Matrix, Vector
 
 
 @final
@@ -14,9 +14,6 @@ class Errors:
     atol: Vector
     rtol: Vector
     allowed: Vector
-
-
-ERRORS: Final[dict[str, Any]] = {"atol": vector(), "rtol": vector(), "allowed": vector()}
 
 
 @final
@@ -40,11 +37,6 @@ class Totals:
     size: Vector
     whole: Vector
     low: Vector
-
-
-TOTALS: Final[dict[str, Any]] = {
-    name: vector() for name in ("start", "end", "before", "after", "change", "size", "whole", "low")
-}
 
 
 @final
@@ -100,19 +92,10 @@ class Memory:
     whole: Vector
     low: Vector
     times: Vector
-    rows_t: Matrix
+    rows_t: Annotated[Matrix, 4]
     rows_q: Matrix
     rows_y: Matrix
 
     @property
     def errors(self) -> Errors:
         return Errors(self.atol, self.rtol, self.allowed)
-
-
-MEMORY: Final[dict[str, Any]] = {
-    "q": vector(), "y": vector(), "k": matrix(), "q1": vector(), "y1": vector(), "q2": vector(), "y2": vector(),
-    "k2": matrix(), "last": vector(), "atol": vector(), "rtol": vector(), "allowed": vector(), "open": vector(),
-    "fine": vector(), "coarse": vector(), "carry": vector(), "carry1": vector(), "carry2": vector(),
-    "change": vector(), "size": vector(), "whole": vector(), "low": vector(), "times": vector(),
-    "rows_t": matrix(4), "rows_q": matrix(), "rows_y": matrix(),
-}  # fmt: skip

@@ -1,10 +1,9 @@
 """Data of a march: equations of motion, a tableau, its control, its memory."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final, final
+from typing import Annotated, final
 
 from ephs.semantics.stage import (
     Evaluator,
@@ -14,11 +13,8 @@ from ephs.semantics.stage import (
     Real,
     Record,
     Vector,
-    indices,
     integer,
-    matrix,
     real,
-    vector,
 )
 from ephs.solve.march.account import Account
 
@@ -156,88 +152,6 @@ class Motion(ABC):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Field(Motion):
-    """A plain right-hand side ẏ = f(y) on ℝⁿ.
-
-    Parameters
-    ----------
-    function
-        Called with the evaluator, y, the vector for ẏ and the parameters; returns a status.
-    parameters
-        Memory that it reads.
-    size
-        n.
-    """
-
-    function: Callable[[Evaluator, Vector, Vector, Any], Integer]
-    parameters: Any
-    size: Integer
-
-    @property
-    def increments(self) -> Integer:
-        return 0
-
-    @property
-    def freedoms(self) -> Integer:
-        return 0
-
-    @property
-    def summed(self) -> Integer:
-        return self.size
-
-    @property
-    def counted(self) -> Integer:
-        return self.size
-
-    @property
-    def closes(self) -> bool:
-        return False
-
-    def rates(self, on: Evaluator, base: Vector, y: Vector, q: Vector, out: Vector) -> tuple[Integer, Integer]:
-        return self.function(on, y, out, self.parameters), 0
-
-    def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
-        return 0
-
-    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
-        return 0.0
-
-    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
-        return 0
-
-    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
-        """There is no heat."""
-
-    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
-        """There is no heat."""
-
-    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
-        """There are no sums."""
-
-    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
-        return 0
-
-    def correct(
-        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
-    ) -> Integer:
-        account.moved, account.rest, account.size = 0.0, 0.0, 0.0
-        return 0
-
-    def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:
-        def one(j: Integer) -> None:
-            out[j] = on.maximum(on.absolute(y0[j]), on.absolute(y1[j]))
-
-        on.loop(self.size, one)
-
-    def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
-        """There are no constraints."""
-
-    def least(self, on: Evaluator, change: Vector) -> Real:
-        return 0.0
-
-
-@final
-@dataclass(frozen=True, slots=True)
 class Tableau:
     """Coefficients of a Runge-Kutta method whose first stage is the step's start.
 
@@ -254,15 +168,7 @@ class Tableau:
     a: Matrix
     error: Vector
     coarse: Vector
-    eighth: Integers
-
-
-TABLEAU: Final[dict[str, Any]] = {
-    "a": matrix(),
-    "error": vector(),
-    "coarse": vector(),
-    "eighth": indices(1),
-}
+    eighth: Annotated[Integers, 1]
 
 
 class Control(Record):

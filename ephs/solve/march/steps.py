@@ -15,11 +15,7 @@ from ephs.semantics.stage import (
     Table,
     Truth,
     Vector,
-    indices,
-    real,
     staged,
-    table,
-    vector,
 )
 from ephs.solve.march.control import judge
 from ephs.solve.march.evaluating import combine, evaluate, place
@@ -260,10 +256,6 @@ def _judge(on: Evaluator, control: Table[Control], h: Real, error: Real) -> Inte
 
 
 STEPS: Final = Program(
-    "steps",
-    measure=Entry(measure, fine=vector(), coarse=vector(), allowed=vector(), eighth=indices(1)),
-    drift=Entry(drift, before=vector(), after=vector(), allowed=vector()),
-    stiffness=Entry(stiffness, rise=vector(), run=vector(), allowed=vector(), h=real()),
-    judge=Entry(_judge, control=table(Control), h=real(), error=real()),
+    "steps", measure=Entry(measure), drift=Entry(drift), stiffness=Entry(stiffness), judge=Entry(_judge)
 )
 """Entry functions for drivers with one step per call."""

@@ -7,7 +7,7 @@ size of the degrees of freedom: with γ = μ/h, (γ² − γ (J_rr + J_vv) + J_r
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, final
+from typing import final
 
 from ephs.semantics.linear.dense import copy, dot
 from ephs.semantics.linear.envelope import envelope_lu, envelope_solve, times
@@ -20,12 +20,8 @@ from ephs.semantics.stage import (
     Record,
     Table,
     Vector,
-    indices,
     integer,
-    matrix,
     real,
-    table,
-    vector,
 )
 
 
@@ -112,14 +108,6 @@ class Stiff:
     y: Vector
     rate: Vector
     q: Vector
-
-
-STIFF: Final[dict[str, Any]] = {
-    "newton": table(Newton), "matrix": matrix(), "damping": matrix(), "spring": matrix(), "factors": matrix(),
-    "swaps": indices(), "ends": indices(), "values": vector(), "inverse": matrix(), "into": matrix(), "out": matrix(),
-    "stages": matrix(), "change": matrix(), "parts": matrix(), "part": vector(), "right": vector(), "y": vector(),
-    "rate": vector(), "q": vector(),
-}  # fmt: skip
 
 
 def whole(x: Matrix) -> Vector:

@@ -4,7 +4,7 @@ Rank is decided on the constraint matrix, its columns scaled by the square root 
 show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose pivots are squares of singular values.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, final
 
@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
 from ephs.solve.errors import SolveError
-from ephs.solve.methods.records import STORING, Order, OrderOf
+from ephs.solve.methods.records import STORING
 from ephs.solve.model import Model, cancelled, evaluate_at
-from ephs.solve.sparse import Index, order
+from ephs.solve.sparse import Index
 
 SHRUNK = 1e-3
 """Part of its first size to which a pivot may shrink: pivots fall with the part that omitted equations have in their
@@ -50,25 +49,6 @@ class Decided:
     tried: int
 
 
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Analysis:
-    """A pivot order for the present values, and the dependent equations that it leaves out.
-
-    Parameters
-    ----------
-    dropped
-        (rows,) 1 where an equation depends on others and is replaced by "this multiplier does not change".
-    redundant
-        The equations left out, in words.
-    """
-
-    order: Order
-    dropped: Index
-    redundant: tuple[str, ...]
-    fill: int
-
-
 def entries_at(model: Model, x: Array, z: Array, h: float, tried: int = AT_START) -> tuple[Array, Array]:
     """Entries of the matrix, and those by which the rank of constraints is decided.
 
@@ -87,56 +67,6 @@ def entries_at(model: Model, x: Array, z: Array, h: float, tried: int = AT_START
     if tried != AT_START:
         return values, values
     return values, np.where(np.isin(model.tables.row, model.constraint_rows), found(0.0), values)
-
-
-def analyse(model: Model, x: Array, z: Array, h: float, before: Index | None = None, tried: int = AT_START) -> Analysis:
-    """Decide rank and order at a state and unknowns.
-
-    The pivots that it finds set the order's floor: a pivot that has shrunk much asks for another order.
-    ``before`` are the equations that were left out so far.
-
-    Raises
-    ------
-    SolveError
-        The motion is not determined: some junction's effort or some state's rate has no equation.
-    """
-    t = model.tables
-    size = model.unknowns
-    values, ranked = entries_at(model, x, z, h, tried)
-    dropped = dependent_rows(model, x, ranked, before)
-    diagonal = np.arange(size) + t.row.size - size
-    active = np.ones(t.row.size, dtype=bool)
-    active[diagonal] = dropped == 1
-    active &= ~((dropped[t.row] == 1) & (np.arange(t.row.size) < t.row.size - size))
-    data = values.copy()
-    data[diagonal] = 1.0
-    chosen = np.flatnonzero(active)
-    entries = np.where(data[chosen] == 0.0, TINY, data[chosen])  # an entry that is zero now may become nonzero
-    try:
-        elimination = order(size, t.row[chosen], t.column[chosen], entries)
-    except RuntimeError as error:
-        raise SolveError.undetermined(model, _null_unknown(model, chosen, data)) from error
-    place = np.full(t.row.size, -1, dtype=np.int64)
-    place[chosen] = elimination.place
-    compiled = OrderOf(
-        rows=elimination.rows,
-        columns=elimination.columns,
-        start=elimination.start,
-        entry=elimination.column,
-        diagonal=elimination.diagonal,
-        place=place,
-        dropped=dropped,
-        floor=np.zeros(size),
-        tolerance=np.array([DEFECT]),
-    )
-    c, ratio = compiled, np.zeros(size)
-    factors, scratch = np.zeros(elimination.fill), np.zeros(size)
-    factorise = sparse_lu().compiled()["factorise"]
-    if not factorise(c.place, c.start, c.entry, c.diagonal, data, factors, scratch, c.floor, ratio):
-        raise SolveError.undetermined(model, _null_unknown(model, chosen, data))
-    compiled = replace(compiled, floor=SHRUNK * ratio)
-    redundant = tuple(model.row_name(int(row)) for row in np.flatnonzero(dropped))
-    return Analysis(compiled, dropped, redundant, elimination.fill)
 
 
 def dependent_rows(
@@ -277,11 +207,10 @@ def _compliance(model: Model, values: Array) -> Any:
     return csr_array(whole, shape=(plain.size, plain.size))
 
 
-def _null_unknown(model: Model, chosen: Index, data: Array) -> int:
+def null_unknown(size: int, row: Index, column: Index, values: Array) -> int:
     """The first of the unknowns with the largest components in the null space, independent of its basis."""
-    t, size = model.tables, model.unknowns
     matrix = np.zeros((size, size))
-    np.add.at(matrix, (t.row[chosen], t.column[chosen]), data[chosen])
+    np.add.at(matrix, (row, column), values)
     matrix /= np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)[:, None]
     _, sizes, vectors = svd(matrix)
     least = min(rank_of(sizes, IMPLICIT), size - 1)

@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING
-from ephs.solve.methods.stored import guessed_efforts
+from ephs.solve.methods.stored import Stored
 from ephs.solve.model import Evaluation, Model, cancelled
 
 
@@ -84,7 +84,7 @@ class Continuous:
 
     def guess(self, x: Array) -> Array:
         """Unknowns from which to begin: the storages' efforts."""
-        return guessed_efforts(self.model, x)
+        return Stored(self.model).efforts(x)
 
     def residual(self, x: Array, z: Array, inputs: Array) -> Array:
         """g(x, z), (n,).

@@ -3,36 +3,13 @@
 from collections.abc import Callable
 from typing import Final
 
-from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
-from ephs.solve.methods.places import add_to, raise_to
+from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth
+from ephs.solve.methods.places import add_to
 from ephs.solve.methods.records import STORING, Columns, Dims, row_of
 from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
 
 _NONE: Final = 1e-280
 """Squares up to which there is nothing to correct along."""
-
-
-def rest(on: Evaluator, t: Columns, h: Real, slope: Vector, scale: Vector) -> None:
-    """Scale of efforts at rest: their change by the flows in a step."""
-
-    def component(c: Integer) -> None:
-        n, e_at, w_at, j_at = row_of(Dims, t.dims, c).efforts, t.e_at[c], t.read_w_at[c], t.jacobian_at[c]
-
-        def row(j: Integer) -> None:
-            def entry(q: Integer) -> None:
-                place = t.jacobian[j_at + j * n + q]
-
-                def there() -> None:
-                    flow = scale[t.counts[0] + t.e_index[e_at + q]]
-                    raise_to(on, scale, t.read_w[w_at + j], on.absolute(h) * on.absolute(slope[place]) * flow)
-
-                on.when(place >= 0, there)
-
-            on.loop(n, entry)
-
-        on.when(on.same(t.kind[c], STORING), lambda: on.loop(n, row))
-
-    on.loop(t.kind.size, component)
 
 
 def bend(on: Evaluator, scheme: Scheme, g: GroupColumns, h: Real, z: Matrix, s: StageScratch) -> None:

@@ -20,11 +20,6 @@ _CURABLE = (Outcome.DIVERGED, Outcome.SINGULAR, Outcome.CONTRADICTION)
 _DOMAINS = (Outcome.TURN, Outcome.TEMPERATURE, Outcome.EXTENT, Outcome.DOMAIN, Outcome.DEPTH)
 
 
-def started(method: Natural, x: Array, sums: Array) -> NaturalState:
-    """State of a method that starts at the states x, with the former counts."""
-    return replace(method.init(x), sums=sums)
-
-
 def advance_whole(
     method: Natural, state: NaturalState, h: float, steps: int, inputs: Array | None = None, cuts: int = CUTS
 ) -> tuple[NaturalState, Chunk]:

@@ -25,10 +25,7 @@ from ephs.semantics.stage import (
     Program,
     Real,
     Vector,
-    indices,
-    matrix,
     staged,
-    vector,
 )
 from ephs.solve.errors import SolveError
 from ephs.solve.layout import LINEAR
@@ -36,10 +33,8 @@ from ephs.solve.methods.continuous import Continuous, Instant, Matrices
 from ephs.solve.methods.places import Part, add_to
 from ephs.solve.methods.records import (
     COMPONENT,
-    MEMORY,
     REVERSIBLE,
     STORING,
-    TABLES,
     Columns,
     Outer,
     Scratch,
@@ -154,15 +149,7 @@ def rates(
 @cache
 def integral_program() -> Program:
     """Return the program of the rates."""
-    by_rows = {"start": indices(), "column": indices(), "value": vector()}
-    return Program(
-        "integral",
-        rates=Entry(
-            rates, t=TABLES, storing=indices(), others=indices(), place=indices(), rest=vector(), **by_rows,
-            **{f"{name}s": kind for name, kind in by_rows.items()}, xs=matrix(), inputs=matrix(), found=matrix(),
-            z=vector(), scal=vector(3), m=MEMORY,
-        ),
-    )  # fmt: skip
+    return Program("integral", rates=Entry(rates))
 
 
 @final

@@ -24,9 +24,9 @@ from ephs.solve.methods.analysis import (
     SHRUNK,
     WITHIN,
     Decided,
-    analyse,
     dependent_rows,
     entries_at,
+    null_unknown,
 )
 from ephs.solve.methods.blame import Blame
 from ephs.solve.methods.collocation import moments
@@ -228,7 +228,8 @@ class Natural:
             if status == DONE:
                 tried = AS_BEFORE
                 self._settle(taken)
-            elif status >= COMPONENT and (tried == WITHIN or not has_choice(o.dropped, status)):
+            # other equations that are left out may keep a step within a component's domain
+            elif status >= COMPONENT and (tried == WITHIN or not o.dropped.any() or status == COMPONENT + RAISED):
                 failure = SolveError.of_component(status, model, component)
             elif tried == WITHIN:
                 failure = self._failure(status, o, x, z, h)
@@ -337,7 +338,7 @@ class Natural:
         try:
             found = order(size, (row + i * n)[chosen], (column + j * n)[chosen], entries)
         except RuntimeError as error:
-            raise self._singular(self._decided) from error
+            raise self._singular(self._decided, row[chosen], column[chosen], data[chosen]) from error
         place = np.full(active.size, -1, dtype=np.int64)
         place[chosen] = found.place
         made = OrderOf(
@@ -349,21 +350,20 @@ class Natural:
             place, made.start, made.entry, made.diagonal, np.where(active, data, 0.0), self._memory.factors, s.dense,
             made.floor, ratio,
         ):  # fmt: skip
-            raise self._singular(self._decided)
+            raise self._singular(self._decided, row[chosen], column[chosen], data[chosen])
         self.elimination = replace(made, floor=SHRUNK * ratio)
         self.redundant = tuple(model.row_name(int(number)) for number in np.flatnonzero(dropped))
         self.changes += 1
         return self.elimination
 
-    def _singular(self, decided: Decided) -> SolveError:
-        """Why there is no order of elimination: an unknown without equation, or only these values."""
+    def _singular(self, decided: Decided, row: Index, column: Index, values: Array) -> SolveError:
+        """Why there is no order of elimination: an unknown without equation, or only the values of several stages."""
+        if self.stages == 1:
+            return SolveError.undetermined(self.model, null_unknown(self.model.unknowns, row, column, values))
+        single = Natural(self.model)
+        single._dropped = decided.before
         try:
-            analyse(self.model, decided.x, decided.z[0], decided.h, decided.before, decided.tried)
+            single._order(decided.x, decided.z[:1], decided.h, single._given(None), decided.tried)
         except SolveError as error:
             return error
         return SolveError(Outcome.SINGULAR, "", "")
-
-
-def has_choice(dropped: Index, status: int) -> bool:
-    """Whether leaving out other equations may keep a step within the domain of the component that gave this status."""
-    return bool(dropped.any()) and status != COMPONENT + RAISED

@@ -5,6 +5,7 @@ from functools import cache
 from itertools import chain
 from typing import Any, Final
 
+from ephs.semantics.linear.dense import copy
 from ephs.semantics.linear.sparse import factorise, solve
 from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage import (
@@ -16,25 +17,17 @@ from ephs.semantics.stage import (
     Program,
     Truth,
     Vector,
-    indices,
-    integer,
-    matrix,
-    real,
-    vector,
 )
 from ephs.solve.methods.guesses import BEFORE, extrapolated, restrain
 from ephs.solve.methods.moves import settle
-from ephs.solve.methods.places import add_to, copy
+from ephs.solve.methods.places import add_to
 from ephs.solve.methods.records import (
     COMPONENT,
     DIVERGED,
     DONE,
     INCONSISTENT,
-    MEMORY,
-    ORDER,
     PIVOT,
     STORING,
-    TABLES,
     Columns,
     Elimination,
     Scratch,
@@ -43,8 +36,6 @@ from ephs.solve.methods.records import (
 from ephs.solve.methods.residuals import FAULTS, account, balance, evaluated
 from ephs.solve.methods.scales import COMMON, FAR, measure
 from ephs.solve.methods.scheme import (
-    GROUPS,
-    STAGE_MEMORY,
     GroupColumns,
     Node,
     Place,
@@ -313,22 +304,11 @@ def natural_program(stages: int) -> Program:
     """Return the program of steps with a number of stages."""
     scheme = gauss(stages)
     known: tuple[tuple[str, ...], Any] = (), lambda: scheme
-    step = {"scal": vector(3), "still": vector(3), "inputs": matrix()}
-    kinds = {
-        "t": TABLES, "g": GROUPS, "o": ORDER, "m": MEMORY, "s": STAGE_MEMORY, "x": vector(), "z": matrix(),
-        "previous": matrix(), **step, "sums": vector(), "states": matrix(), "energies": matrix(),
-        "ledgers": matrix(5), "outcome": indices(4), "steps": integer(),
-    }  # fmt: skip
-    entries = {"advance": Entry.bundled(advance, kinds, known)}
+    entries = {"advance": Entry.bundled(advance, {}, known)}
     if scheme.single:  # what is called from one place only would be inlined: steps would take 4 % longer
-        point = {"x": vector(), "z": vector(), "scal": vector(3), "inputs": vector()}
-        entries["evaluate"] = Entry(evaluated, t=TABLES, **point, m=MEMORY, weight=real())
+        entries["evaluate"] = Entry(evaluated)
     else:
-        kinds = {
-            "t": TABLES, "g": GROUPS, "dropped": indices(), "x": vector(), "z": matrix(), **step, "m": MEMORY,
-            "s": STAGE_MEMORY, "fresh": integer(),
-        }  # fmt: skip
-        entries["linearise"] = Entry.bundled(linearise, kinds, known)
+        entries["linearise"] = Entry.bundled(linearise, {}, known)
     return Program("natural" if scheme.single else f"natural_of_{stages}_stages", **entries)
 
 

@@ -12,7 +12,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.breakpoints import NEAR
 from ephs.solve.control import Control, Grid
-from ephs.solve.methods.driven import advance_driven, advance_whole, started
+from ephs.solve.methods.driven import advance_driven, advance_whole
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.model import Model, compile_model
@@ -111,7 +111,7 @@ class Paced:
             return replace(state, t=t)
         if self._within is None:
             self._within = self._make(self._model)
-        start = started(self._within, state.kept.x, self._sums(state.kept))
+        start = replace(self._within.init(state.kept.x), sums=self._sums(state.kept))
         inner, chunk = advance_driven(self.problem, self._within, start, state.t, t - state.t)
         return _end(chunk, inner, t)
 
@@ -128,7 +128,7 @@ class Paced:
 
     def anew(self, state: PacedState) -> PacedState:
         """The same state as one to start from: unknowns are guessed afresh."""
-        return replace(state, inner=started(self.method, state.kept.x, self._sums(state.kept)))
+        return replace(state, inner=replace(self.method.init(state.kept.x), sums=self._sums(state.kept)))
 
     def record(self, taken: Instants[PacedState]) -> Record:
         """Records of many instants."""

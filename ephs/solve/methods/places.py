@@ -7,24 +7,6 @@ from ephs.semantics.stage import Evaluator, Integer, Real, Vector
 from ephs.solve.methods.records import Columns, Dims, row_of
 
 
-def copy(on: Evaluator, source: Vector, out: Vector) -> None:
-    """out = source, of one length."""
-
-    def one(i: Integer) -> None:
-        out[i] = source[i]
-
-    on.loop(out.size, one)
-
-
-def fill(on: Evaluator, out: Vector, value: Real) -> None:
-    """Write a number into all places."""
-
-    def one(i: Integer) -> None:
-        out[i] = value
-
-    on.loop(out.size, one)
-
-
 def raise_to(on: Evaluator, out: Vector, i: Integer, value: Real) -> None:
     """The larger of an entry and a number."""
     out[i] = on.maximum(out[i], value)

@@ -1,14 +1,13 @@
 """A model's tables, order of elimination and scratch memory, as arrays and as records of programs."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, Final, Generic, TypeAlias, TypeVar, final
+from typing import Annotated, Any, Final, Generic, TypeAlias, TypeVar, final
 
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
-from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, vector
+from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, matrix, vector
 from ephs.semantics.stage.kinds import Kind, group
 from ephs.semantics.stage.memory import Held
 
@@ -20,6 +19,7 @@ STORING, REVERSIBLE, IRREVERSIBLE, WORKING = 0, 1, 2, 3
 
 Whole = TypeVar("Whole")
 Numbers = TypeVar("Numbers")
+Rows = TypeVar("Rows")
 
 
 @final
@@ -190,9 +190,6 @@ class MemoryOf(Generic[Numbers]):
 Tables: TypeAlias = TablesOf[Index, Array]
 Order: TypeAlias = OrderOf[Index, Array]
 Memory: TypeAlias = MemoryOf[Array]
-Columns: TypeAlias = TablesOf[Integers, Vector]
-Elimination: TypeAlias = OrderOf[Integers, Vector]
-Scratch: TypeAlias = MemoryOf[Vector]
 
 
 def flat() -> Kind:
@@ -212,16 +209,15 @@ def parts_of(value: Any) -> dict[str, Any]:
     return {field.name: getattr(value, field.name) for field in fields(value)}
 
 
-def kind_of(cls: Any, numbers: Iterable[str] | None = None) -> Kind:
-    """The kind of argument that is all the arrays of a class, those of these names, or all, of real numbers."""
-    names = [field.name for field in fields(cls)]
-    reals = set(names if numbers is None else numbers)
-    return group(cls, **{name: vector() if name in reals else flat() for name in names})
+def kind_of(cls: Any) -> Kind:
+    """The kind of argument that is all the arrays of a class, by the variables of their types."""
+    kinds: dict[Any, Any] = {Whole: flat, Numbers: vector, Rows: matrix}
+    return group(cls, **{field.name: kinds[field.type]() for field in fields(cls)})
 
 
-TABLES: Final = kind_of(TablesOf, ("parameters", "intensive", "entropy", "template"))
-ORDER: Final = kind_of(OrderOf, ("floor", "tolerance"))
-MEMORY: Final = kind_of(MemoryOf)
+Columns: TypeAlias = Annotated[TablesOf[Integers, Vector], kind_of(TablesOf)]
+Elimination: TypeAlias = Annotated[OrderOf[Integers, Vector], kind_of(OrderOf)]
+Scratch: TypeAlias = Annotated[MemoryOf[Vector], kind_of(MemoryOf)]
 
 Row = TypeVar("Row", bound=Record)
 _NO_REALS: Final[Held[Any]] = Held([])

@@ -4,6 +4,7 @@ from functools import cache
 from typing import Final
 
 from ephs.semantics.descriptor.kernel_table import SIGNATURE
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -12,19 +13,14 @@ from ephs.semantics.stage import (
     Program,
     Real,
     Vector,
-    indices,
-    real,
     staged,
-    vector,
 )
 from ephs.semantics.stage.reaching import Reached
-from ephs.solve.methods.places import Part, add_to, copy, fill
+from ephs.solve.methods.places import Part, add_to
 from ephs.solve.methods.records import (
     COMPONENT,
     IRREVERSIBLE,
-    MEMORY,
     STORING,
-    TABLES,
     WORKING,
     Columns,
     Dims,
@@ -49,8 +45,8 @@ def evaluated(
     """
     fault = on.counter(0)
     copy(on, t.template, m.data)
-    fill(on, m.residual, 0.0)
-    fill(on, m.scale, 0.0)
+    clear(on, m.residual)
+    clear(on, m.scale)
 
     def component(i: Integer) -> None:
         def sound() -> None:
@@ -322,12 +318,7 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
 @cache
 def evaluation_program() -> Program:
     """Return the program of single evaluations."""
-    point = {"x": vector(), "z": vector(), "scal": vector(3), "inputs": vector()}
     return Program(
-        "evaluation",
-        evaluate=Entry(evaluated, t=TABLES, **point, m=MEMORY, weight=real()),
-        measure=Entry(measure, t=TABLES, z=vector(), dropped=indices(), m=MEMORY),
-        account=Entry(account, t=TABLES, z=vector(), h=real(), inputs=vector(), m=MEMORY, sums=vector()),
-        reach=Entry(reach, t=TABLES, m=MEMORY),
-        weigh=Entry(weigh, t=TABLES, m=MEMORY),
-    )
+        "evaluation", evaluate=Entry(evaluated), measure=Entry(measure), account=Entry(account), reach=Entry(reach),
+        weigh=Entry(weigh),
+    )  # fmt: skip

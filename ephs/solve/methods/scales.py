@@ -6,8 +6,9 @@ their own: then it is measured by what its neighbours could make of it.
 
 from typing import Final
 
+from ephs.semantics.linear.dense import clear
 from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
-from ephs.solve.methods.places import Part, fill, raise_to
+from ephs.solve.methods.places import Part, raise_to
 from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
 NOTHING = 1e-200
@@ -57,20 +58,37 @@ def reach(on: Evaluator, t: Columns, m: Scratch) -> None:
         raise_to(on, flow, t.row[entry] - n_rate, on.absolute(m.data[entry]) * whole[t.column[entry] - n_rate])
 
     on.loop(n_effort, begin)
-    fill(on, block, 0.0)
+    clear(on, block)
     on.loop(largest.size, gather)
     on.loop(t.constraining.size, size)
     on.loop(t.constraining.size, share)
     on.loop(t.balancing.size, carry)
 
 
+def rest(on: Evaluator, part: Part, h: Real, slopes: Vector, scale: Vector) -> None:
+    """Scale of a storage's efforts at rest: their change by the flows in a step of h, by entries of the matrix."""
+
+    def row(j: Integer) -> None:
+        def entry(q: Integer) -> None:
+            place = part.t.jacobian[part.j_at + j * part.n + q]
+
+            def there() -> None:
+                raise_to(on, scale, part.rate(j), h * on.absolute(slopes[place]) * scale[part.balance(q)])
+
+            on.when(place >= 0, there)
+
+        on.loop(part.n, entry)
+
+    on.loop(part.n, row)
+
+
 def still(on: Evaluator, t: Columns, z: Vector, m: Scratch) -> None:
-    """Scale of efforts at rest: their change by the flows in a step."""
+    """Scales of efforts, and of entropy production, at rest."""
 
     def component(i: Integer) -> None:
         part = Part.of(t, i)
         on.when(on.same(t.kind[i], IRREVERSIBLE), lambda: produced(part))
-        on.when(on.same(t.kind[i], STORING), lambda: stored(part))
+        on.when(on.same(t.kind[i], STORING), lambda: rest(on, part, 1.0, m.data, m.scale))
 
     def produced(part: Part) -> None:
         # nor has entropy production, the square of a rounding-sized rate: the possible power of the forces counts
@@ -94,23 +112,6 @@ def still(on: Evaluator, t: Columns, z: Vector, m: Scratch) -> None:
 
         on.loop(part.n, made)
         on.loop(part.n, heat)
-
-    def stored(part: Part) -> None:
-        n = part.n
-
-        def row(j: Integer) -> None:
-            rate = part.rate(j)
-
-            def entry(q: Integer) -> None:
-                place = t.jacobian[part.j_at + j * n + q]
-                on.when(
-                    place >= 0,
-                    lambda: raise_to(on, m.scale, rate, on.absolute(m.data[place]) * m.scale[part.balance(q)]),
-                )
-
-            on.loop(n, entry)
-
-        on.loop(n, row)
 
     on.loop(t.kind.size, component)
 
@@ -160,8 +161,8 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
 
     Not a number where a residual is none. The largest of the dropped ones goes into m.defect.
     """
-    fill(on, m.block, 0.0)
-    fill(on, m.group, 0.0)
+    clear(on, m.block)
+    clear(on, m.group)
     worst, defect, largest = on.variable(0.0), on.variable(0.0), on.variable(0.0)
 
     def gather(i: Integer) -> None:

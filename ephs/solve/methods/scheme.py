@@ -2,20 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Final, Generic, TypeAlias, TypeVar, final
+from typing import Annotated, Generic, TypeAlias, final
 
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
-from ephs.semantics.stage import Integers, Matrix, Record, Vector, integer, matrix, vector
-from ephs.semantics.stage.kinds import group
+from ephs.semantics.stage import Integers, Matrix, Record, Vector, integer
 from ephs.solve.methods.collocation import moments, values
-from ephs.solve.methods.records import flat
-
-Whole = TypeVar("Whole")
-Numbers = TypeVar("Numbers")
-Rows = TypeVar("Rows")
+from ephs.solve.methods.records import Numbers, Rows, Whole, kind_of
 
 
 @final
@@ -172,10 +167,5 @@ class StagesOf(Generic[Numbers, Rows]):
 
 Groups: TypeAlias = GroupsOf[Index, Array]
 Stages: TypeAlias = StagesOf[Array, Array]
-GroupColumns: TypeAlias = GroupsOf[Integers, Vector]
-StageScratch: TypeAlias = StagesOf[Vector, Matrix]
-_ROWS: Final = {"x", "v", "turn", "outer", "share", "residual", "scale", "data", "slope"}
-GROUPS: Final = group(GroupsOf, velocity=flat(), metric=vector(), node=flat(), entry=flat(), where=flat())
-STAGE_MEMORY: Final = group(
-    StagesOf, **{name: matrix() if name in _ROWS else vector() for name in StagesOf.__dataclass_fields__}
-)
+GroupColumns: TypeAlias = Annotated[GroupsOf[Integers, Vector], kind_of(GroupsOf)]
+StageScratch: TypeAlias = Annotated[StagesOf[Vector, Matrix], kind_of(StagesOf)]

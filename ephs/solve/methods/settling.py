@@ -15,13 +15,13 @@ from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.rank import TINY
-from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Table, Vector, real, table, vector
+from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Table, Vector
 from ephs.solve.errors import SolveError
 from ephs.solve.march.account import ROUNDING, Account, rounding, worth
 from ephs.solve.march.noted import Noted
 from ephs.solve.march.storing import Missing, Moved, store
 from ephs.solve.methods.places import Part
-from ephs.solve.methods.records import MEMORY, STORING, TABLES, Columns, Scratch, parts_of
+from ephs.solve.methods.records import STORING, Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, called
 from ephs.solve.model import Model
 
@@ -110,15 +110,7 @@ def settled(
 @cache
 def settling_program() -> Program:
     """Return the program of the correction."""
-    given: dict[str, Any] = {
-        "t": TABLES, "weights": vector(), "z": vector(), "scal": vector(3), "m": MEMORY, "account": table(Account)
-    }  # fmt: skip
-    numbers = ("states", "start", "along", "beside", "trial", "allowed", "free")
-    return Program(
-        "settling",
-        missed=Entry(missed, **given, states=vector(), work=real(), heat=real()),
-        settled=Entry(settled, **given, **dict.fromkeys(numbers, vector()), work=real(), heat=real()),
-    )
+    return Program("settling", missed=Entry(missed), settled=Entry(settled))
 
 
 @final

@@ -25,6 +25,24 @@ NARROW = 16
 Solver: TypeAlias = Callable[[Array], Array]
 
 
+def dense(whole: Any, fail: Callable[[int], SolveError]) -> Solver:
+    """Solve with a dense matrix, which is overwritten.
+
+    Raises
+    ------
+    SolveError
+        What ``fail`` makes of the number of an unknown, or −1: the matrix is singular, or holds numbers that are not
+        finite.
+    """
+    if not whole.size:
+        return lambda right: right  # LAPACK takes no empty matrix
+    factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
+    factors, pivots, info = factorise(whole, overwrite_a=True)
+    if info > 0 or not np.isfinite(factors).all():
+        raise fail(info - 1)
+    return lambda right: solve(factors, pivots, right)[0]
+
+
 @final
 class _Band:
     """Order of unknowns, and how many diagonals below and above the main one it leaves.
@@ -151,9 +169,9 @@ class Solvers:
             The matrix is singular, or holds numbers that are not finite.
         """
         if isinstance(matrix, np.ndarray):
-            return self._dense(matrix)
+            return dense(matrix, self._singular)
         if matrix.indptr.size - 1 <= DENSE:
-            return self._dense(matrix.toarray())
+            return dense(matrix.toarray(), self._singular)
         if self._band is None or not self._band.orders(matrix):
             self._band = _Band(matrix)
         if self._band.narrow:
@@ -162,15 +180,6 @@ class Solvers:
             return splu(matrix, **self._pivots).solve
         except RuntimeError as error:  # SuperLU's message for a singular matrix
             raise self._singular(-1) from error
-
-    def _dense(self, whole: Array) -> Solver:
-        if not whole.size:
-            return lambda right: right  # LAPACK takes no empty matrix
-        factorise, solve = get_lapack_funcs(("getrf", "getrs"), (whole,))
-        factors, pivots, info = factorise(whole, overwrite_a=True)
-        if info > 0 or not np.isfinite(factors).all():
-            raise self._singular(info - 1)
-        return lambda right: solve(factors, pivots, right)[0]
 
     def _singular(self, unknown: int) -> SolveError:
         return SolveError(Outcome.SINGULAR, "", self._name(unknown) if unknown >= 0 else "")

@@ -18,15 +18,17 @@ stages it is 4).
 
 from typing import Final
 
+from ephs.semantics.linear.dense import copy
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.spaces.vectors import apply, dot
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
-from ephs.solve.methods.corrections import bend, correct_joints, correct_storages, rest
+from ephs.solve.methods.corrections import bend, correct_joints, correct_storages
 from ephs.solve.methods.moves import retract, somewhere
-from ephs.solve.methods.places import copy
+from ephs.solve.methods.places import Part
 from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, row_of
 from ephs.solve.methods.residuals import evaluated
+from ephs.solve.methods.scales import rest
 from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
 
 LAST = 2e-16
@@ -141,7 +143,11 @@ def linearise(
             copy(on, m.residual, s.residual.row(i))
             copy(on, m.scale, s.scale.row(i))
             on.when(on.same(fresh, 1), derivatives)
-            on.when(on.same(fault.value, 0), lambda: rest(on, t, h, s.slope.row(i), s.scale.row(i)))
+            on.when(on.same(fault.value, 0), lambda: on.loop(t.kind.size, resting))
+
+        def resting(c: Integer) -> None:
+            part, size = Part.of(t, c), on.absolute(h)
+            on.when(on.same(t.kind[c], STORING), lambda: rest(on, part, size, s.slope.row(i), s.scale.row(i)))
 
         def derivatives() -> None:
             copy(on, m.data, s.data.row(i))

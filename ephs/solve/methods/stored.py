@@ -51,13 +51,3 @@ class Stored:
         if status:
             raise SolveError.of_component(status, self.model, component)
         return found.memory.energy.copy()
-
-
-def guessed_efforts(model: Model, x: Array) -> Array:
-    """`Stored.efforts` of a model at one place."""
-    return Stored(model).efforts(x)
-
-
-def stored_energies(model: Model, x: Array) -> Array:
-    """`Stored.energies` of a model at one place."""
-    return Stored(model).energies(x)

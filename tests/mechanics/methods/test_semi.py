@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.engine.drags import DRAGS, Drags, resisting
+from ephs.mechanics.tree.engine.drags import Drags, resisting
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.equations.equations import Equations
 from ephs.semantics.linear.dense import copy
-from ephs.semantics.stage import Program, group, real, vector
+from ephs.semantics.stage import Program, Real, Vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
@@ -52,7 +52,9 @@ def test_the_estimate_is_by_a_method_of_order_two():
     assert other @ EXPLICIT.sum(axis=1) ** 2 != pytest.approx(1.0 / 3.0, rel=1e-3)
 
 
-def probe(on, motion, drags, base, y, q, out, known, weight):
+def probe(
+    on, motion, drags: Drags, base: Vector, y: Vector, q: Vector, out: Vector, known: Vector, weight: Real,
+):  # fmt: skip
     status, _ = drags.observe(on, motion, base, y, q)
     copy(on, known, drags.reached)
     copy(on, drags.seen, out)
@@ -60,10 +62,7 @@ def probe(on, motion, drags, base, y, q, out, known, weight):
     return status
 
 
-KINDS = {
-    "drags": group(Drags, **DRAGS), **dict.fromkeys(("base", "y", "q", "out", "known"), vector()), "weight": real()
-}  # fmt: skip
-PROBES = {looped: Program("probe", probe=of_motion(probe, looped=looped, **KINDS)) for looped in (False, True)}
+PROBES = {looped: Program("probe", probe=of_motion(probe, looped=looped)) for looped in (False, True)}
 
 
 class Stage:

@@ -2,8 +2,9 @@
 
 import re
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from threading import Barrier
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from ephs.semantics.stage import (
     StageError,
     Table,
     Vector,
+    group,
     indices,
     integer,
     matrix,
@@ -245,6 +247,28 @@ def test_threads_that_compile_a_program_at_once_get_the_same_code():
 
     with ThreadPoolExecutor(4) as threads:
         assert len(set(threads.map(compiled, range(4)))) == 1
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """Numbers with weights, two columns."""
+
+    weights: Vector
+    numbers: Annotated[Matrix, 2]
+
+
+def test_annotations_say_the_kinds_of_arguments():
+    """The text is that of the function whose kinds are written out; a size that is given counts."""
+
+    def plain(on: Evaluator, whole: Weighed, k: Integer, scale: Real, found: Table[Link], out: Vector) -> None:
+        out[k] = scale * whole.weights[k] * whole.numbers[k, 1] + found[k].mass
+
+    kinds = {"whole": group(Weighed, weights=vector(), numbers=matrix(2)), "k": integer(), "scale": real()}
+    kinds |= {"found": table(Link), "out": vector()}
+    texts = [Program("one", run=entry).text() for entry in (Entry(plain), Entry(plain, **kinds))]
+    assert texts[0] == texts[1]
+    kinds["whole"] = group(Weighed, weights=vector(), numbers=matrix())
+    assert Program("one", run=Entry(plain, **kinds)).text() != texts[0]
 
 
 def test_arguments_are_bundled_into_one_thing():

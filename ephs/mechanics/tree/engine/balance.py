@@ -12,7 +12,7 @@ What is then still missing is left to what is attached, see `ephs.mechanics.tree
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Annotated, final
 
 from ephs.mechanics.tree.engine.attachment import attached_energy
 from ephs.mechanics.tree.engine.forces import strain
@@ -39,7 +39,7 @@ FARTHEST = 0.5
 
 
 @staged
-def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector, out: Vector) -> Integer:
+def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector, out: Annotated[Vector, 3]) -> Integer:
     """Write kinetic energy, all other energy that is not heat, and the sum of its terms' sizes in J to out (3,).
 
     Returns

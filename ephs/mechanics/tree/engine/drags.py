@@ -7,7 +7,7 @@ D are rates in an order with children first, each subtree in one piece: factors 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, final
+from typing import Annotated, Any, final
 
 import numpy as np
 
@@ -29,10 +29,7 @@ from ephs.semantics.stage import (
     Real,
     Truth,
     Vector,
-    indices,
-    matrix,
     staged,
-    vector,
 )
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.records import Motion
@@ -90,17 +87,17 @@ class Drags(Lagged):
     tip: Integers
     reach: Integers
     first: Integers
-    counts: Integers
+    counts: Annotated[Integers, 2]
     edge: Integers
     pair: Integers
     chain: Integers
-    resistance: Matrix
-    row: Matrix
-    joined: Matrix
-    axes: Matrix
-    column: Matrix
-    moved: Matrix
-    body: Matrix
+    resistance: Annotated[Matrix, 36]
+    row: Annotated[Matrix, 36]
+    joined: Annotated[Matrix, 36]
+    axes: Annotated[Matrix, 6]
+    column: Annotated[Matrix, 6]
+    moved: Annotated[Matrix, 6]
+    body: Annotated[Matrix, 10]
     mass: Matrix
     drag: Matrix
     speed: Vector
@@ -282,14 +279,3 @@ def memory_of(
     return {name: array.astype(np.int64) for name, array in whole.items()} | {
         name: np.zeros(shape) for name, shape in shapes.items()
     }
-
-
-DRAGS: Final[dict[str, Any]] = {
-    "scheme": matrix(), "again": indices(), "seen": vector(), "reached": vector(), "rate": indices(),
-    "row_of": indices(), "above": indices(), "owner": indices(), "tip": indices(), "reach": indices(),
-    "first": indices(), "counts": indices(2), "edge": indices(), "pair": indices(), "chain": indices(),
-    "resistance": matrix(36), "row": matrix(36), "joined": matrix(36), "axes": matrix(6), "column": matrix(6),
-    "moved": matrix(6), "body": matrix(10), "mass": matrix(), "drag": matrix(), "speed": vector(), "part": vector(),
-    "sign": vector(), "given": vector(), "led": indices(), "held": matrix(), "bent": matrix(), "among": matrix(),
-    "pulled": vector(),
-}  # fmt: skip

@@ -9,9 +9,9 @@ from ephs.mechanics.road.elimination import Closing
 from ephs.mechanics.tree.engine.drags import resisting
 from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, stiff_program
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.stage import Program, Record, Table
+from ephs.semantics.stage import Program, Record, Table, members
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import TOTALS, Account, Control
+from ephs.solve.march import Account, Control, Totals
 from ephs.solve.march.account import WORTH
 
 
@@ -50,7 +50,7 @@ class Engine:
         self._r, self._change = np.zeros(work["force"].size), np.zeros(work["force"].size)
         summed = size - self._r.size - work["still"].size
         self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
-        self.totals = {name: np.zeros(summed) for name in TOTALS} | {"start": self._start, "end": self._y}
+        self.totals = {name: np.zeros(summed) for name in members(Totals)} | {"start": self._start, "end": self._y}
         self._counted = 2 * self._r.size + work["entropy"].size
         self._account, self._allowed = Account.table(1), np.zeros(self._counted)
         self._stages: dict[int, tuple[dict[str, Array], Table[Control], Array, Array, Bound]] = {}

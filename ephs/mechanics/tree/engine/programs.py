@@ -5,10 +5,10 @@ from functools import cache
 from typing import Any
 
 from ephs.mechanics.tree.engine.balance import held, measure
-from ephs.mechanics.tree.engine.drags import DRAGS, Drags
+from ephs.mechanics.tree.engine.drags import Drags
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.shutting import close
-from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -18,18 +18,9 @@ from ephs.semantics.stage import (
     Real,
     Table,
     Vector,
-    group,
-    integer,
-    matrix,
-    real,
-    table,
-    vector,
+    kind_of,
 )
 from ephs.solve.march import (
-    MEMORY,
-    STIFF,
-    TABLEAU,
-    TOTALS,
     Account,
     Control,
     Memory,
@@ -42,12 +33,12 @@ from ephs.solve.march.account import worth
 from ephs.solve.march.lagged import end, stage
 from ephs.solve.march.steps import attempt, book
 
-_MOVING = {"tables": group(Tables, **TABLES), "work": group(Work, **WORK)}
+_MOVING: dict[str, Any] = {"tables": kind_of(Tables), "work": kind_of(Work)}
 """Kinds of a mechanism's arguments, which all entry functions have first."""
 
 
 def of_motion(function: Callable[..., Any], *, looped: bool, **kinds: Any) -> Entry:
-    """Return an entry function of a mechanism."""
+    """Return an entry function of a mechanism, which takes its tables and memory first."""
 
     def moving(tables: Tables, work: Work) -> Mechanism:
         return Mechanism(tables, work, looped)
@@ -120,41 +111,14 @@ def motion_program(*, looped: bool) -> Program:
 
         on.loop(repeats, lambda _: on.loop(q.rows, one))
 
-    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
-        return of_motion(function, looped=looped, **kinds)
-
-    tried = {"tableau": group(Tableau, **TABLEAU)}
-    entries = {
-        "march": entry(
-            marched, **tried, memory=group(Memory, **MEMORY), control=table(Control), account=table(Account),
-            steps=integer(),
-        ),
-        "stages": entry(
-            stages, **tried, control=table(Control), base=vector(), start=vector(), k=matrix(),
-            last=vector(),
-            y=vector(), q=vector(), h=real(),
-        ),
-        "rates": entry(rates, base=vector(), y=vector(), q=vector(), out=vector()),
-        "advance": entry(advance, base=vector(), v=vector(), q=vector()),
-        "velocities": entry(velocities, y=vector(), r=vector(), out=vector()),
-        "counted": entry(counted, before=vector(), after=vector()),
-        "summed": entry(
-            summed, tableau=tried["tableau"], k=matrix(), totals=group(Totals, **TOTALS), base=vector(), q=vector(),
-            h=real(), anchor=real(), part=integer(), damped=integer(),
-        ),
-        "corrected": entry(
-            corrected, account=table(Account), start=vector(), y=vector(), q=vector(), allowed=vector(), h=real(),
-            share=real(),
-        ),
-        "measured": entry(measure, q=vector(), r=vector()),
-        "energy": entry(held, q=vector(), r=vector(), heats=vector(), out=vector(3)),
-        "evaluations": entry(
-            evaluations, q=matrix(), r=matrix(), out=vector(), rates=matrix(), repeats=integer()
-        ),
+    functions = {
+        "march": marched, "stages": stages, "rates": rates, "advance": advance, "velocities": velocities,
+        "counted": counted, "summed": summed, "corrected": corrected, "measured": measure, "energy": held,
+        "evaluations": evaluations,
     }  # fmt: skip
     if looped:
-        entries["close"] = entry(close, q=vector(), r=vector())
-        entries["project"] = entry(project, q=vector(), change=vector())
+        functions |= {"close": close, "project": project}
+    entries = {name: of_motion(function, looped=looped) for name, function in functions.items()}
     return Program("motion_of_loops" if looped else "motion_of_trees", **entries)
 
 
@@ -168,13 +132,7 @@ def stiff_program() -> Program:
     ) -> Integer:  # fmt: skip
         return march(on, motion, tableau, memory, control[0], account[0], steps, stiff)
 
-    return Program(
-        "stiff_steps_of_trees",
-        march=of_motion(
-            marched, looped=False, tableau=group(Tableau, **TABLEAU), memory=group(Memory, **MEMORY),
-            control=table(Control), account=table(Account), stiff=group(Stiff, **STIFF), steps=integer(),
-        ),
-    )  # fmt: skip
+    return Program("stiff_steps_of_trees", march=of_motion(marched, looped=False))
 
 
 @cache
@@ -199,17 +157,9 @@ def lagged_program(*, looped: bool) -> Program:
         on.when(i < tableau.a.columns, one, lambda: end(on, motion, tableau, base, start, h, k, drags, y, q))
         return status.value
 
-    given = {"tableau": group(Tableau, **TABLEAU), "control": table(Control), "drags": group(Drags, **DRAGS)}
     return Program(
         "lagged_steps_of_loops" if looped else "lagged_steps_of_trees",
-        march=of_motion(
-            marched, looped=looped, tableau=given["tableau"], memory=group(Memory, **MEMORY),
-            control=given["control"], account=table(Account), drags=given["drags"], steps=integer(),
-        ),
-        stage=of_motion(
-            staged, looped=looped, tableau=given["tableau"], control=given["control"], base=vector(), start=vector(),
-            k=matrix(), drags=given["drags"], y=vector(), q=vector(), i=integer(), h=real(),
-        ),
+        march=of_motion(marched, looped=looped), stage=of_motion(staged, looped=looped),
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from ephs.mechanics.road.programs import Sweeps
 from ephs.mechanics.road.records import Tree
 from ephs.mechanics.road.tree import outward, spread
 from ephs.mechanics.tree.engine.forces import act
-from ephs.mechanics.tree.sweeps.acting import TABLES, WORK, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.expanding import ABOUT, About
 from ephs.semantics.linear.dense import cholesky, clear
 from ephs.semantics.stage import (
@@ -34,6 +34,7 @@ from ephs.semantics.stage import (
     Vector,
     integer,
     matrix,
+    members,
     vector,
 )
 
@@ -42,10 +43,10 @@ ACTIVE: Final = (
     "located", "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",
 )  # fmt: skip
 """Arguments that have derivatives, beside those that only one of the functions has."""
-MOVING: Final[dict[str, Any]] = {**TABLES, **WORK}
+MOVING: Final[dict[str, Any]] = {**members(Tables), **members(Work)}
 """Arguments that all functions have first."""
 _BUNDLES: Final[tuple[tuple[dict[str, Any], Callable[..., Any]], ...]] = (
-    (TABLES, Tables), (WORK, Work), (ABOUT, About)
+    (members(Tables), Tables), (members(Work), Work), (ABOUT, About)
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired_tables
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.stage import Evaluator, Integer, Program, Vector, vector
+from ephs.semantics.stage import Evaluator, Integer, Program, Vector
 from ephs.solve.sparse import Index
 
 Call = tuple[tuple[Index, Index], Index, Index, Index]
@@ -26,7 +26,7 @@ def rate_slopes() -> Program:
     def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
         return motion.rates(on, base, y, q, out)[0]
 
-    entry = of_motion(rates, looped=False, base=vector(), y=vector(), q=vector(), out=vector())
+    entry = of_motion(rates, looped=False)
     return Program(f"rates_of_trees_along_{DIRECTIONS}", rates=entry.tangent(directions=DIRECTIONS))
 
 

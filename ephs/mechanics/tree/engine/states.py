@@ -3,7 +3,7 @@
 Poses are quaternions that are continuous along the motion, and bodies are those of the system, not the engine's links.
 """
 
-from typing import Final
+from typing import Annotated, Final
 
 from ephs.semantics.descriptor.kernel_table import SIGNATURE
 from ephs.semantics.linear.dense import copy
@@ -21,13 +21,9 @@ from ephs.semantics.stage import (
     Table,
     Vector,
     function,
-    indices,
     integer,
     integers,
-    matrix,
     reals,
-    table,
-    vector,
 )
 
 POSE, MOMENTUM, ELEMENT, RELATIVE, ENTROPY = range(5)
@@ -187,7 +183,7 @@ def _relative(on: Evaluator, ends: Ends, poses: Matrix) -> list[Real]:
 
 def rows(
     on: Evaluator, bodies: Table[Walked], springs: Table[Ends], plan: Table[Source], q: Matrix, r: Matrix, s: Matrix,
-    poses: Matrix, twists: Matrix, x: Matrix,
+    poses: Annotated[Matrix, 7], twists: Annotated[Matrix, 6], x: Matrix,
 ) -> None:  # fmt: skip
     """Write the states x (rows, size) at rows of elements, rates and entropies; poses and twists are memory."""
 
@@ -267,15 +263,5 @@ def energies(
     return status.value
 
 
-STATES: Final = Program(
-    "states",
-    rows=Entry(
-        rows, bodies=table(Walked), springs=table(Ends), plan=table(Source), q=matrix(), r=matrix(), s=matrix(),
-        poses=matrix(7), twists=matrix(6), x=matrix(),
-    ),
-    energies=Entry(
-        energies, storages=table(Stored), reads=indices(), parameters=vector(), scal=vector(3), x=matrix(),
-        **dict.fromkeys(("x0", "v", "e", "lam", "f", "c", "jac", "work"), vector()), out=matrix(), fault=indices(1),
-    ),
-)  # fmt: skip
+STATES: Final = Program("states", rows=Entry(rows), energies=Entry(energies))
 """Program that makes the records of a run from its states, for all systems."""

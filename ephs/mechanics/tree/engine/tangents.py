@@ -18,7 +18,6 @@ from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.engine.tables import copied
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import (
-    Entry,
     Evaluator,
     Integer,
     Matrix,
@@ -27,14 +26,9 @@ from ephs.semantics.stage import (
     Record,
     Table,
     Vector,
-    group,
-    matrix,
-    real,
-    table,
-    vector,
 )
 from ephs.solve.heats import PLAIN
-from ephs.solve.march import TABLEAU, Account, Control, Tableau
+from ephs.solve.march import Account, Control, Tableau
 from ephs.solve.march.steps import attempt
 
 BEYOND: Final = 1e100
@@ -72,20 +66,9 @@ def step_program(*, looped: bool) -> Program:
     ) -> Integer:  # fmt: skip
         return _settled(on, motion, account[0], allowed, base, start, y, q, h)
 
-    def entry(function: Callable[..., Any], **kinds: Any) -> Entry:
-        return of_motion(function, looped=looped, **kinds)
-
-    balance: dict[str, Any] = {"account": table(Account), "allowed": vector()}
-    return Program(
-        "steps_of_loops" if looped else "steps_of_trees",
-        step=entry(
-            step, tableau=group(Tableau, **TABLEAU), control=table(Control), base=vector(), start=vector(),
-            k=matrix(), last=vector(), **balance, y=vector(), q=vector(), h=real(),
-        ),
-        rates=entry(rates, base=vector(), start=vector(), q=vector(), k=vector()),
-        settle=entry(settle, **balance, base=vector(), start=vector(), y=vector(), q=vector(), h=real()),
-        close=entry(_closed, y=vector(), q=vector()),
-    )  # fmt: skip
+    functions = {"step": step, "rates": rates, "settle": settle, "close": _closed}
+    entries = {name: of_motion(function, looped=looped) for name, function in functions.items()}
+    return Program("steps_of_loops" if looped else "steps_of_trees", **entries)
 
 
 def _settled(

@@ -1,7 +1,7 @@
 """Data of a mechanism's equations of motion: tables of records, addresses of its sweeps, memory of one evaluation."""
 
 from dataclasses import dataclass
-from typing import Any, Final, final
+from typing import Annotated, Any, final
 
 from ephs.mechanics.road import loops, programs
 from ephs.mechanics.road.charts import Chart
@@ -18,15 +18,11 @@ from ephs.semantics.stage import (
     Table,
     Vector,
     function,
-    indices,
     integer,
     integers,
-    matrix,
     real,
     reals,
     signature_of,
-    table,
-    vector,
 )
 
 ABOVE, BEYOND, APART, ALONG = 1, 2, 3, 4
@@ -247,7 +243,7 @@ class Tables:
     own: Table[Own]
     integers: Integers
     reals: Vector
-    gravity: Vector
+    gravity: Annotated[Vector, 3]
     chart: Table[Chart]
     cut: Integers
     cut_numbers: Vector
@@ -271,8 +267,8 @@ class Tables:
     net: Integers
     numbers: Vector
     drive: Vector
-    wrench: Matrix
-    scal: Vector
+    wrench: Annotated[Matrix, 6]
+    scal: Annotated[Vector, 3]
     supply: Vector
     lead: Vector
 
@@ -285,17 +281,6 @@ class Tables:
     def charts(self) -> Integers:
         """The integers of all charts."""
         return Integers(self.chart.integers, 0, self.chart.size * Chart.integer_width)
-
-
-TABLES: Final[dict[str, Any]] = {
-    "own": table(Own), "integers": indices(), "reals": vector(), "gravity": vector(3), "chart": table(Chart),
-    "cut": indices(), "cut_numbers": vector(), "at": indices(), "slot": indices(), "row": indices(), "flat": indices(),
-    "end": indices(), "acting": table(Acting), "group": table(Group), "middle": table(Middle), "body": table(Body),
-    "node": table(Node), "conduction": table(Conduction), "sink": table(Sink), "component": table(Component),
-    "parameters": vector(), "island": indices(), "bases": vector(), "port": table(Port), "net": indices(),
-    "numbers": vector(), "drive": vector(), "wrench": matrix(6), "scal": vector(3), "supply": vector(),
-    "lead": vector(),
-}  # fmt: skip
 
 
 @final
@@ -338,17 +323,17 @@ class Work:
     """
 
     work: Vector
-    pushed: Matrix
+    pushed: Annotated[Matrix, 6]
     force: Vector
     zero: Vector
     attached: Vector
     pulled: Vector
-    located: Matrix
-    relative: Matrix
-    value: Matrix
+    located: Annotated[Matrix, 6]
+    relative: Annotated[Matrix, Relative.real_width]
+    value: Annotated[Matrix, 4]
     entry: Vector
-    covector: Matrix
-    along: Matrix
+    covector: Annotated[Matrix, 6]
+    along: Annotated[Matrix, 12]
     largest: Vector
     temperature: Vector
     entropy: Vector
@@ -362,7 +347,7 @@ class Work:
     scratch: Vector
     alter: Vector
     moved: Vector
-    momenta: Matrix
+    momenta: Annotated[Matrix, 6]
     spin: Vector
     direction: Vector
     descent: Vector
@@ -370,27 +355,14 @@ class Work:
     released: Vector
     found: Vector
     torque: Vector
-    sums: Matrix
+    sums: Annotated[Matrix, SUMS]
     still: Vector
     idle: Vector
     spare: Vector
-    answer: Vector
-    fault: Integers
+    answer: Annotated[Vector, 1]
+    fault: Annotated[Integers, 1]
 
     def places(self, tables: Tables) -> Matrix:
         """Rows of links and the ground, which begin with `ephs.mechanics.road.records.Place`."""
         own = tables.own[0]
         return Matrix(self.work.cells, self.work.start, own.links + 1, own.width)
-
-
-WORK: Final[dict[str, Any]] = {
-    "work": vector(), "pushed": matrix(6), "force": vector(),
-    "zero": vector(), "attached": vector(), "pulled": vector(), "located": matrix(6),
-    "relative": matrix(Relative.real_width), "value": matrix(4), "entry": vector(), "covector": matrix(6),
-    "along": matrix(12), "largest": vector(), "temperature": vector(), "entropy": vector(), "x": vector(),
-    "v": vector(), "e": vector(), "lam": vector(), "f": vector(), "c": vector(), "jac": vector(),
-    "scratch": vector(), "alter": vector(), "moved": vector(),
-    "momenta": matrix(6), "spin": vector(), "direction": vector(), "descent": vector(), "kept": vector(),
-    "released": vector(), "found": vector(), "torque": vector(), "sums": matrix(SUMS), "still": vector(),
-    "idle": vector(), "spare": vector(), "answer": vector(1), "fault": indices(1),
-}  # fmt: skip

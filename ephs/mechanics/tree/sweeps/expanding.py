@@ -7,7 +7,7 @@ first order, which is all that equations over dual numbers need there.
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import prod
-from typing import Any, Final, final
+from typing import Annotated, Any, Final, final
 
 from ephs.mechanics.tree.sweeps.acting import Work
 from ephs.mechanics.tree.sweeps.balances import slopes_of
@@ -22,11 +22,9 @@ from ephs.semantics.stage import (
     Record,
     Table,
     Vector,
-    matrix,
+    members,
     real,
     reals,
-    table,
-    vector,
 )
 
 
@@ -75,7 +73,7 @@ class About:
     flow: Vector
     slope: Matrix
     increment: Vector
-    local: Vector
+    local: Annotated[Vector, 7]
     off: Vector
     changed: Vector
 
@@ -174,7 +172,4 @@ def _put(vector: Vector, k: Integer, value: Real) -> None:
     vector[k] = value
 
 
-ABOUT: Final[dict[str, Any]] = {
-    "expansion": table(Expansion), "met": vector(), "flow": vector(), "slope": matrix(), "increment": vector(),
-    "local": vector(7), "off": vector(), "changed": vector(),
-}  # fmt: skip
+ABOUT: Final = members(About)
