@@ -215,8 +215,8 @@ USES: dict[str, tuple[Callable[..., None], st.SearchStrategy[Any]]] = {
 
 REACHING = {
     "motion_of_loops", "motion_of_trees", "stiff_steps_of_trees", "network", "natural", "natural_along",
-    "natural_of_3_stages", "evaluation", "integral", "outputs", "rates_of_trees_along_4", "settling", "point",
-    "lagged_steps_of_trees",
+    "natural_of_3_stages", "evaluation", "integral", "outputs", "rates_of_loops_along_4", "rates_of_trees_along_4",
+    "settling", "point", "lagged_steps_of_trees",
 }  # fmt: skip
 """Programs that call others by address: the emulator of arm64 has no others, so their bits there are not known."""
 

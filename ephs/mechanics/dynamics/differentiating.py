@@ -17,7 +17,7 @@ Slopes = tuple[Array, Array, Array]
 def forward_slopes(linear: Linearised, q: Array, r: Array, s: Array) -> Slopes:
     """Accelerations and their derivatives under the present inputs."""
     a = linear.forward(q, r, s)[: linear.equations.n]
-    return a, linear.columns(solve=True, fit=True), linear.mobility()
+    return a, linear.columns(solve=True), linear.mobility()
 
 
 def derivatives_of(linear: Linearised, under: Slopes, q: Array, r: Array, s: Array, given: Array | None) -> Derivatives:
@@ -25,7 +25,7 @@ def derivatives_of(linear: Linearised, under: Slopes, q: Array, r: Array, s: Arr
     n, nv = linear.equations.n, linear.equations.nv
     a, forward, by_force = under
     linear.inverse(q, r, s, a if given is None else given)
-    inverse = linear.columns(solve=False, fit=True)[:n]
+    inverse = linear.columns(solve=False)[:n]
     at_q, at_r, at_s = slice(0, n), slice(nv, nv + n), slice(nv + n, None)
     return Derivatives(
         forward[:n, at_q], forward[:n, at_r], by_force, forward[:n, at_s],

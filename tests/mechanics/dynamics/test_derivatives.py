@@ -214,9 +214,9 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
     n = equations.n
     assume(n and not model.cut and not equations.driven.size)
     a = linear.forward(q, r, s)
-    forward = linear.columns(solve=True, fit=True)
+    forward = linear.columns(solve=True)
     linear.inverse(q, r, s, a)
-    inverse, mass = linear.columns(solve=False, fit=True), equations.mass(q, r)
+    inverse, mass = linear.columns(solve=False), equations.mass(q, r)
     assert np.array_equal(forward[n:], inverse[n:])
     size = max(1.0, np.abs(inverse).max(), np.abs(mass).max() * np.abs(forward[:n]).max())
     assert np.abs(mass @ forward[:n] + inverse[:n]).max() <= 10 * np.finfo(float).eps * np.linalg.cond(mass) * size

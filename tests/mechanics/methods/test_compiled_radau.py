@@ -12,6 +12,7 @@ from ephs.mechanics.methods.radau import Implicit
 from ephs.mechanics.methods.stages import Kept, scheme_of
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.solve.control import Control, Tolerance
 from tests.mechanics.ball import BALL
 from tests.written import scene_of_text
@@ -131,9 +132,13 @@ def test_the_matrix_of_compiled_rates_is_that_of_the_residual(scene, monkeypatch
     at, seen = Jacobian.at, []
 
     def both(self, state, *, renew=False):
+        found = at(self, state, renew=renew)
         if renew:
-            seen.append((self._of_rates(state), self._dense(state)))
-        return at(self, state, renew=renew)
+            eq, linear = self.equations, Linearised(self.equations)
+            linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
+            moving = eq.nv + eq.n
+            seen.append((found[eq.nv : moving, :moving].copy(), linear.columns(solve=True)[: eq.n, :moving]))
+        return found
 
     monkeypatch.setattr(Jacobian, "at", both)
     ephs.simulate(scene, 0.3, rtol=1e-3, **ASKED)

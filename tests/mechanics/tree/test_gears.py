@@ -143,7 +143,7 @@ def test_changes_of_geared_motion_are_those_of_the_equations():
         return eq.dense.rate.copy()
 
     linear.forward(state.q, r, s)
-    exact, middle = linear.columns(solve=True, fit=False)[: eq.n], np.concatenate([np.zeros(eq.nv), r])
+    exact, middle = linear.columns(solve=True)[: eq.n], np.concatenate([np.zeros(eq.nv), r])
     for j in range(middle.size):
         step = 1e-5 * np.eye(middle.size)[j]
         near = (rates(middle + step) - rates(middle - step)) / 2e-5

@@ -1,11 +1,12 @@
 """The network attached to a mechanism, as the arrays of `ephs.mechanics.tree.sweeps.network.Net`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ephs.mechanics.tree.engine.tables import copied
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS, Called, Net, Stores
 from ephs.semantics.bundles.bundle import Array
@@ -36,8 +37,8 @@ class Attachment:
         return self.integers[at : at + size]
 
 
-def attachment_of(reduced: "Reduced", address: Index) -> Attachment:
-    """The arrays of a mechanism's network, its components' relations at addresses (components,)."""
+def attachment_of(reduced: "Reduced") -> Attachment:
+    """The arrays of a mechanism's network, with its components' relations at rest."""
     t, there = reduced.tables, reduced.attaching
     net = there.network
     size, nodes = net.skew.shape[0], len(reduced.entropies) - len(net.states)
@@ -47,10 +48,10 @@ def attachment_of(reduced: "Reduced", address: Index) -> Attachment:
     stores: list[list[int]] = []
     for component, first in net.storages:
         n = int(t.dims[component, 0])
-        stores.append([*_head(reduced, address, component), first, net.state_at + first, kept])
+        stores.append([*_head(reduced, component), first, net.state_at + first, kept])
         kept += n * n
     for one, read, vary, flows in zip(net.attached, there.reads, there.varies, there.flows, strict=True):
-        called.append([*_head(reduced, address, one.component), len(rows), len(reads), len(varies), kept])
+        called.append([*_head(reduced, one.component), len(rows), len(reads), len(varies), kept])
         reads += read.tolist()
         varies += vary.tolist()
         n, k, nv, _ = t.dims[one.component].tolist()
@@ -100,9 +101,9 @@ def _places(parts: Sequence[Array | Index], first: int) -> Index:
     return np.column_stack([first + starts(size), size]).ravel()
 
 
-def _head(reduced: "Reduced", address: Index, component: int) -> list[int]:
+def _head(reduced: "Reduced", component: int) -> list[int]:
     t = reduced.tables
-    return [int(address[component]), *t.dims[component].tolist(), int(t.parameter_at[component]), component]
+    return [int(t.resting[component]), *t.dims[component].tolist(), int(t.parameter_at[component]), component]
 
 
 def _sparse(row: Array) -> tuple[Index, Array]:
@@ -118,3 +119,15 @@ def laws_in(integers: Index) -> list[tuple[int, int]]:
         rows = range(at, at + size, record.integer_width)
         found += [(row + record.law.offset, int(integers[row + record.component.offset])) for row in rows]
     return found
+
+
+def with_derivatives(tables: Mapping[str, Any], address: Index) -> dict[str, Any]:
+    """Tables with relations of components at addresses (components,), which may give derivatives, and with memory of
+    the network apart.
+    """
+    component, net = copied(tables["component"]), tables["net"].copy()
+    for number, law in enumerate(address.tolist()):
+        component[number].law = law
+    for place, number in laws_in(net):
+        net[place] = address[number]
+    return {**tables, "component": component, "net": net, "numbers": tables["numbers"].copy()}

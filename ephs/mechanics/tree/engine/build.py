@@ -13,7 +13,7 @@ from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.pack import STANDARD, Packed
 from ephs.mechanics.road.programs import sweeps
 from ephs.mechanics.road.rigid import SUMS
-from ephs.mechanics.tree.engine.attachment import Attachment, attachment_of
+from ephs.mechanics.tree.engine.attachment import Attachment, attachment_of, with_derivatives
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.islands import islands_of
 from ephs.mechanics.tree.engine.links import Frames, links_of
@@ -113,7 +113,7 @@ def _plan(
     cut, cut_numbers, ends = _cut(reduced, bodies, ground, kept)
     charts = _chart(reduced, cut)
     forces = _forces(reduced, bodies, ground, cut, acted)
-    net = attachment_of(reduced, reduced.tables.resting)
+    net = attachment_of(reduced)
     attached = reduced.attaching.network.acts
     forced = bool(forces.edge.size or forces.conduction.size or np.any(forces.body != -1) or attached)
     driven = any(part.joint.driven for part in found.parts)
@@ -169,14 +169,14 @@ def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
     charts, size = _chart(reduced, cut), 2 * int(cut[:, 8].sum())
     joints = frozenset(i for i in range(len(reduced.edges)) if t.kind[i] != SPRING)
     forces = _forces(reduced, found.bodies, found.ground, cut, (joints, frozenset(range(reduced.links))))
-    net, none = attachment_of(reduced, t.address), np.zeros(0, dtype=np.int64)
+    net, none = attachment_of(reduced), np.zeros(0, dtype=np.int64)
     attached = reduced.attaching.network.acts
     reached = {"attach": (network_program(), "solve")} if attached else {}
     whole = Closing(none, none, np.arange(size), none, none, 0, 0)
     own = _own((len(parts), 0, 0), reached, forced=True, driven=False, attached=attached)
     links = {"own": own, "island": none, "bases": np.zeros(0), **_links(records)}
     tables = {**links, **_joints(charts, cut, cut_numbers, whole), **forces.tables(), **_attached(net)}
-    tables["component"] = forces.component
+    tables = with_derivatives(tables, t.address)
     booked = len(reduced.entropies), len(reduced.entropies) + 2 + len(reduced.made)
     shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[sorted(joints)].sum()), len(cut), booked, whole)
     shapes["located"] = tables["middle"].size, 6
@@ -382,14 +382,13 @@ def _forces(
         conduction=t.conduction,
         sink=t.sink,
         port=np.array([port[int(place)] for place in reduced.attaching.ports], dtype=np.int64).reshape(-1, 3),
-        component=_components(t, t.address),
-        resting=_components(t, t.resting),
+        component=_components(t),
         parameters=t.parameters,
     )
 
 
-def _components(t: Mechanism, address: Index) -> Table[Component]:
-    """Components whose relations are at addresses."""
-    none = np.zeros_like(address[:, None])
-    rows = np.hstack([address[:, None], t.dims, t.parameter_at[: len(address), None], t.made_at[:, None], none])
+def _components(t: Mechanism) -> Table[Component]:
+    """Components with their relations at rest."""
+    none = np.zeros_like(t.resting[:, None])
+    rows = np.hstack([t.resting[:, None], t.dims, t.parameter_at[: len(t.resting), None], t.made_at[:, None], none])
     return table_of(Component, rows)

@@ -10,6 +10,7 @@ from ephs.mechanics.tree.engine.forces import act
 from ephs.mechanics.tree.engine.heats import absorb, count, entropies, heat_rates, hold, lawless, warm
 from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.semantics.linear.dense import clear, subtract
 from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
@@ -32,11 +33,15 @@ class Mechanism(Motion):
         Its tables, and memory.
     looped
         Whether loops are closed, or joints have prescribed motions in them; known while staging.
+    kept, read
+        As in `act`: receives what acts; is read in its place.
     """
 
     tables: Tables
     work: Work
     looped: bool
+    kept: About | None = None
+    read: About | None = None
 
     @property
     def increments(self) -> Integer:
@@ -150,7 +155,7 @@ class Mechanism(Motion):
             clear(on, w.force)
 
             def forced() -> None:
-                status.value = act(on, self.tables, w, q, r, s_rate, made, totals, None, None, drags)
+                status.value = act(on, self.tables, w, q, r, s_rate, made, totals, self.kept, self.read, drags)
 
             def inward() -> None:
                 status.value = self.fold(on, w.force, w.pushed)

@@ -1,67 +1,106 @@
-"""Derivatives of a mechanism's rates by its state: the rates over dual numbers, several directions a call."""
+"""Derivatives of a mechanism's rates by its state: the rates over dual numbers, several directions a call.
 
-from collections.abc import Callable, Sequence
+What acts is evaluated once, with derivatives, and is then read to first order: components need no dual numbers.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
-from typing import final
+from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
 
 from ephs.mechanics.tree.engine.apart import Column
+from ephs.mechanics.tree.engine.attachment import with_derivatives
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
-from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired_tables
+from ephs.mechanics.tree.engine.tables import copied
+from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired
+from ephs.mechanics.tree.sweeps.expanding import ABOUT, About, memory_about
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.stage import Evaluator, Integer, Program, Vector
+from ephs.semantics.stage import Evaluator, Integer, Program, Vector, group
 from ephs.solve.sparse import Index
 
+if TYPE_CHECKING:
+    from ephs.mechanics.tree.finding.mechanism import Reduced
+
+SWEPT: Final = ("accelerations", "move", "fold", "dependent", "unfold", "power", "rows", "advance", "velocities")
+"""Functions of a mechanism's class that its rates call, beside what acts."""
 Call = tuple[tuple[Index, Index], Index, Index, Index]
 """Places of the seeds of one call, and rows, columns and directions of its derivatives."""
 
 
 @cache
-def rate_slopes() -> Program:
-    """Return the program of the rates of trees over dual numbers."""
+def rate_slopes(*, looped: bool) -> Program:
+    """Return the program of the rates that keep what acts about a state, and of those over dual numbers there."""
 
-    def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
-        return motion.rates(on, base, y, q, out)[0]
+    def keep(
+        on: Evaluator, motion: Mechanism, about: About, base: Vector, y: Vector, q: Vector, out: Vector
+    ) -> Integer:
+        return replace(motion, kept=about).rates(on, base, y, q, out)[0]
 
-    entry = of_motion(rates, looped=False)
-    return Program(f"rates_of_trees_along_{DIRECTIONS}", rates=entry.tangent(directions=DIRECTIONS))
+    def rates(
+        on: Evaluator, motion: Mechanism, about: About, base: Vector, y: Vector, q: Vector, out: Vector
+    ) -> Integer:
+        moved = replace(about, increment=y.part(0, motion.increments))
+        return replace(motion, read=moved).rates(on, base, y, q, out)[0]
+
+    about = group(About, **ABOUT)
+    return Program(
+        f"rates_of_{'loops' if looped else 'trees'}_along_{DIRECTIONS}",
+        keep=of_motion(keep, looped=looped, about=about),
+        rates=of_motion(rates, looped=looped, about=about).tangent(directions=DIRECTIONS),
+    )
+
+
+def rate_slopes_of_loops() -> Program:
+    """Return the program with loops."""
+    return rate_slopes(looped=True)
+
+
+def rate_slopes_of_trees() -> Program:
+    """Return the program without loops."""
+    return rate_slopes(looped=False)
 
 
 @final
 class RateSlopes:
-    """Derivatives of the rates of one tree.
+    """Derivatives of the rates of one mechanism; it keeps memory.
 
     Parameters
     ----------
     engine
         Its equations, whose tables are read where they are.
-    relation
-        Called with the number of a component; returns the program and the entry that it is in machine code.
     calls
         What is asked for, by `calls_of`; all other derivatives are 0.
     size
         How many numbers of y have rates of interest: the first ones.
+
+    Attributes
+    ----------
+    engine
+        As given.
     """
 
-    def __init__(
-        self,
-        engine: Engine,
-        relation: Callable[[int], tuple[Program, str]],
-        calls: Sequence[Call],
-        size: int,
-    ) -> None:
+    def __init__(self, engine: Engine, reduced: "Reduced", calls: Sequence[Call], size: int) -> None:
         coordinates, whole = engine.sizes
-        self._q, self._y, self._out = (np.zeros(count) for count in (coordinates, whole, whole))
+        self.engine, self._size, self._calls = engine, size, calls
+        self._base, self._y, self._out = (np.zeros(count) for count in (coordinates, whole, whole))
         self._seed, self._slope = np.zeros((2, whole, DIRECTIONS))
-        self._size = size
-        self._calls = calls
+        tables = with_derivatives(engine.tables, reduced.tables.address)
+        work = {name: array.copy() for name, array in engine.work.items()}
+        work |= {"e": np.zeros(64), "jac": np.zeros(1024), "scratch": np.zeros(4096)}
+        self._fault = work["fault"]
+        net, q = reduced.attaching.network, np.zeros(coordinates)
+        about = memory_about(len(reduced.tables.dims), net.known, len(reduced.attaching.bent))
+        about["increment"] = np.zeros(engine.work["still"].size)
+        found = rate_slopes(looped=engine.looped).compiled()
+        self._keep = found["keep"].bind(tables, work, about, self._base, self._y, q, self._out)
+        tables["own"] = _tangents(engine)
         still, moved = np.zeros((coordinates, DIRECTIONS)), np.zeros((coordinates, DIRECTIONS))
-        tables, work = paired_tables(engine, relation)
-        self._run = rate_slopes().compiled()["rates"].bind(
-            tables, work, (self._q, still), (self._y, self._seed), (np.zeros(coordinates), moved),
+        self._run = found["rates"].bind(
+            paired(tables), paired(work), paired(about), (self._base, still), (self._y, self._seed), (q, moved),
             (self._out, self._slope),
         )  # fmt: skip
 
@@ -70,18 +109,41 @@ class RateSlopes:
         """Number of calls for one matrix."""
         return len(self._calls)
 
+    @property
+    def failed(self) -> int:
+        """Number of the component or degree of freedom at which the evaluation failed last."""
+        return int(self._fault[0])
+
     def at(self, q: Array, y: Array) -> tuple[int, Array]:
-        """A status, and ∂ẏ/∂y (size, size) where joints' elements are q·exp(v)."""
-        self._q[:], self._y[:] = q, y
-        found = np.zeros((self._size, self._size))
+        """A status, and ∂ẏ/∂y (size, size) where joints' elements are q·exp(v), at v = 0."""
+        self._base[:], self._y[:] = q, y
+        found, status = np.zeros((self._size, self._size)), int(self._keep())
         for seeds, rows, columns, along in self._calls:
-            self._seed[seeds] = 1.0
-            status = int(self._run())
-            self._seed[seeds] = 0.0
-            if status:
-                return status, found
-            found[rows, columns] = self._slope[rows, along]
-        return 0, found
+            if not status:
+                self._seed[seeds] = 1.0
+                status = int(self._run())
+                self._seed[seeds] = 0.0
+                found[rows, columns] = self._slope[rows, along]
+        return status, found
+
+
+def _tangents(engine: Engine) -> Any:
+    """The addresses of the tangents of all that the rates call but what acts."""
+    own = copied(engine.tables["own"])
+    for name, (program, entry) in engine.reached.items():
+        if entry in SWEPT:
+            setattr(own[0], name, _swept(program).compiled()[entry].address)
+    return own
+
+
+@cache
+def _swept(program: Program) -> Program:
+    """The tangents of a program's functions that the rates call."""
+    chosen = {name: entry for name, entry in program.entries.items() if name in SWEPT}
+    return Program(
+        f"{program.name}_along_{DIRECTIONS}",
+        **{name: entry.tangent(directions=DIRECTIONS) for name, entry in chosen.items()},
+    )
 
 
 def calls_of(wanted: Sequence[Sequence[Column]]) -> list[Call]:

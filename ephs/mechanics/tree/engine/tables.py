@@ -39,8 +39,7 @@ class Forces(NamedTuple):
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (sinks, 4): see `ephs.mechanics.tree.sweeps.acting.Sink`
     port: Index  # (rates, 3): place of the freedom, edge, freedom in it
-    component: Table[Component]  # with their relations over a step
-    resting: Table[Component]  # with those at rest, without derivatives
+    component: Table[Component]  # with their relations at rest, without derivatives
     parameters: Array
 
     def tables(self) -> dict[str, Any]:
@@ -61,7 +60,7 @@ class Forces(NamedTuple):
             "conduction": table_of(Conduction, self.conduction),
             "sink": table_of(Sink, self.sink),
             "port": table_of(Port, self.port),
-            "component": self.resting,
+            "component": self.component,
             "parameters": self.parameters,
         }
 

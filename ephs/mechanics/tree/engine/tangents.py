@@ -147,9 +147,9 @@ class StepTangent:
         self._tangents = partial(reaching, engine, relation, lambda program: program.tangent(DIRECTIONS))
         self._looped = engine.looped
         self.given: dict[str, Any] = {
-            "tables": _all_paired(engine.tables, self.slopes),
-            "work": _all_paired(engine.work, {}),
-            "tableau": _all_paired(tableau, {}),
+            "tables": paired(engine.tables, self.slopes),
+            "work": paired(engine.work),
+            "tableau": paired(tableau),
         }
         arguments = self.given
         shapes: dict[str, tuple[int, ...]] = {
@@ -209,17 +209,10 @@ def step_tangents(looped: bool) -> Program:
     )
 
 
-def paired_tables(
-    engine: Engine, relation: Callable[[int], tuple[Program, str]]
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return an engine's tables and memory with slopes, which call tangents."""
-    tables = {**engine.tables, **reaching(engine, relation, lambda program: program.tangent(DIRECTIONS))}
-    return _all_paired(tables, {}), _all_paired(engine.work, {})
-
-
-def _all_paired(values: Mapping[str, Any], kept: dict[str, Array]) -> dict[str, Any]:
-    """Return arguments with memory for their slopes."""
-    return {name: _paired(value, kept, name) for name, value in values.items()}
+def paired(values: Mapping[str, Any], kept: dict[str, Array] | None = None) -> dict[str, Any]:
+    """Return arguments with memory for their slopes, which may be kept by their names."""
+    slopes = {} if kept is None else kept
+    return {name: _paired(value, slopes, name) for name, value in values.items()}
 
 
 def _pair(array: Array) -> tuple[Array, Array]:

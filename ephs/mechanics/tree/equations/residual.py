@@ -14,7 +14,7 @@ from ephs.mechanics.tree.engine.residuals import MOVING, point_program, residual
 from ephs.mechanics.tree.equations.slopes import Slopes
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
-from ephs.mechanics.tree.sweeps.expanding import Expansion
+from ephs.mechanics.tree.sweeps.expanding import memory_about
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rank import REGULAR, TINY
@@ -71,16 +71,14 @@ class Residual:
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
         self.entropy_rates = slice(self.cut_changes.stop, self.cut_changes.stop + self.ns)
         n, m, q, net = self.n, self.m, np.zeros(reduced.coordinates), reduced.attaching.network
-        read = net.known + len(reduced.attaching.bent)
         self.made, self._totals = np.zeros(len(reduced.made)), np.zeros(2)
         self.arrays: dict[str, Any] = {
             **whole.tables, **{name: np.zeros(shape) for name, shape in whole.shapes.items()},
             "work": np.zeros((records.size + 1) * self.program.width), "fault": np.zeros(1, dtype=np.int64),
             "drive": np.zeros(self.nv), "wrench": np.zeros((reduced.links, 6)), "scal": scal, "supply": supply,
-            "lead": np.zeros(n), "expansion": Expansion.table(t.dims.shape[0]), "met": np.zeros(read),
-            "flow": np.zeros(net.known), "slope": np.zeros((net.known, read)), "increment": np.zeros(self.nv),
-            "local": np.zeros(7), "off": np.zeros(read), "changed": np.zeros(net.known), "base": q, "q": q.copy(),
-            "r": np.zeros(n), "a": np.zeros(n), "multiplier": np.zeros(m), "unit": np.zeros(n),
+            "lead": np.zeros(n), **memory_about(t.dims.shape[0], net.known, len(reduced.attaching.bent)),
+            "increment": np.zeros(self.nv), "base": q, "q": q.copy(), "r": np.zeros(n),
+            "a": np.zeros(n), "multiplier": np.zeros(m), "unit": np.zeros(n),
             "mass": np.zeros((n, n)), "factor": np.zeros((n, n)), "jacobian": np.zeros((m + driven, n)),
             "terms": np.zeros(m + driven), "rows": np.zeros((n, 6)), "made": self.made, "totals": self._totals,
         }  # fmt: skip

@@ -50,26 +50,21 @@ class Linearised:
         eq.refuse(*found.about(q, r, s, eq.drive, eq.wrench))
         return found.at(a, np.zeros(found.m))[found.forces].copy()
 
-    def columns(self, *, solve: bool, fit: bool) -> Array:
+    def columns(self, *, solve: bool) -> Array:
         """(nv + ns, nv + n + ns) the derivatives where `forward` (with ``solve``) or `inverse` was called last.
 
         Columns are changes of the elements of tree and cut joints, left-trivialised, of the tree's rates, of entropies;
-        rows are the tree's accelerations (or forces), the cut joints' rates, ṡ.
-
-        Parameters
-        ----------
-        fit
-            Cut joints' elements follow the tree's; else they change on their own.
+        rows are the tree's accelerations (or forces), the cut joints' rates, ṡ. Cut joints' elements follow the tree's;
+        their own columns are zero.
         """
         found = self._residual
         n, nv, ns = found.n, found.nv, found.ns
         wanted = np.setdiff1d(np.arange(nv + n + ns), self._known)
         slopes = np.zeros((found.out.size, nv + n + ns))
         slopes[:, wanted] = self._slopes.along("residual", ("increment", "r", "entropy"), wanted)
-        if fit:
-            slopes[:, :n] += slopes[:, n:nv] @ slopes[found.cut_rates, nv : nv + n]
-            slopes[:, n:nv] = 0.0
-            slopes[:, self._known] = 0.0
+        slopes[:, :n] += slopes[:, n:nv] @ slopes[found.cut_rates, nv : nv + n]
+        slopes[:, n:nv] = 0.0
+        slopes[:, self._known] = 0.0
         forces = slopes[found.forces]
         if solve:
             forces = self._dense.solved(-forces, self._rows(slopes))
@@ -109,13 +104,6 @@ class Linearised:
         kept = np.concatenate([slopes[:, :n], slopes[:, nv:]], axis=1)
         return kept[:n], kept[n : 2 * n]
 
-    def pushed(self, drive: Array, wrench: Array) -> Array:
-        """(n, k) the changes of the tree's accelerations under further forces (nv, k) on all joints and wrenches
-        (links, 6, k) on the links, after `forward`."""
-        found = self._residual
-        slopes = self._slopes.of("residual", {"drive": drive, "wrench": wrench}, drive.shape[-1])
-        return self._dense.solved(-slopes[found.forces], self._rows(slopes))
-
     def turning(self, q: Array, r: Array) -> tuple[Array, Array, Array]:
         """((m, n), (nv − n, n), (links + 1, 6, n)) derivatives by the tree's elements, at fixed rates r, of what the
         rates make: of all rows, of cut joints' rates, of links' twists in their frames. Cut joints' elements follow the
@@ -143,11 +131,6 @@ class Linearised:
     def cut_rates(self) -> Array:
         """(nv − n,) the rates of cut joints where `forward` or `inverse` was called last."""
         return self._residual.cut_twists()
-
-    @property
-    def entropy_rates(self) -> Array:
-        """(entropies,) ṡ in J/(K s) where `forward` or `inverse` was called last."""
-        return self._residual.out[self._residual.entropy_rates].copy()
 
     def targets(self, q: Array, r: Array, s: Array) -> tuple[Array, int]:
         """(m,) what the constraints' rows on the accelerations are to be, −(d rows/dt)·r; and the rows' rank."""

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from math import prod
 from typing import Annotated, Any, Final, final
 
+import numpy as np
+
 from ephs.mechanics.tree.sweeps.acting import Work
 from ephs.mechanics.tree.sweeps.balances import slopes_of
 from ephs.mechanics.tree.sweeps.network import Net
@@ -152,6 +154,23 @@ class About:
         on.loop(head[2], lambda k: put(head[0] + (head[1] + k), net.given[k]))
         on.loop(head[3], lambda k: put(net.first_state + k, work.entropy[head[5] + k]))
         on.loop(net.bent.size, lambda k: put(net.known + k, self.increment[net.bent[k]]))
+
+
+def memory_about(components: int, known: int, bent: int) -> dict[str, Any]:
+    """Memory of a point by the names of `About`, but for increments.
+
+    Parameters
+    ----------
+    components
+        How many components the system has.
+    known, bent
+        How many efforts of what is attached are known, and how many degrees of freedom it reads.
+    """
+    shapes = {
+        "met": (known + bent,), "flow": (known,), "slope": (known, known + bent), "local": (7,), "off": (known + bent,),
+        "changed": (known,),
+    }  # fmt: skip
+    return {"expansion": Expansion.table(components), **{name: np.zeros(shape) for name, shape in shapes.items()}}
 
 
 def _part(one: Expansion, field: Any) -> Vector:
