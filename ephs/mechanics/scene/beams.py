@@ -18,14 +18,13 @@ import numpy as np
 
 from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.element import FREE_END
-from ephs.mechanics.scene.entries import Checked, shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.entries import Checked
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.placing import Place
 from ephs.mechanics.scene.resolve import JointDraft, Names
-from ephs.mechanics.scene.schema_touching import ContactLawEntry
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -51,14 +50,13 @@ _TURNED = float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamDraft:
-    """A beam with its nodes as a scene, its elements and welds as joints yet to be measured, its heat, its touch."""
+    """A beam with its nodes as a scene, its elements and welds as joints yet to be measured, its heat."""
 
     beam: Beam
     nodes: Scene
     joints: tuple[JointDraft, ...]
     thermal: dict[str, ThermalNode]
     conduction: dict[str, Conduction]
-    law: ContactLawEntry | None
 
 
 def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
@@ -108,13 +106,11 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
         if end != FREE_END:
             at = frames[node]
             joints.append(_joint(f"{name}-{side}", held, (end, f"{name}.{node}"), Place(at, at, False)))
-    beam = Beam(
-        name, n, (ends[0], ends[1]), section.outline, tuple(lengths.tolist()) if entry.rod != "reissner" else ()
-    )
+    hinged = tuple(lengths.tolist()) if entry.rod != "reissner" else ()
+    sink = entry.surface.heat if entry.surface else None
+    beam = Beam(name, n, (ends[0], ends[1]), section.outline, hinged, sink)
     nodes = _nodes(name, entry, section, frames, lengths, world)
-    return BeamDraft(
-        beam, nodes, tuple(joints), *_warmth(beam, entry, lengths, float(section.stiffness[3])), entry.surface
-    )
+    return BeamDraft(beam, nodes, tuple(joints), *_warmth(beam, entry, lengths, float(section.stiffness[3])))
 
 
 def _warmth(
@@ -206,10 +202,11 @@ def _surfaces(entry: Any, sides: tuple[Array, Array]) -> dict[str, Surface]:
     if entry.surface is None:
         return {}
     radius = entry.surface.radius or _radius(entry.section)
+    law = entry.surface.model_dump(exclude={"radius", "heat"})
     found: dict[str, Surface] = {}
     for i, (ahead, behind) in enumerate(np.array(sides).T.tolist()):
-        pose = np.array([*_TURNED, 0.25 * (ahead - behind), 0.0, 0.0])
-        found[str(i)] = Surface(str(i), str(i), {"capsule": [radius, 0.5 * (ahead + behind)]}, frozen(pose))
+        shape, at = {"capsule": [radius, 0.5 * (ahead + behind)]}, [0.25 * (ahead - behind), 0.0, 0.0]
+        found[str(i)] = Surface(body=str(i), shape=shape, position=at, rotation=list(_TURNED), **law).called(str(i))
     return found
 
 

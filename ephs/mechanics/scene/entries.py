@@ -12,13 +12,12 @@ from typing import Any, Generic, TypeVar, final, get_args
 from pydantic import ValidationError, WrapValidator
 
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name, shown
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import FORMS
 from ephs.mechanics.scene.schema import FILE_KEYS, SECTIONS, AssemblyEntry, WorldEntry
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
-from ephs.mechanics.scene.schema_touching import SurfaceShapeEntry
 
 LONGEST_NAME = 200
 E = TypeVar("E", bound=Entry)
@@ -30,9 +29,6 @@ _NEUTRAL: dict[str, Any] = {
     "capacity": 1.0,
     "temperature": 1.0,
     "use": "?",
-    "body": "ground",
-    "shape": SurfaceShapeEntry(),
-    "surfaces": ["?", "?"],
     "section": SectionEntry(),
 }
 
@@ -131,22 +127,6 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
     required = {k for k, field in model.model_fields.items() if field.is_required()}
     neutral = {k: _NEUTRAL[k] for k in spoiled & required}
     return Checked(model.model_validate({**sound, **neutral}), frozenset(spoiled))
-
-
-def shown(value: Any) -> str:
-    """A value in the file's notation, shortened."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, float):
-        return "nan" if math.isnan(value) else repr(value)
-    if isinstance(value, list):
-        text = "[" + ", ".join(shown(entry) for entry in value) + "]"
-        return text if len(text) <= 60 else f"{text[:57]}…] of {len(value)} entries"
-    return str(value)
 
 
 def _check_format(raw: Mapping[str, Any], faults: list[Fault]) -> None:

@@ -7,7 +7,6 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import (
@@ -25,7 +24,6 @@ from ephs.mechanics.scene.model import (
 )
 from ephs.mechanics.scene.motions import changed, number_of_law
 from ephs.mechanics.scene.registry import REGISTERED
-from ephs.mechanics.scene.surfaces import Contact
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -107,22 +105,6 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
         return _edited(scene, kind, name, edited)
 
     return Field(get, put, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
-
-
-def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
-    """A number of the law of contacts that have it: hard ones have no stiffness, soft ones no restitution."""
-
-    def get(scene: Scene, name: str) -> Array:
-        value = getattr(_thing(scene, "contacts", name).law, key, None)
-        return np.zeros(0) if value is None else np.asarray(value, dtype=float)
-
-    def put(scene: Scene, name: str, values: Array) -> Scene:
-        def edited(contact: Contact) -> Contact:
-            return replace(contact, law=replace(contact.law, **{key: float(values)}))
-
-        return _edited(scene, "contacts", name, edited)
-
-    return Field(get, put, least)
 
 
 def _world(key: str) -> Field:
@@ -346,14 +328,6 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     },
     **{section: _registered(KINDS[section]) for section in ("springs", "tendons", *ATTACHED)},
     "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
-    **{section: _registered(KINDS[section]) for section in ("conduction", "markers")},
-    "contacts": {
-        "stiffness": _law("stiffness", POSITIVE),
-        "loss": _law("loss", NON_NEGATIVE),
-        "friction": _law("friction", NON_NEGATIVE),
-        "slip": _law("slip", POSITIVE),
-        "rolling": _law("rolling", NON_NEGATIVE),
-        "spinning": _law("spinning", NON_NEGATIVE),
-    },
+    **{section: _registered(KINDS[section]) for section in ("conduction", "markers", "contacts")},
 }
 """Kind of element -> key of the scene file -> its numbers."""

@@ -40,6 +40,7 @@ class Beam(SceneElement):
     ends : what the first and the last node are welded to, ``"free"`` where to nothing
     outline : radius of a round section, or extents along axes 2 and 3 in m; for pictures
     lengths : of the elements in m, where these are spherical joints between rigid pieces
+    heat : where the heat of contacts of its surface goes, or None
     """
 
     name: str
@@ -47,6 +48,7 @@ class Beam(SceneElement):
     ends: Annotated[tuple[str, str], Named("end")]
     outline: tuple[float, ...]
     lengths: tuple[float, ...] = ()
+    heat: Annotated[str | None, Named("node")] = None
 
     @property
     def nodes(self) -> list[str]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.mechanics.scene.entries import Checked, shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.entries import Checked
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.schema import BodyEntry, ShapeEntry
 from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.spaces.rotations import quaternion_to_matrix

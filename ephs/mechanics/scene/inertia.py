@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen, symmetric_eigenvalues

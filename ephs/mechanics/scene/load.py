@@ -14,15 +14,26 @@ import numpy as np
 from ephs.mechanics.scene import resolve, values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
-from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told, warn_caller
+from ephs.mechanics.scene.contacts import overlaps
+from ephs.mechanics.scene.entries import Document, read_document
+from ephs.mechanics.scene.errors import (
+    Fault,
+    ModelWarning,
+    SceneError,
+    SceneWarning,
+    fault,
+    legible,
+    shown,
+    told,
+    warn_caller,
+)
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved
-from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements, settled
-from ephs.mechanics.scene.state import Asked, adjusted
-from ephs.mechanics.scene.text import file_text, lost
-from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
+from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements, settled, with_contacts
+from ephs.mechanics.scene.state import Asked, Snapshot, adjusted
+from ephs.mechanics.scene.stops import beyond, with_stops
+from ephs.mechanics.scene.text import file_inside, file_text, lost
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
 from ephs.operad.collector import paused_collector
@@ -57,7 +68,6 @@ class _Reading:
     odd: list[Fault] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
     asked: dict[str, Asked] = field(default_factory=dict)
-    laws: dict[str, Laws] = field(default_factory=dict)
 
 
 @paused_collector()
@@ -126,7 +136,6 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     sections = document.sections
     rods = _beams(document, world, faults)
     parts |= {name: rod.nodes for name, rod in rods.items()}
-    r.laws.update({name: dict.fromkeys(rod.nodes.surfaces, rod.law) for name, rod in rods.items() if rod.law})
     warm = {name for rod in rods.values() for name in rod.thermal}
     names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
     for name, table in sections["beams"].items():
@@ -135,8 +144,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
     joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
     thermal = resolve.resolve_thermal(document)
-    surfaces = resolve_surfaces(document, names, path.parent, faults)
-    elements = resolve_elements(document, parts, names, faults)
+    elements = resolve_elements(document, parts, names, path.parent, faults)
     if faults:
         return None
     drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
@@ -151,22 +159,20 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         thermal=thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
         parts=parts,
         source=str(path),
-        surfaces=surfaces,
         beams={name: rod.beam for name, rod in rods.items()},
     )
-    scene = settled(with_sections(scene, elements))
-    contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
+    scene = with_contacts(with_sections(scene, elements), faults)
     if faults:
         return None
-    scene = with_stops(document, replace(scene, contacts=contacts), faults)
+    scene = with_stops(document, settled(scene), faults)
     if faults:
         return None
-    r.odd.extend(overlaps(scene, faults))
+    touched = bool(scene.contacts) or any(joint.limits is not None for _, joint in scene.all_joints())
+    length = Snapshot.of(scene).scale(world.gravity).length if touched else 1.0
+    r.odd.extend([*beyond(scene, length, faults), *overlaps(scene, length, faults)])
     faults += placed_faults(scene)
     if faults:
         return None
-    r.laws.clear()
-    r.laws[""] = laws
     if r.adjust:
         scene, open_joints = adjusted(scene, r.asked)
     faults += open_joints
@@ -233,8 +239,8 @@ def _parts(
         pose = values.pose(entry.position, entry.rotation, key, faults)
         if not table.sound("use"):
             continue
-        file = _file_inside(path.parent / entry.use, r.home)
-        if file is None:
+        file = path.parent / entry.use
+        if file_inside(file, r.home) is None:
             faults.append(fault("outside scene", f"{key}.use", shown(entry.use)))
             continue
         r.files["parts"] += 1
@@ -246,13 +252,12 @@ def _parts(
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
             faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
             continue
-        below = replace(r, faults=[], odd=[], left=[], asked={}, laws={})
+        below = replace(r, faults=[], odd=[], left=[], asked={})
         part = _read(file, world, stack, below)
         faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
         r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
         r.left.extend(f"{legible(key)}: {line}" for line in below.left)
         r.asked.update({f"{name}.{joint}": asked for joint, asked in below.asked.items()})
-        r.laws[name] = below.laws.get("", {})
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)
@@ -273,14 +278,6 @@ def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, B
                 if each in document.sections[kind]:
                     faults.append(fault("collision", f"{kind}.{each}", shown(each), other=f"the beam {name}"))
     return found
-
-
-def _file_inside(file: Path, home: Path) -> Path | None:
-    """The resolved file, if it is in a folder or below it."""
-    try:
-        return file if file.resolve().is_relative_to(home) else None
-    except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle
-        return None
 
 
 def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.schema import MotionEntry
 from ephs.solve.errors import OptionError
 from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion

@@ -6,8 +6,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene import values
-from ephs.mechanics.scene.entries import Checked, shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.entries import Checked
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.geometry import ROUND, UNIVERSAL, frame_rotation, unit
 from ephs.mechanics.scene.schema import FrameEntry, JointEntry
 from ephs.semantics.bundles.bundle import Array

@@ -12,8 +12,8 @@ import numpy as np
 
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.element import Measured
-from ephs.mechanics.scene.entries import Checked, Document, shown
-from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing
+from ephs.mechanics.scene.entries import Checked, Document
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, shown
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.geometry import Coupling, coupling, joint_types
 from ephs.mechanics.scene.homogeneous import mass_and_moments
@@ -22,7 +22,7 @@ from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, World, frozen
 from ephs.mechanics.scene.motions import law_of
 from ephs.mechanics.scene.placing import Place, resolve_place
 from ephs.mechanics.scene.schema import BodyEntry, JointEntry, ShapeEntry
-from ephs.mechanics.scene.text import MESHES
+from ephs.mechanics.scene.text import MESHES, file_inside
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.mechanics.shapes.dry import Dry
 from ephs.semantics.bundles.bundle import Array
@@ -248,15 +248,6 @@ def _motion(entry: JointEntry, d: int, drive: Array, key: str, faults: list[Faul
     return found
 
 
-def mesh_file(name: str, folder: Path) -> Path | None:
-    """The resolved file, if it is in a folder or below it."""
-    try:
-        file = (folder / name).resolve()
-    except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle
-        return None
-    return file if file.is_relative_to(folder.resolve()) else None
-
-
 def _shape(entry: ShapeEntry, key: str, folder: Path, faults: list[Fault]) -> Mapping[str, Any] | None:
     given = {name: value for name, value in entry.model_dump().items() if value is not None}
     kinds = [name for name in given if name not in ("position", "rotation", "scale")]
@@ -268,7 +259,7 @@ def _shape(entry: ShapeEntry, key: str, folder: Path, faults: list[Fault]) -> Ma
     if "rotation" in given:
         given["rotation"] = values.quaternion(given["rotation"], f"{key}.rotation", faults).tolist()
     if "mesh" in given:
-        file = mesh_file(given["mesh"], folder)
+        file = file_inside(folder / given["mesh"], folder)
         if file is None:
             faults.append(fault("mesh", f"{key}.mesh", shown(given["mesh"])))
         elif file.suffix.lower() not in MESHES:

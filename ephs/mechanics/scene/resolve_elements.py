@@ -1,15 +1,19 @@
 """Elements of registered sections: checks of their tables, of what they name, and of their rules."""
 
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ephs.mechanics.scene.actuators import Actuator
+from ephs.mechanics.scene.contacts import meeting
 from ephs.mechanics.scene.custom import Element, number_of
 from ephs.mechanics.scene.element import AXIS, JOINTS, SINGLE
-from ephs.mechanics.scene.entries import Checked, Document, shown, validate
-from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
+from ephs.mechanics.scene.entries import Checked, Document, validate
+from ephs.mechanics.scene.errors import Fault, fault, legible, shown, unknown
 from ephs.mechanics.scene.model import KINDS, Scene, elements_of, with_sections
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.resolve import Names
@@ -22,7 +26,7 @@ _ERRORS = (SemanticsError, PatternError, ValueError, ArithmeticError)
 
 
 def resolve_elements(
-    document: Document, parts: Mapping[str, Scene], names: Names, faults: list[Fault]
+    document: Document, parts: Mapping[str, Scene], names: Names, folder: Path, faults: list[Fault]
 ) -> dict[str, dict[str, Element]]:
     """The elements by section, checked but for what depends on where bodies are."""
     known = {
@@ -33,9 +37,10 @@ def resolve_elements(
     for section in (*KINDS, *REGISTERED):
         found[section] = {}
         for name, table in document.sections[section].items():
-            faults += check_table(table, f"{section}.{name}", names, known)
+            entry = table.entry.called(name, folder)
+            faults += check_table(replace(table, entry=entry), f"{section}.{name}", names, known)
             if not table.spoiled:
-                found[section][name] = table.entry.normalised().called(name)
+                found[section][name] = entry.normalised().called(name)
     found["actuators"] |= _pulls(document, found, faults)
     return found
 
@@ -47,6 +52,16 @@ def _pulls(document: Document, found: Mapping[str, Mapping[str, Element]], fault
         if name in found["tendons"] and of.named("tendon") != (name,):
             faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
     return {name: Actuator(tendon=name, ratio=[-1.0]).called(name) for name in found["tendons"] if name not in given}
+
+
+def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
+    """The scene with contacts of all surfaces of its level that can meet, where its file names none."""
+    given = scene.contacts
+    found = given or {each.name: each for each in meeting(scene)}
+    for name, each in found.items():
+        key = f"contacts.{name}" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
+        faults += islice(broken(Checked(each), key, Site(scene, each, Level())), 1)
+    return replace(scene, contacts=found)
 
 
 def settled(scene: Scene) -> Scene:

@@ -33,7 +33,6 @@ from ephs.mechanics.scene.schema_numbers import (
     Vector,
     key,
 )
-from ephs.mechanics.scene.schema_touching import ContactEntry, SurfaceEntry
 from ephs.mechanics.scene.thermal import ThermalNode
 
 
@@ -154,8 +153,6 @@ WorldEntry: Any = table_of(World, "world")
 _TABLES: dict[str, tuple[type[Entry], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
-    "surfaces": (SurfaceEntry, "surfaces of bodies for contact"),
-    "contacts": (ContactEntry, "pairs of surfaces that can touch"),
     "beams": (BeamEntry, "rods that bend, twist and stretch"),
     "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
 }

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, create_model
 
 from ephs.mechanics.scene.schema_numbers import Entry, Extents, NonNegative, Number, Positive, Sizes, Text, Vector, key
-from ephs.mechanics.scene.schema_touching import ContactLawEntry
+from ephs.mechanics.scene.surfaces import ContactLaw
 
 
 class SectionEntry(Entry):
@@ -35,7 +35,7 @@ class RodHeatEntry(Entry):
     reference: Positive | None = key("temperature without thermal stress, K; default: temperature", None)
 
 
-class RodSurfaceEntry(ContactLawEntry):
+class RodSurfaceEntry(ContactLaw):
     """``surface`` of a beam: a capsule along each node's piece, which meets others and the pieces further on."""
 
     radius: Positive | None = key("radius of the surface, m; default: that of a circle or tube", None)

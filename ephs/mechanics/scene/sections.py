@@ -10,8 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.semantics.bundles.bundle import Array
 

@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.errors import Fault, fault, shown
+from ephs.mechanics.scene.rotations import TOLERANCE as UNIT
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 
 TOLERANCE = 1e-9
-QUATERNION_TOLERANCE = 1e-6
 
 
 def quaternion(values: list[float] | None, key: str, faults: list[Fault]) -> Array:
@@ -19,7 +18,7 @@ def quaternion(values: list[float] | None, key: str, faults: list[Fault]) -> Arr
         return np.array([1.0, 0.0, 0.0, 0.0])
     q = np.array(values, dtype=np.float64)
     size = float(np.linalg.norm(q))
-    if abs(size - 1.0) > QUATERNION_TOLERANCE:
+    if abs(size - 1.0) > UNIT:
         faults.append(fault("quaternion", key, f"{shown(values)} of norm {size:.9g}"))
         return np.array([1.0, 0.0, 0.0, 0.0])
     return q / size
