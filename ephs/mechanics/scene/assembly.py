@@ -13,12 +13,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ephs.mechanics.scene.bodies import BodyDraft
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist
+from ephs.mechanics.scene.joints import JointDraft
 from ephs.mechanics.scene.kinematics import Link, Scale, at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
-from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY

@@ -16,15 +16,15 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.element import FREE_END
-from ephs.mechanics.scene.entries import Checked
-from ephs.mechanics.scene.errors import Fault, fault, shown
+from ephs.mechanics.scene.errors import shown
 from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
+from ephs.mechanics.scene.joints import JointDraft, Place
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
-from ephs.mechanics.scene.placing import Place
-from ephs.mechanics.scene.resolve import JointDraft, Names
+from ephs.mechanics.scene.resolve_elements import Names
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -59,32 +59,31 @@ class BeamDraft:
     conduction: dict[str, Conduction]
 
 
-def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
+def check_beam(table: Checked[Any], names: Names) -> None:
     """Append a fault where a beam's end or heat leads nowhere; ``names`` have the nodes of all beams."""
-    entry, key = table.entry, f"beams.{name}"
+    entry = table.entry
     if table.sound("heat", "thermal") and entry.thermal is not None and entry.heat != ENVIRONMENT:
-        faults.append(fault("beam heat", f"{key}.heat", shown(entry.heat)))
+        table.fault("beam heat", "heat")
     elif table.sound("heat"):
-        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+        names.check(table, entry.heat, "heat", "thermal")
     if table.sound("surface") and entry.surface is not None and entry.surface.heat is not None:
-        names.check(entry.surface.heat, f"{key}.surface.heat", "thermal", faults)
+        names.check(table, entry.surface.heat, "surface.heat", "thermal")
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
         if end != FREE_END:
-            names.check(end, f"{key}.ends[{i}]", "body", faults)
+            names.check(table, end, f"ends[{i}]", "body")
 
 
-def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Fault]) -> BeamDraft | None:
+def resolve_beam(table: Checked[Any], world: World) -> BeamDraft | None:
     """A beam's bodies and joints; None where its place or section is invalid."""
-    entry, key = table.entry, f"beams.{name}"
+    entry, name = table.entry, table.name
     ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
-    section = (
-        resolve_section(entry.section, f"{key}.section", faults, entry.rod) if table.sound("section", "rod") else None
-    )
-    placed = _placed(table, key, faults)
-    _check_kind(table, key, faults)
+    given = table.inner("section", entry.section)
+    section = resolve_section(given, entry.rod) if table.sound("section", "rod") else None
+    placed = _placed(table)
+    _check_kind(table)
     touching = entry.surface if table.sound("section", "surface") else None
     if touching is not None and not (touching.radius or _radius(entry.section)):
-        faults.append(fault("rod radius", f"{key}.surface.radius", "nothing"))
+        table.fault("rod radius", "surface.radius", "nothing")
         return None
     if section is None or placed is None:
         return None
@@ -132,20 +131,20 @@ def _warmth(
     return nodes, ways if given.conduction else {}
 
 
-def _check_kind(table: Checked[Any], key: str, faults: list[Fault]) -> None:
+def _check_kind(table: Checked[Any]) -> None:
     """Rigid pieces have strain energy of torsion and bending, those of strings none; order 2."""
     entry = table.entry
     if not table.sound("rod", "order", "strain", "damping", "thermal") or entry.rod == "reissner":
         return
     if entry.thermal is not None and entry.thermal.expansion:
-        faults.append(fault("rod expansion", f"{key}.thermal.expansion", entry.thermal.expansion, rod=entry.rod))
+        table.fault("rod expansion", "thermal.expansion", rod=entry.rod)
     strain = np.array(entry.strain or np.zeros(6))
     if entry.order != 2:
-        faults.append(fault("rod order", f"{key}.order", entry.order, rod=entry.rod))
+        table.fault("rod order", "order", rod=entry.rod)
     if np.any(strain[3 if entry.rod == "kirchhoff" else 0 :]):
-        faults.append(fault("rod strain", f"{key}.strain", shown(entry.strain), rod=entry.rod))
+        table.fault("rod strain", "strain", rod=entry.rod)
     if entry.rod == "string" and entry.damping:
-        faults.append(fault("string damping", f"{key}.damping", shown(entry.damping)))
+        table.fault("string damping", "damping")
 
 
 def _element(
@@ -256,7 +255,7 @@ def _settled(strain: Array) -> Array:
     return np.where(np.abs(strain) <= NOISE * np.abs(strain).max(), 0.0, strain)
 
 
-def _placed(table: Checked[Any], key: str, faults: list[Fault]) -> tuple[list[Array], list[Array]] | None:
+def _placed(table: Checked[Any]) -> tuple[list[Array], list[Array]] | None:
     """Result of `curve` of a table; None, with a fault, where they cannot be told."""
     entry = table.entry
     if not table.sound("from", "to", "points", "up", "elements"):
@@ -264,23 +263,23 @@ def _placed(table: Checked[Any], key: str, faults: list[Fault]) -> tuple[list[Ar
     ends = getattr(entry, "from"), entry.to
     if (entry.points is None) == (ends == (None, None)) or (ends != (None, None) and None in ends):
         given = [word for word in ("from", "to", "points") if getattr(entry, word) is not None]
-        faults.append(fault("beam place", key, " and ".join(given) or "nothing that says where the beam is"))
+        table.fault("beam place", found=" and ".join(given) or "nothing that says where the beam is")
         return None
     points = np.array(entry.points if entry.points is not None else ends, dtype=float)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     short = np.flatnonzero(gaps <= NOISE * max(float(np.abs(points).max()), TINY))
     if short.size:
-        where = f"{key}.points[{short[0] + 1}]" if entry.points is not None else f"{key}.to"
-        faults.append(fault("beam points", where, shown(points[short[0] + 1].tolist())))
+        where = f"points[{short[0] + 1}]" if entry.points is not None else "to"
+        table.fault("beam points", where, shown(points[short[0] + 1].tolist()))
         return None
     segments = len(points) - 1
     elements = entry.elements or segments
     if elements % segments or elements > MOST_ELEMENTS:
-        faults.append(fault("beam elements", f"{key}.elements", elements, segments=segments, most=MOST_ELEMENTS))
+        table.fault("beam elements", "elements", elements, segments=segments, most=MOST_ELEMENTS)
         return None
     found = curve(points, None if entry.up is None else np.array(entry.up), elements)
     if found is None:
-        faults.append(fault("up", f"{key}.up", "nothing" if entry.up is None else shown(entry.up)))
+        table.fault("up", "up", "nothing" if entry.up is None else None)
     return found
 
 

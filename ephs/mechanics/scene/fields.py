@@ -291,7 +291,7 @@ def _registered(kind: type[Element]) -> dict[str, Field]:
     def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         from ephs.mechanics.scene.resolve_elements import number_faults
 
-        return list(number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}"))
+        return number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}")
 
     return {key: _attribute(kind.section, key, faults=faults) for key in kind.numbers}
 

@@ -11,9 +11,10 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene import resolve, values
+from ephs.mechanics.scene import values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
+from ephs.mechanics.scene.bodies import resolve_body
 from ephs.mechanics.scene.contacts import overlaps
 from ephs.mechanics.scene.entries import Document, read_document
 from ephs.mechanics.scene.errors import (
@@ -27,13 +28,16 @@ from ephs.mechanics.scene.errors import (
     told,
     warn_caller,
 )
+from ephs.mechanics.scene.joints import resolve_joint
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved
-from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements, settled, with_contacts
+from ephs.mechanics.scene.resolve_elements import Names, placed_faults, resolve_elements, settled, with_contacts
+from ephs.mechanics.scene.schema_elements import attributes
 from ephs.mechanics.scene.state import Asked, Snapshot, adjusted
 from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
 from ephs.operad.collector import paused_collector
@@ -134,16 +138,17 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     parts, lost = _parts(document, path, world, stack, r)
     _check_names(document, faults)
     sections = document.sections
-    rods = _beams(document, world, faults)
+    rods = _beams(document, world)
     parts |= {name: rod.nodes for name, rod in rods.items()}
     warm = {name for rod in rods.values() for name in rod.thermal}
     names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
-    for name, table in sections["beams"].items():
-        check_beam(name, table, names, faults)
+    for table in sections["beams"].values():
+        check_beam(table, names)
     mode = r.inertia or document.assembly.inertia
-    bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
-    joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
-    thermal = resolve.resolve_thermal(document)
+    bodies = [resolve_body(table, mode, path.parent, r.odd) for table in sections["bodies"].values()]
+    joints = [resolve_joint(table, names) for table in sections["joints"].values()]
+    stores = sections["thermal"].items()
+    thermal = {name: ThermalNode(name=name, **attributes(ThermalNode, table.entry)) for name, table in stores}
     elements = resolve_elements(document, parts, names, path.parent, faults)
     if faults:
         return None
@@ -164,7 +169,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     scene = with_contacts(with_sections(scene, elements), faults)
     if faults:
         return None
-    scene = with_stops(document, settled(scene), faults)
+    scene = with_stops(document, settled(scene))
     if faults:
         return None
     touched = bool(scene.contacts) or any(joint.limits is not None for _, joint in scene.all_joints())
@@ -214,7 +219,7 @@ def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
 
 
 def _world(document: Document, wanted: World | None, faults: list[Fault]) -> World:
-    own = resolve.resolve_world(document)
+    own = None if document.world is None else World(**attributes(World, document.world))
     if wanted is None:
         return own or World()
     if own is not None and _described(own) != _described(wanted):
@@ -235,22 +240,22 @@ def _parts(
     stack = (*stack, path.resolve())
     found: dict[str, Scene] = {}
     for name, table in document.sections["parts"].items():
-        entry, key = table.entry, f"parts.{name}"
-        pose = values.pose(entry.position, entry.rotation, key, faults)
+        entry, key = table.entry, table.key
+        pose = values.pose(table)
         if not table.sound("use"):
             continue
         file = path.parent / entry.use
         if file_inside(file, r.home) is None:
-            faults.append(fault("outside scene", f"{key}.use", shown(entry.use)))
+            table.fault("outside scene", "use")
             continue
         r.files["parts"] += 1
         if r.files["parts"] > MOST_PARTS or len(stack) > MOST_LEVELS:
             if r.files["parts"] == MOST_PARTS + 1 or len(stack) > MOST_LEVELS:
-                faults.append(fault("many parts", f"{key}.use", "one more", most=MOST_PARTS))
+                table.fault("many parts", "use", "one more", most=MOST_PARTS)
             continue
         if file.resolve() in stack:
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
-            faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
+            table.fault("cycle", "use", chain=chain)
             continue
         below = replace(r, faults=[], odd=[], left=[], asked={})
         part = _read(file, world, stack, below)
@@ -263,9 +268,9 @@ def _parts(
     return found, set(document.sections["parts"]) - set(found)
 
 
-def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, BeamDraft]:
+def _beams(document: Document, world: World) -> dict[str, BeamDraft]:
     """The beams with a valid place and section."""
-    drafts = {n: resolve_beam(n, t, world, faults) for n, t in document.sections["beams"].items()}
+    drafts = {name: resolve_beam(table, world) for name, table in document.sections["beams"].items()}
     found = {name: draft for name, draft in drafts.items() if draft is not None}
     for name, draft in found.items():
         kinds = {
@@ -276,7 +281,7 @@ def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, B
         for kind, taken in kinds.items():
             for each in taken:
                 if each in document.sections[kind]:
-                    faults.append(fault("collision", f"{kind}.{each}", shown(each), other=f"the beam {name}"))
+                    document.sections[kind][each].fault("collision", found=shown(each), other=f"the beam {name}")
     return found
 
 
@@ -285,11 +290,11 @@ def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
-def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> resolve.Names:
+def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> Names:
     bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
     thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
     sections = document.sections
-    return resolve.Names(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
+    return Names(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
 
 
 def _is_name(text: str) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment
-from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, World, free_joint
+from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, World
 from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.contacts import Contact
 from ephs.mechanics.scene.custom import Element
@@ -21,6 +21,7 @@ from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, SceneElement, froz
 from ephs.mechanics.scene.flexible import Beam
 from ephs.mechanics.scene.gas_springs import GasSpring
 from ephs.mechanics.scene.gears import Gear
+from ephs.mechanics.scene.joints import Joint, free_joint
 from ephs.mechanics.scene.loads import Load
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.motors import Motor

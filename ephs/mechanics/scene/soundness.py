@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
-from ephs.mechanics.scene.entries import Checked
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
@@ -37,7 +37,7 @@ def check_scene(scene: Scene) -> None:
             if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
                 raise ValueError(f"{legible(name)}.{key} is {legible(str(value))}, expected finite numbers {shape}")
     for name, each in _all(scene):
-        if isinstance(each, Element) and (wrong := next(broken(Checked(each), name), None)):
+        if isinstance(each, Element) and (wrong := next(broken(Checked(each, name)), None)):
             raise ValueError(str(wrong))
     _check_names(scene)
     there = {

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.contacts import DEEP, OVERLAP
 from ephs.mechanics.scene.entries import Document
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import coupling_of
-from ephs.mechanics.scene.model import Joint, Scene, frozen
-from ephs.mechanics.scene.schema import JointEntry
+from ephs.mechanics.scene.joints import Joint, JointEntry
+from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -21,35 +22,36 @@ LOSS = 0.1
 """Loss of stops by default, s/rad or s/m."""
 
 
-def with_stops(document: Document, scene: Scene, faults: list[Fault]) -> Scene:
+def with_stops(document: Document, scene: Scene) -> Scene:
     """The scene with the limits of its own joints."""
     found = dict(scene.joints)
     for name, table in document.sections["joints"].items():
-        entry, key = table.entry, f"joints.{name}"
+        entry = table.entry
         sound = table.sound("limits", "limit_stiffness", "limit_loss", "limit_restitution")
         if entry.limits is None or not sound or name not in found:
             continue
         joint = found[name]
         if joint.dim != 1 or joint.motion is not None:
             what = "a joint with a prescribed motion" if joint.motion is not None else f"a {joint.kind} joint"
-            faults.append(fault("limited joint", f"{key}.limits", what))
+            table.fault("limited joint", "limits", what)
             continue
-        if (law := _stop(scene, joint, entry, key, faults)) is not None:
+        if (law := _stop(scene, joint, table)) is not None:
             found[name] = replace(joint, limits=frozen(entry.limits), stop=law)
     return replace(scene, joints=found)
 
 
-def _stop(scene: Scene, joint: Joint, entry: JointEntry, key: str, faults: list[Fault]) -> Law | Impact | None:
+def _stop(scene: Scene, joint: Joint, table: Checked[JointEntry]) -> Law | Impact | None:
     """The law of a joint's stops, or None and a fault."""
+    entry = table.entry
     if entry.limit_restitution is not None:
         soft = [name for name in ("limit_stiffness", "limit_loss") if getattr(entry, name) is not None]
         if soft:
-            faults.append(fault("hard and soft", key, f"limit_restitution and {soft[0]}", soft=soft[0]))
+            table.fault("hard and soft", found=f"limit_restitution and {soft[0]}", soft=soft[0])
             return None
         return Impact(entry.limit_restitution)
     stiffness = entry.limit_stiffness or _stiffness(scene, joint)
     if not stiffness:
-        faults.append(fault("no scale", f"{key}.limit_stiffness", "nothing"))
+        table.fault("no scale", "limit_stiffness", "nothing")
         return None
     return Law(stiffness=stiffness, loss=LOSS if entry.limit_loss is None else entry.limit_loss)
 
