@@ -160,7 +160,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     "table": ("a table", "write it as [{key}] with keys below"),
     "type": ("{what}", "correct the value"),
     "length": ("{what}", "correct the number of entries"),
-    "one freedom": ("a number", "a pair with one degree of freedom takes one number"),
     "large": ("a number of at most {most:g} in size", "check the unit"),
     "finite": ("a finite number", "nan and inf are not allowed"),
     "range": ("{what}", "correct the value"),
