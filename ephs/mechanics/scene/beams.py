@@ -22,7 +22,7 @@ from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.errors import shown
 from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
-from ephs.mechanics.scene.joints import JointDraft, Place
+from ephs.mechanics.scene.joints import Asked, Joint
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.resolve_elements import Names
 from ephs.mechanics.scene.sections import Section, resolve_section
@@ -54,7 +54,7 @@ class BeamDraft:
 
     beam: Beam
     nodes: Scene
-    joints: tuple[JointDraft, ...]
+    joints: tuple[tuple[Joint, Asked], ...]
     thermal: dict[str, ThermalNode]
     conduction: dict[str, Conduction]
 
@@ -92,19 +92,19 @@ def resolve_beam(table: Checked[Any], world: World) -> BeamDraft | None:
     lengths = np.array([float(np.linalg.norm(shape[3:])) for shape in shapes])
     initial = np.array(entry.strain or np.zeros(6))
     make = _element if entry.rod == "reissner" else _hinge
-    joints: list[JointDraft] = []
+    joints: list[tuple[Joint, Asked]] = []
     for i, shape in enumerate(shapes):
         own, ends_of = f"{name}-{i + 1}", (f"{name}.{i}", f"{name}.{i + 1}")
         if i and shape is shapes[i - 1]:
-            element = replace(joints[-1], name=own, body1=ends_of[0], body2=ends_of[1])
+            element = replace(joints[-1][0], name=own, body1=ends_of[0], body2=ends_of[1])
         else:
             element = make(own, ends_of, _settled(shape / lengths[i]), float(lengths[i]), initial, section, entry)
-        joints.append(element if entry.thermal is None else replace(element, heat=own))
+        joints.append((element if entry.thermal is None else replace(element, heat=own), Asked()))
     held = "spherical" if entry.rod == "string" else "fixed"
     for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
         if end != FREE_END:
             at = frames[node]
-            joints.append(_joint(f"{name}-{side}", held, (end, f"{name}.{node}"), Place(at, at, False)))
+            joints.append((_joint(f"{name}-{side}", held, (end, f"{name}.{node}"), at, at), Asked(in_bodies=False)))
     hinged = tuple(lengths.tolist()) if entry.rod != "reissner" else ()
     sink = entry.surface.heat if entry.surface else None
     beam = Beam(name, n, (ends[0], ends[1]), section.outline, hinged, sink)
@@ -149,26 +149,25 @@ def _check_kind(table: Checked[Any]) -> None:
 
 def _element(
     name: str, bodies: tuple[str, str], shape: Array, length: float, initial: Array, section: Section, entry: Any
-) -> JointDraft:
+) -> Joint:
     """A geometrically exact element; ``shape`` (6,) is the strain of its reference curve, stretch 1."""
     rest = shape - initial
-    place = Place(SE3.exp(length * rest), IDENTITY_POSE, in_bodies=True)
     strain = Strain(length, frozen(section.stiffness), frozen(rest), entry.damping, entry.order)
-    return _joint(name, "free", bodies, place, entry.heat, strain)
+    return _joint(name, "free", bodies, SE3.exp(length * rest), IDENTITY_POSE, entry.heat, strain)
 
 
 def _hinge(
     name: str, bodies: tuple[str, str], shape: Array, length: float, initial: Array, section: Section, entry: Any
-) -> JointDraft:
+) -> Joint:
     """A spherical joint in the middle of an element, its frames one another's half a rotation away from rest."""
     half = SE3.exp(0.5 * length * shape)
     turn = SE3.exp(np.append(0.5 * length * initial[:3], np.zeros(3)))
-    place = Place(SE3.compose(half, SE3.inverse(turn)), SE3.compose(SE3.inverse(half), turn), in_bodies=True)
-    joint = _joint(name, "spherical", bodies, place, entry.heat)
+    frames = SE3.compose(half, SE3.inverse(turn)), SE3.compose(SE3.inverse(half), turn)
+    joint = _joint(name, "spherical", bodies, *frames, entry.heat)
     if entry.rod == "string":
         return joint
     stiffness = section.stiffness[:3] / length
-    return replace(joint, stiffness=stiffness, friction=np.diag(entry.damping * stiffness))
+    return replace(joint, stiffness=frozen(stiffness), friction=frozen(np.diag(entry.damping * stiffness)))
 
 
 def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths: Array, world: World) -> Scene:
@@ -241,13 +240,14 @@ def _shape(outline: tuple[float, ...], length: float, shift: float) -> dict[str,
 
 
 def _joint(
-    name: str, kind: str, bodies: tuple[str, str], place: Place, heat: str = ENVIRONMENT, strain: Strain | None = None
-) -> JointDraft:
+    name: str, kind: str, bodies: tuple[str, str], frame1: Array, frame2: Array, heat: str = ENVIRONMENT,
+    strain: Strain | None = None,
+) -> Joint:  # fmt: skip
+    """A joint of a beam, its coordinates and rates yet to be measured."""
     d = {"free": 6, "spherical": 3, "fixed": 0}[kind]
-    none = np.zeros(d)
-    return JointDraft(
-        name, kind, *bodies, place, 0.0, np.zeros((d, d)), none, none, heat, none, None, None, None, strain
-    )
+    none, frames = frozen(np.zeros(d)), (frozen(frame1), frozen(frame2))
+    loss = frozen(np.zeros((d, d)))
+    return Joint(name, kind, *bodies, *frames, 0.0, loss, none, none, heat, none, None, none, none, strain=strain)
 
 
 def _settled(strain: Array) -> Array:

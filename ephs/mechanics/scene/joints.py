@@ -12,7 +12,7 @@ from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, NON_NEGATIVE, POSE
 from ephs.mechanics.scene.element import Number as Measure
 from ephs.mechanics.scene.errors import did_you_mean, shown
 from ephs.mechanics.scene.flexible import Strain
-from ephs.mechanics.scene.geometry import ROUND, UNIVERSAL, Coupling, coupling, frame_rotation, joint_types, unit
+from ephs.mechanics.scene.geometry import ROUND, UNIVERSAL, coupling, frame_rotation, joint_types, unit
 from ephs.mechanics.scene.motions import MotionEntry, law_of
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import (
@@ -186,36 +186,19 @@ class Place:
 
 
 @final
-@dataclass(frozen=True, slots=True)
-class JointDraft:
-    """A joint whose frames in the bodies may still depend on their poses; coordinates and rates are None
-    where not given."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """What a file says of a joint's start: coordinates (d,) and rate (d,), None where not given, and whether its frames
+    are in the bodies; else they are in the world, where the coordinates are 0."""
 
-    name: str
-    kind: str
-    body1: str
-    body2: str
-    place: Place
-    pitch: float
-    friction: Array
-    stiffness: Array
-    rest: Array
-    heat: str
-    drive: Array
-    motion: MotionLaw | None
-    coordinates: Array | None
-    rate: Array | None
-    strain: Strain | None = None
-    dry: Dry | None = None
-    armature: float = 0.0
-
-    def coupling(self) -> Coupling:
-        """Motions that the joint allows."""
-        return coupling(self.kind, self.pitch, self.place.middle)
+    coordinates: Array | None = None
+    rate: Array | None = None
+    in_bodies: bool = True
 
 
-def resolve_joint(table: Checked[JointEntry], names: "Names") -> JointDraft | None:
-    """A joint with everything checked but its closure; None where its type or place is not usable."""
+def resolve_joint(table: Checked[JointEntry], names: "Names") -> tuple[Joint, Asked] | None:
+    """A joint with everything checked but its closure, its frames as the file has them, and its start; None where its
+    type or place is not usable."""
     entry = table.entry
     if table.sound("bodies"):
         for i, name in enumerate(entry.bodies):
@@ -255,24 +238,27 @@ def resolve_joint(table: Checked[JointEntry], names: "Names") -> JointDraft | No
     friction = values.friction(table, "friction", d)
     if place is None:
         return None
-    return JointDraft(
+    joint = Joint(
         name=table.name,
         kind=entry.type,
         body1=entry.bodies[0],
         body2=entry.bodies[1],
-        place=place,
+        frame1=frozen(place.frame1),
+        frame2=frozen(place.frame2),
         pitch=entry.pitch or 0.0,
-        friction=friction,
-        stiffness=stiffness,
-        rest=rest,
+        friction=frozen(friction),
+        stiffness=frozen(stiffness),
+        rest=frozen(rest),
         heat=entry.heat,
-        drive=drive,
+        drive=frozen(drive),
         motion=motion,
-        coordinates=coordinates,
-        rate=rate,
+        coordinate=frozen(allowed.identity()),
+        rate=frozen(np.zeros(d)),
+        middle=None if place.middle is None else frozen(place.middle),
         dry=_dry(table, d),
         armature=entry.armature,
     )
+    return joint, Asked(coordinates if place.in_bodies else None, rate, place.in_bodies)
 
 
 def _dry(table: Checked[JointEntry], d: int) -> Dry | None:

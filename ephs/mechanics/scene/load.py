@@ -28,13 +28,13 @@ from ephs.mechanics.scene.errors import (
     told,
     warn_caller,
 )
-from ephs.mechanics.scene.joints import resolve_joint
+from ephs.mechanics.scene.joints import Asked, resolve_joint
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved
 from ephs.mechanics.scene.resolve_elements import Names, placed_faults, resolve_elements, settled, with_contacts
 from ephs.mechanics.scene.schema_elements import attributes
-from ephs.mechanics.scene.state import Asked, Snapshot, adjusted
+from ephs.mechanics.scene.state import Snapshot, adjusted
 from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -152,9 +152,9 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     elements = resolve_elements(document, parts, names, path.parent, faults)
     if faults:
         return None
-    drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
+    drafts = [*filter(None, joints), *(start for rod in rods.values() for start in rod.joints)]
     placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
-    r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
+    r.asked.update({joint.name: asked for joint, asked in drafts})
     elements["conduction"] |= {name: x for rod in rods.values() for name, x in rod.conduction.items()}
     scene = Scene(
         document.name,
@@ -274,7 +274,7 @@ def _beams(document: Document, world: World) -> dict[str, BeamDraft]:
     found = {name: draft for name, draft in drafts.items() if draft is not None}
     for name, draft in found.items():
         kinds = {
-            "joints": [each.name for each in draft.joints],
+            "joints": [joint.name for joint, _ in draft.joints],
             "thermal": draft.thermal,
             "conduction": draft.conduction,
         }
