@@ -43,7 +43,7 @@ class Actuator(Element, section="actuators", said="actuators: forces on joints b
         return self.changed(ratio=np.repeat(ratio, len(self.joints) if self.joints and ratio.size == 1 else 1).tolist())
 
     @classmethod
-    def upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
         return {key: value for key, value in table.items() if key != "heat"}
 
     def build(self, site: Site) -> None:

@@ -14,7 +14,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.polytope import MOST_FACES, faces_and_edges
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Pair
-from ephs.mechanics.scene.site import Level, Site
+from ephs.mechanics.scene.site import Level, Site, surfaces_of
 from ephs.mechanics.scene.surfaces import SOFT, ContactLaw, Surface, Touching
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -115,7 +115,7 @@ class Contact(Touching, section="contacts", said="pairs of surfaces that can tou
         return self.changed(**(dict.fromkeys(given) | asdict(law) | {"heat": heat}))
 
     def _pair(self, site: Site) -> list[Surface]:
-        return [site.scene.surface(name) for name in self.surfaces]
+        return [surfaces_of(site.scene)[name] for name in self.surfaces]
 
     def _bodies(self, site: Site) -> list[str]:
         return [each.body for each in self._pair(site)]
@@ -141,7 +141,7 @@ class Contact(Touching, section="contacts", said="pairs of surfaces that can tou
         return Law(friction=self.friction or 0.0, **{name: getattr(self, name) for name in SOFT})
 
     @classmethod
-    def upgraded(cls, table: Mapping[str, Any]) -> dict[str, Any]:
+    def _upgraded(cls, table: Mapping[str, Any]) -> dict[str, Any]:
         given = dict(table)
         return given | given.pop("law", {})
 
@@ -163,7 +163,7 @@ def contact_points(scene: "Scene", of: Contact) -> Points:
     """Bodies and points of a contact, as seen from a scene; made once for all its contacts and kept with it."""
 
     def made() -> dict[tuple[str, ...], Points]:
-        surfaces = dict(scene.all_surfaces())
+        surfaces = surfaces_of(scene)
         out: dict[tuple[str, ...], Points] = {}
         for _, each in scene.all_contacts():
             out[tuple(each.surfaces)] = _points(*(surfaces[name] for name in each.surfaces))
@@ -194,7 +194,7 @@ def meeting(scene: "Scene") -> Iterator[Contact]:
     """Contacts of surfaces on different bodies without a common joint but a free one, which fixed joints do not
     connect, and not of the same group or part; of a beam's pieces those further apart along it than half a circle of
     its radius: nearer ones cannot touch."""
-    surfaces, rigid = dict(scene.all_surfaces()), _rigid(scene)
+    surfaces, rigid = surfaces_of(scene), _rigid(scene)
     for beam in scene.beams.values():
         pieces = [surfaces[node] for node in beam.nodes if node in surfaces]
         sizes = np.array([piece.shape["capsule"] for piece in pieces]).reshape(-1, 2)
@@ -222,7 +222,7 @@ def overlaps(scene: "Scene", length: float, faults: list[Fault]) -> list[Fault]:
     """Contacts of a level whose surfaces overlap at the start by more than a part of a length in m; hard ones, and
     those of meshes with too many faces, are faults."""
     found: list[Fault] = []
-    surfaces = dict(scene.all_surfaces())
+    surfaces = surfaces_of(scene)
     for name, of in scene.contacts.items():
         key = f"contacts.{name}"
         if faceted := _faceted([surfaces[each] for each in of.surfaces]):

@@ -173,14 +173,14 @@ class Element(Entry):
             The table is not sound.
         """
         try:
-            found = cls.model_validate({key: value for key, value in cls.upgraded(table).items() if key != "name"})
+            found = cls.model_validate({key: value for key, value in cls._upgraded(table).items() if key != "name"})
         except ValidationError as error:
             where, what = error.errors(include_url=False)[0]["loc"], error.errors(include_url=False)[0]["msg"]
             raise ValueError(f"{cls.section}.{name}.{'.'.join(map(str, where))}: {what}") from None
         return found.normalised().called(name)
 
     @classmethod
-    def upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
         """The table of an older result file with the keys of today."""
         return table
 
@@ -192,10 +192,10 @@ class Element(Entry):
         """Itself with values for keys whose default depends on where bodies are."""
         return self
 
-    def called(self, name: str, folder: Path = Path()) -> Self:
-        """Itself with a name, and the folder of its file while this is read."""
+    def called(self, name: str) -> Self:
+        """Itself with a name."""
         found = self.model_copy()
-        found._name, found._folder = name, folder
+        found._name = name
         return found
 
     def changed(self, **keys: Any) -> Self:
@@ -265,6 +265,13 @@ class Element(Entry):
     def __str__(self) -> str:
         """In a few words."""
         return " – ".join(name for _, _, name in self.references()) or self.said
+
+
+def read_in(element: Element, name: str, folder: Path = Path()) -> Element:
+    """The element with a name, and while its file is read with the folder of this."""
+    found = element.called(name)
+    found._folder = folder
+    return found
 
 
 def _extra(given: Any) -> _Hidden:

@@ -145,10 +145,6 @@ class Scene:
         own = self._own("joints", name)
         return own or _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
 
-    def surface(self, name: str) -> Surface:
-        """The surface of this (dotted) name, its names seen from here."""
-        return self._own("surfaces", name) or _find(dict(self.all_surfaces()), name, "surface")
-
     def section(self, name: str) -> Mapping[str, Any]:
         """The elements of a section of this level, registered ones included."""
         return getattr(self, name) if name in ELEMENTS else self.elements.get(name, {})

@@ -73,11 +73,6 @@ def first_rate(law: MotionLaw | None) -> float | None:
     return None if law is None else law.rate(0.0)
 
 
-def number_of_law(of: MotionLaw | None, key: str) -> float | None:
-    """A number of a motion law by its name; None where it has none of that name."""
-    return None if of is None else dict(of.numbers).get(key)
-
-
 def changed(of: MotionLaw | None, key: str, value: float) -> MotionLaw:
     """The motion law with another number."""
     if key == "rate" or not isinstance(of, HarmonicMotion):

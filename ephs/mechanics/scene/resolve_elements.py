@@ -11,7 +11,7 @@ import numpy as np
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.contacts import meeting
-from ephs.mechanics.scene.custom import Element, number_of
+from ephs.mechanics.scene.custom import Element, number_of, read_in
 from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, JOINTS, SINGLE
 from ephs.mechanics.scene.entries import Document, validate
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, legible, listing, shown, unknown
@@ -56,10 +56,10 @@ def resolve_elements(
     for section in (*KINDS, *REGISTERED):
         found[section] = {}
         for name, table in document.sections[section].items():
-            entry = table.entry.called(name, folder)
+            entry = read_in(table.entry, name, folder)
             check_table(replace(table, entry=entry), names, known)
             if not table.spoiled:
-                found[section][name] = entry.normalised().called(name)
+                found[section][name] = read_in(entry.normalised(), name)
     found["actuators"] |= _pulls(document, found, faults)
     return found
 

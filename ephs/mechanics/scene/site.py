@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.scene.custom import Element
     from ephs.mechanics.scene.model import Scene
+    from ephs.mechanics.scene.surfaces import Surface
 
 INPUTS = "inputs"
 """First name of the outer ports of elements."""
@@ -207,10 +208,15 @@ class Site:
         """Only what keys name is connected: parts expose no other junctions."""
         named = [each for kind in kinds for each in self.element.named(kind)]
         if "body" in kinds:
-            named += [self.scene.surface(each).body for each in self.element.named("surface")]
+            named += [surfaces_of(self.scene)[each].body for each in self.element.named("surface")]
         if name not in named:
             expected = f"one that its keys name: {', '.join(named) or 'there is none'}"
             raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
+
+
+def surfaces_of(scene: "Scene") -> "Mapping[str, Surface]":
+    """Surfaces by dotted name; made once and kept with the scene."""
+    return once(scene, "surfaces", lambda: dict(scene.all_surfaces()))
 
 
 def built(scene: "Scene") -> Level:

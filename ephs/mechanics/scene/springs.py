@@ -46,7 +46,7 @@ class Spring(Element, section="springs", said="springs and dampers between two p
         return float(np.linalg.norm(one - two)) >= ASSEMBLY * self.length
 
     @classmethod
-    def upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
         given = dict(table)
         return given | ({"bodies": [given.pop("body1"), given.pop("body2")]} if "body1" in given else {})
 

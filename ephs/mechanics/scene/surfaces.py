@@ -160,13 +160,15 @@ class Surface(Touching, section="surfaces", said="surfaces of bodies for contact
 
     def normalised(self) -> Self:
         q, corners = self.rotation, self._corners or self.shape.get("points")
-        return self.changed(
+        found = self.changed(
             rotation=None if q is None else (np.array(q) / np.linalg.norm(q)).tolist(),
             shape=self.shape if corners is None else {"mesh": corners},
         )
+        found._corners = None
+        return found
 
     @classmethod
-    def upgraded(cls, table: Mapping[str, Any]) -> dict[str, Any]:
+    def _upgraded(cls, table: Mapping[str, Any]) -> dict[str, Any]:
         given = dict(table)
         if "frame" in given:
             frame = given.pop("frame")
