@@ -1,6 +1,6 @@
 """The tables of a scene file in the making: links with their own frames become bodies at their centres of mass."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, final
 
@@ -17,6 +17,8 @@ from ephs.semantics.spaces.rank import DIRECTION
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 LONGEST_NAME = 200
+SECTIONS = "bodies", "joints", "springs", "gears", "actuators", "tendons", "surfaces", "contacts"
+"""Tables of models, in the order of files."""
 WORLD = ""
 """Name of the ground in joints: no link has it."""
 UNLIMITED = 1e15
@@ -34,17 +36,10 @@ class Draft:
 
     def __init__(self, name: str, folder: Path, faults: list[Fault], *, contact: bool = False) -> None:
         self.name, self.folder, self.faults, self.contact = name, folder, faults, contact
-        self._surfaces: dict[str, dict[str, Any]] = {}
-        self._contacts: dict[str, dict[str, Any]] = {}
+        self._tables: dict[str, dict[str, dict[str, Any]]] = {section: {} for section in SECTIONS}
         self.gravity: list[float] | None = None
-        self._bodies: dict[str, dict[str, Any]] = {}
-        self._joints: dict[str, dict[str, Any]] = {}
         self._names: dict[str, str] = {WORLD: GROUND}
         self._joint_names: dict[str, str] = {}
-        self._gears: dict[str, dict[str, Any]] = {}
-        self._actuators: dict[str, dict[str, Any]] = {}
-        self._tendons: dict[str, dict[str, Any]] = {}
-        self._springs: dict[str, dict[str, Any]] = {}
         self._centres: dict[str, Array] = {WORLD: np.zeros(3)}
         self._left: dict[str, dict[str, None]] = {}
         self._renamed: list[str] = []
@@ -74,16 +69,14 @@ class Draft:
     ) -> str:
         """A body: inertia (3, 3) about its centre of mass in the link's axes; ``place`` (7,) of the link in the world,
         unless a joint says it. Returns its name in the scene."""
-        name = self._own(link, self._bodies)
-        self._names[link] = name
         self._centres[link] = np.asarray(centre, dtype=float)
         t = np.broadcast_to(np.asarray(inertia, dtype=float), (3, 3))
         entries = _plain([t[0, 0], t[1, 1], t[2, 2], t[0, 1], t[0, 2], t[1, 2]])
         entry: dict[str, Any] = {"mass": float(mass), "inertia": entries if any(entries[3:]) else entries[:3]}
         if place is not None:
             entry |= _placed(self._at(link, place, inverse=False))
-        self._bodies[name] = entry
-        return name
+        self._names[link] = self._add("bodies", link, entry)
+        return self._names[link]
 
     def frame_without_mass(self, name: str) -> str:
         """A body without mass between two joints; returns its name in the draft."""
@@ -94,14 +87,11 @@ class Draft:
         self, name: str, kind: str, first: str, second: str, at1: Array, at2: Array, entries: Mapping[str, Any]
     ) -> None:
         """A joint of two links, its frames (7,) in theirs; ``entries`` are further keys of its table."""
-        own = self._joint_names[name] = self._own(name, self._joints)
-        self._joints[own] = {
-            "type": kind,
-            "bodies": [self._names[first], self._names[second]],
-            "frame1": _placed(self._at(first, at1)),
-            "frame2": _placed(self._at(second, at2)),
-            **{key: value for key, value in entries.items() if np.any(value)},
-        }
+        frames = {"frame1": _placed(self._at(first, at1)), "frame2": _placed(self._at(second, at2))}
+        more = {key: value for key, value in entries.items() if np.any(value)}
+        self._joint_names[name] = self._add(
+            "joints", name, {"type": kind, "bodies": [self._names[first], self._names[second]], **frames, **more}
+        )
 
     def dry(self, name: str, force: float, freedoms: int) -> dict[str, Any]:
         """Entries of dry friction; a note of it where the joint has several freedoms."""
@@ -117,29 +107,25 @@ class Draft:
         if not self.contact or lower >= upper:
             self.leave("limits of", name)
         else:
-            self._joints[self._joint_names[name]] |= {"limits": sides, **law}
+            self._joint(name).update(limits=sides, **law)
 
     def surface(self, link: str, name: str, kind: str, value: Any, place: Array, **law: Any) -> str:
         """A surface of a link, with keys of its table; returns its name in the scene."""
-        own = self._own(name, self._surfaces)
-        size = {} if kind == "plane" else _plain(value)
-        at = _placed(self._at(link, place))
-        self._surfaces[own] = {"body": self._names[link], "shape": {kind: size}, **at, **law}
-        return own
+        size, at = {} if kind == "plane" else _plain(value), _placed(self._at(link, place))
+        return self._add("surfaces", name, {"body": self._names[link], "shape": {kind: size}, **at, **law})
 
     @property
     def mass(self) -> float:
         """Mass of all bodies so far, kg."""
-        return sum(body["mass"] for body in self._bodies.values())
+        return sum(body["mass"] for body in self._tables["bodies"].values())
 
     def touch(self, surfaces: tuple[str, str], law: Mapping[str, float]) -> None:
         """A contact of two surfaces."""
-        name = self._own("_".join(surfaces), self._contacts)
-        self._contacts[name] = {"surfaces": list(surfaces), **law}
+        self._add("contacts", "_".join(surfaces), {"surfaces": list(surfaces), **law})
 
     def hold(self, name: str) -> None:
         """Lock a joint of one degree of freedom."""
-        entries = self._joints[self._joint_names[name]]
+        entries = self._joint(name)
         for key in ("armature", "dry", "limits", "limit_stiffness", "limit_loss"):
             entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
@@ -150,19 +136,19 @@ class Draft:
         """
         joints = [self._joint_names[first], self._joint_names[second]]
         if offset:
-            self._joints[joints[0]]["coordinate"] = offset
+            self._joint(first)["coordinate"] = offset
         if ratio:
-            self._gears[self._own(name, self._gears)] = {"joints": joints, "ratio": float(ratio)}
+            self._add("gears", name, {"joints": joints, "ratio": float(ratio)})
         else:
             self.hold(first)
 
     def knows(self, name: str) -> bool:
         """Whether a free joint has this name."""
-        return name in self._joint_names and "motion" not in self._joints[self._joint_names[name]]
+        return name in self._joint_names and "motion" not in self._joint(name)
 
     def pull(self, name: str, stiffness: float, rest: float, damping: float) -> None:
         """Add a spring and friction to a joint of one degree of freedom."""
-        entries = self._joints[self._joint_names[name]]
+        entries = self._joint(name)
         before, whole = entries.get("stiffness", 0.0), entries.get("stiffness", 0.0) + stiffness
         if stiffness:
             entries["rest"] = (before * entries.get("rest", 0.0) + stiffness * rest) / whole
@@ -176,30 +162,25 @@ class Draft:
         """A spring and a damper along a sum of coordinates of joints with one degree of freedom; numbers of the
         first.
         """
-        self._gears[self._own(name, self._gears)] = {
-            "joints": [self._joint_names[each] for each in joints], "ratio": list(map(float, ratio)),
-            "stiffness": stiffness, "damping": damping, "stretch": stretch,
-        }  # fmt: skip
+        numbers = {"stiffness": stiffness, "damping": damping, "stretch": stretch}
+        named = [self._joint_names[each] for each in joints]
+        self._add("gears", name, {"joints": named, "ratio": list(map(float, ratio)), **numbers})
 
     def spring(
         self, name: str, links: tuple[str, str], at: tuple[Array, Array], stiffness: float, length: float,
         damping: float,
     ) -> None:  # fmt: skip
         """A spring and a damper between two points (3,), each in its link's frame."""
-        ends = {
-            f"at{k}": _plain(self._at(link, pose(x))[4:]) for k, (link, x) in enumerate(zip(links, at, strict=True), 1)
-        }
-        self._springs[self._own(name, self._springs)] = {
-            "bodies": [self._names[link] for link in links], **ends,
-            "stiffness": stiffness, "length": length, "damping": damping,
-        }  # fmt: skip
+        one, other = self._points(links, at)
+        numbers = {"stiffness": stiffness, "length": length, "damping": damping}
+        self._add(
+            "springs", name, {"bodies": [self._names[link] for link in links], "at1": one, "at2": other, **numbers}
+        )
 
     def tendon(self, name: str, links: Sequence[str], points: Sequence[Array], **numbers: Any) -> str:
         """A tendon through points (3,), each in its link's frame; its name."""
-        own = self._own(name, self._tendons)
-        at = [_plain(self._at(link, pose(x))[4:]) for link, x in zip(links, points, strict=True)]
-        self._tendons[own] = {"bodies": [self._names[link] for link in links], "points": at, **numbers}
-        return own
+        bodies = [self._names[link] for link in links]
+        return self._add("tendons", name, {"bodies": bodies, "points": self._points(links, points), **numbers})
 
     def actuate(
         self, name: str, ratio: Mapping[str, float] | float, limits: Sequence[float] | None, tendon: str = ""
@@ -210,13 +191,12 @@ class Draft:
             found = {"joints": [self._joint_names[each] for each in ratio], "ratio": list(map(float, ratio.values()))}
         bounded = limits is not None and bool(np.all(np.isfinite(limits)))
         more = {"limits": _plain(limits)} if limits is not None and bounded else {}
-        others = {each: table for each, table in self._tendons.items() if each != tendon}
-        self._actuators[self._own(name, self._actuators | others)] = found | more
+        self._add("actuators", name, found | more, self._tables["tendons"].keys() - {tendon})
 
     def driven(self, joint: str) -> bool:
         """Whether an actuator acts on a joint."""
         own = self._joint_names[joint]
-        return any(own in actuator.get("joints", ()) for actuator in self._actuators.values())
+        return any(own in actuator.get("joints", ()) for actuator in self._tables["actuators"].values())
 
     def shape(self, link: str, kind: str, value: Any, place: Array, **more: Any) -> None:
         """Something to draw on a link."""
@@ -225,7 +205,7 @@ class Draft:
             return
         seen = {key: v for key, v in _placed(self._at(link, place)).items() if np.any(np.array(v) != _REST[key])}
         table = {kind: value if kind == "mesh" else _plain(value), **more, **seen}
-        self._bodies[self._names[link]].setdefault("shapes", []).append(table)
+        self._tables["bodies"][self._names[link]].setdefault("shapes", []).append(table)
 
     def mesh(self, link: str, file: str, place: Array, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> None:
         """A mesh for pictures, if it is in the model's folder."""
@@ -260,15 +240,22 @@ class Draft:
             or "model",
             **world,
             "assembly": {"inertia": mode},
-            "bodies": self._bodies,
-            "joints": self._joints,
-            **({"springs": self._springs} if self._springs else {}),
-            **({"gears": self._gears} if self._gears else {}),
-            **({"actuators": self._actuators} if self._actuators else {}),
-            **({"tendons": self._tendons} if self._tendons else {}),
-            **({"surfaces": self._surfaces} if self._surfaces else {}),
-            **({"contacts": self._contacts} if self._contacts else {}),
+            **{key: tables for key, tables in self._tables.items() if tables or key in ("bodies", "joints")},
         }
+
+    def _joint(self, name: str) -> dict[str, Any]:
+        """Table of a joint."""
+        return self._tables["joints"][self._joint_names[name]]
+
+    def _points(self, links: Sequence[str], points: Sequence[Array]) -> list[Any]:
+        """Points (3,), each in its link's frame, from the links' centres of mass."""
+        return [_plain(self._at(link, pose(x))[4:]) for link, x in zip(links, points, strict=True)]
+
+    def _add(self, section: str, name: str, table: dict[str, Any], others: Container[str] = ()) -> str:
+        """Add a table under a valid and unused name, which others do not have either; returns the name."""
+        own = self._own(name, self._tables[section], others)
+        self._tables[section][own] = table
+        return own
 
     def _at(self, link: str, place: Array, *, inverse: bool = True) -> Array:
         """From the link's frame to the one at its centre of mass, or its pose in the world."""
@@ -276,7 +263,7 @@ class Draft:
             return SE3.compose(place, np.concatenate([_ONE, self._centres[link]]))
         return np.concatenate([place[:4], place[4:] - self._centres[link]])
 
-    def _own(self, name: str, taken: Mapping[str, Any]) -> str:
+    def _own(self, name: str, taken: Container[str], others: Container[str]) -> str:
         """A valid and unused name for scene files."""
         letters = ("_" if c == "." or c.isspace() or not c.isprintable() else c for c in name[:LONGEST_NAME])
         stem = "".join(letters) or "unnamed"
@@ -285,7 +272,7 @@ class Draft:
         if stem in (GROUND, ENVIRONMENT):
             stem += "_"
         found, count = stem, self._alike.get(stem, 1)
-        while found in taken:
+        while found in taken or found in others:
             count += 1
             found = f"{stem[: LONGEST_NAME - 10]}_{count}"
         self._alike[stem] = count

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ephs.mechanics.elements.contact import lever, losses
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, inverse, turned
 from ephs.mechanics.motion.moving import Moving
-from ephs.mechanics.scene.build import component_path, contact_points
+from ephs.mechanics.scene.build import component_path
+from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import GROUND, Scene
-from ephs.mechanics.scene.surfaces import Contact
 from ephs.mechanics.shapes.gap import Gap, ramp
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law

@@ -14,7 +14,7 @@ import numpy as np
 from ephs.mechanics.motion.batch import compose, inverse
 from ephs.mechanics.motion.batch import gap as change
 from ephs.mechanics.motion.moving import Moving
-from ephs.mechanics.scene.build import contact_points
+from ephs.mechanics.scene.contacts import contact_points
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.shapes.gap import PENETRATED, Gap
 from ephs.semantics.bundles.bundle import Array

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.mechanics.scene.build import contact_points
+from ephs.mechanics.scene.contacts import contact_points
 from ephs.semantics.spaces.pairs import PAIRS, pair
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.errors import SolveError

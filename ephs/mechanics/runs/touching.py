@@ -10,9 +10,8 @@ from ephs.mechanics.motion.batch import gap as change
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.scene.build import contact_points
+from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.surfaces import Contact
 from ephs.solve.errors import SolveError
 from ephs.solve.problem import Problem
 from ephs.solve.result.solution import Solution

@@ -1,14 +1,14 @@
 """Actuators: controls as forces on joints or tendons."""
 
 from collections.abc import Mapping
-from typing import Self, final
+from typing import Any, Self, final
 
 import numpy as np
 
 from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import AXIS
 from ephs.mechanics.scene.gears import counted, different
-from ephs.mechanics.scene.rules import rule
+from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Numbers, Range, Text
 from ephs.mechanics.scene.site import Site
 
@@ -34,13 +34,17 @@ class Actuator(Element, section="actuators", said="actuators: forces on joints b
     @rule(
         "joints", "tendon", at="", found="{found}", expected="either joints or a tendon", advice="give one of the two"
     )
-    def aimed(self) -> bool | Mapping[str, object]:
+    def aimed(self) -> Told:
         """Whether it acts on joints, or on a tendon."""
         return bool(self.joints) != (self.tendon is not None) or {"found": "both" if self.joints else "neither"}
 
     def normalised(self) -> Self:
         ratio = np.atleast_1d(self.ratio)
         return self.changed(ratio=np.repeat(ratio, len(self.joints) if self.joints and ratio.size == 1 else 1).tolist())
+
+    @classmethod
+    def _upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        return {key: value for key, value in table.items() if key != "heat"}
 
     def build(self, site: Site) -> None:
         """Nothing: runs have its forces as signals."""

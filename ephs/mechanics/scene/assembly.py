@@ -8,27 +8,30 @@ unless the scene is adjusted.
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields
-from typing import Any, TypeAlias
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
+from ephs.mechanics.scene.bodies import BodyDraft
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.geometry import body_twist
+from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.joints import Asked
 from ephs.mechanics.scene.kinematics import Link, Scale, at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
-from ephs.mechanics.scene.resolve import BodyDraft, JointDraft
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 
 Bodies: TypeAlias = dict[str, Body]
 Joints: TypeAlias = dict[str, Joint]
+Start: TypeAlias = tuple[Joint, Asked]
+"""A joint with the frames that its file has, and what this says of its start."""
 
 
 def assemble(
-    drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], parts: Mapping[str, Scene], gravity: Array
+    drafts: Sequence[BodyDraft], joints: Sequence[Start], parts: Mapping[str, Scene], gravity: Array
 ) -> tuple[Bodies, Joints, list[Fault]]:
     """Bodies and joints in the initial state, and a fault for each joint that does not hold there.
 
@@ -38,7 +41,7 @@ def assemble(
     names = [draft.name for draft in drafts] + [name for name, _ in others]
     index = {name: i for i, name in enumerate(names)} | {GROUND: -1}
     poses = _place(drafts, joints, index, [body.pose for _, body in others])
-    links = [_link(draft, index, poses) for draft in joints]
+    links = [_link(start, index, poses) for start in joints]
     xs = [link.element(poses) for link in links]
     twists = _move(drafts, joints, links, xs, poses, [body.twist for _, body in others])
     bodies = {
@@ -48,7 +51,16 @@ def assemble(
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
     masses = [(d.mass, d.inertia) for d in drafts] + [(body.mass, body.inertia) for _, body in others]
     scale = Scale.of(links, poses, twists, gyration(masses), gravity)
-    placed = {d.name: _joint(d, link, x, s[0]) for d, link, x, s in zip(joints, links, xs, slips, strict=True)}
+    placed = {
+        joint.name: replace(
+            joint,
+            frame1=frozen(link.frame1),
+            frame2=frozen(link.frame2),
+            coordinate=frozen(x),
+            rate=frozen(rate),
+        )
+        for (joint, _), link, x, (rate, _) in zip(joints, links, xs, slips, strict=True)
+    }
     return bodies, placed, measure(links, xs, poses, slips, names, scale)
 
 
@@ -90,18 +102,17 @@ def measure(
 
 
 def _place(
-    drafts: Sequence[BodyDraft], joints: Sequence[JointDraft], index: Mapping[str, int], rest: Sequence[Array]
+    drafts: Sequence[BodyDraft], joints: Sequence[Start], index: Mapping[str, int], rest: Sequence[Array]
 ) -> Array:
     poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(-1, 7)
     open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
     if not open_bodies:
         return poses
-    links = {j.name: _link(j, index, poses) for j in joints if j.place.in_bodies}
-    by_name = {j.name: j for j in joints}
+    links = {start[0].name: _link(start, index, poses) for start in joints if start[1].in_bodies}
 
     def follow(body: int, name: str) -> None:
-        link, draft = links[name], by_name[name]
-        x = link.coupling.identity() if draft.coordinates is None else link.coupling.element(draft.coordinates)
+        link = links[name]
+        x = link.coupling.identity() if link.coordinates is None else link.coupling.element(link.coordinates)
         poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
 
     _settle(open_bodies, list(links.values()), follow)
@@ -110,7 +121,7 @@ def _place(
 
 def _move(
     drafts: Sequence[BodyDraft],
-    joints: Sequence[JointDraft],
+    joints: Sequence[Start],
     links: Sequence[Link],
     xs: Sequence[Array],
     poses: Array,
@@ -133,8 +144,8 @@ def _move(
     # A joint with `at` and `axis` moves a body only if its rate is specified.
     leading = [
         link
-        for j, link in zip(joints, links, strict=True)
-        if j.place.in_bodies or (j.rate is not None and j.rate.any())
+        for (_, asked), link in zip(joints, links, strict=True)
+        if asked.in_bodies or (asked.rate is not None and asked.rate.any())
     ]
     _settle([i for i, d in enumerate(drafts) if d.velocity is None], leading, follow)
     return twists
@@ -173,24 +184,17 @@ def _other(link: Link, body: int) -> int:
     return link.body1 if link.body2 == body else link.body2
 
 
-def _link(draft: JointDraft, index: Mapping[str, int], poses: Array) -> Link:
-    body1, body2, place = index[draft.body1], index[draft.body2], draft.place
-    frame1, frame2 = place.frame1, place.frame2
-    if not place.in_bodies:
+def _link(start: Start, index: Mapping[str, int], poses: Array) -> Link:
+    joint, asked = start
+    body1, body2 = index[joint.body1], index[joint.body2]
+    frame1, frame2, coordinates = joint.frame1, joint.frame2, asked.coordinates
+    if not asked.in_bodies:
         frame1 = SE3.compose(SE3.inverse(at(poses, body1)), frame1)
         frame2 = SE3.compose(SE3.inverse(at(poses, body2)), frame2)
-    # Where `at` and `axis` are given, the coordinates are 0 by definition.
-    coupling = draft.coupling()
-    coordinates = draft.coordinates if place.in_bodies else np.zeros(coupling.dim)
-    return Link(draft.name, body1, body2, frame1, frame2, coupling, coordinates, draft.rate, first_rate(draft.motion))
-
-
-def _joint(draft: JointDraft, link: Link, x: Array, rate: Array) -> Joint:
-    same = {each.name for each in fields(Joint)} & {each.name for each in fields(JointDraft)} - {"rate"}
-    given: dict[str, Any] = {name: getattr(draft, name) for name in same}
-    given |= {"frame1": link.frame1, "frame2": link.frame2, "coordinate": x, "rate": rate, "middle": draft.place.middle}
-    given = {name: frozen(value) if isinstance(value, np.ndarray) else value for name, value in given.items()}
-    return Joint(**given)
+        coordinates = np.zeros(joint.dim)
+    return Link(
+        joint.name, body1, body2, frame1, frame2, coupling_of(joint), coordinates, asked.rate, first_rate(joint.motion)
+    )  # fmt: skip
 
 
 def gyration(bodies: Iterable[tuple[float, Array]]) -> float:

@@ -16,16 +16,15 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.conduction import Conduction
 from ephs.mechanics.scene.element import FREE_END
-from ephs.mechanics.scene.entries import Checked, shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.errors import shown
 from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
+from ephs.mechanics.scene.joints import Asked, Joint
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
-from ephs.mechanics.scene.placing import Place
-from ephs.mechanics.scene.resolve import JointDraft, Names
-from ephs.mechanics.scene.schema_touching import ContactLawEntry
+from ephs.mechanics.scene.resolve_elements import Names
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -51,42 +50,40 @@ _TURNED = float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class BeamDraft:
-    """A beam with its nodes as a scene, its elements and welds as joints yet to be measured, its heat, its touch."""
+    """A beam with its nodes as a scene, its elements and welds as joints yet to be measured, its heat."""
 
     beam: Beam
     nodes: Scene
-    joints: tuple[JointDraft, ...]
+    joints: tuple[tuple[Joint, Asked], ...]
     thermal: dict[str, ThermalNode]
     conduction: dict[str, Conduction]
-    law: ContactLawEntry | None
 
 
-def check_beam(name: str, table: Checked[Any], names: Names, faults: list[Fault]) -> None:
+def check_beam(table: Checked[Any], names: Names) -> None:
     """Append a fault where a beam's end or heat leads nowhere; ``names`` have the nodes of all beams."""
-    entry, key = table.entry, f"beams.{name}"
+    entry = table.entry
     if table.sound("heat", "thermal") and entry.thermal is not None and entry.heat != ENVIRONMENT:
-        faults.append(fault("beam heat", f"{key}.heat", shown(entry.heat)))
+        table.fault("beam heat", "heat")
     elif table.sound("heat"):
-        names.check(entry.heat, f"{key}.heat", "thermal", faults)
+        names.check(table, entry.heat, "heat", "thermal")
     if table.sound("surface") and entry.surface is not None and entry.surface.heat is not None:
-        names.check(entry.surface.heat, f"{key}.surface.heat", "thermal", faults)
+        names.check(table, entry.surface.heat, "surface.heat", "thermal")
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
         if end != FREE_END:
-            names.check(end, f"{key}.ends[{i}]", "body", faults)
+            names.check(table, end, f"ends[{i}]", "body")
 
 
-def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Fault]) -> BeamDraft | None:
+def resolve_beam(table: Checked[Any], world: World) -> BeamDraft | None:
     """A beam's bodies and joints; None where its place or section is invalid."""
-    entry, key = table.entry, f"beams.{name}"
+    entry, name = table.entry, table.name
     ends = [*entry.ends, *[FREE_END] * (2 - len(entry.ends))]
-    section = (
-        resolve_section(entry.section, f"{key}.section", faults, entry.rod) if table.sound("section", "rod") else None
-    )
-    placed = _placed(table, key, faults)
-    _check_kind(table, key, faults)
+    given = table.inner("section", entry.section)
+    section = resolve_section(given, entry.rod) if table.sound("section", "rod") else None
+    placed = _placed(table)
+    _check_kind(table)
     touching = entry.surface if table.sound("section", "surface") else None
     if touching is not None and not (touching.radius or _radius(entry.section)):
-        faults.append(fault("rod radius", f"{key}.surface.radius", "nothing"))
+        table.fault("rod radius", "surface.radius", "nothing")
         return None
     if section is None or placed is None:
         return None
@@ -95,26 +92,24 @@ def resolve_beam(name: str, table: Checked[Any], world: World, faults: list[Faul
     lengths = np.array([float(np.linalg.norm(shape[3:])) for shape in shapes])
     initial = np.array(entry.strain or np.zeros(6))
     make = _element if entry.rod == "reissner" else _hinge
-    joints: list[JointDraft] = []
+    joints: list[tuple[Joint, Asked]] = []
     for i, shape in enumerate(shapes):
         own, ends_of = f"{name}-{i + 1}", (f"{name}.{i}", f"{name}.{i + 1}")
         if i and shape is shapes[i - 1]:
-            element = replace(joints[-1], name=own, body1=ends_of[0], body2=ends_of[1])
+            element = replace(joints[-1][0], name=own, body1=ends_of[0], body2=ends_of[1])
         else:
             element = make(own, ends_of, _settled(shape / lengths[i]), float(lengths[i]), initial, section, entry)
-        joints.append(element if entry.thermal is None else replace(element, heat=own))
+        joints.append((element if entry.thermal is None else replace(element, heat=own), Asked()))
     held = "spherical" if entry.rod == "string" else "fixed"
     for end, node, side in ((ends[0], 0, "start"), (ends[1], n, "end")):
         if end != FREE_END:
             at = frames[node]
-            joints.append(_joint(f"{name}-{side}", held, (end, f"{name}.{node}"), Place(at, at, False)))
-    beam = Beam(
-        name, n, (ends[0], ends[1]), section.outline, tuple(lengths.tolist()) if entry.rod != "reissner" else ()
-    )
+            joints.append((_joint(f"{name}-{side}", held, (end, f"{name}.{node}"), at, at), Asked(in_bodies=False)))
+    hinged = tuple(lengths.tolist()) if entry.rod != "reissner" else ()
+    sink = entry.surface.heat if entry.surface else None
+    beam = Beam(name, n, (ends[0], ends[1]), section.outline, hinged, sink)
     nodes = _nodes(name, entry, section, frames, lengths, world)
-    return BeamDraft(
-        beam, nodes, tuple(joints), *_warmth(beam, entry, lengths, float(section.stiffness[3])), entry.surface
-    )
+    return BeamDraft(beam, nodes, tuple(joints), *_warmth(beam, entry, lengths, float(section.stiffness[3])))
 
 
 def _warmth(
@@ -136,44 +131,43 @@ def _warmth(
     return nodes, ways if given.conduction else {}
 
 
-def _check_kind(table: Checked[Any], key: str, faults: list[Fault]) -> None:
+def _check_kind(table: Checked[Any]) -> None:
     """Rigid pieces have strain energy of torsion and bending, those of strings none; order 2."""
     entry = table.entry
     if not table.sound("rod", "order", "strain", "damping", "thermal") or entry.rod == "reissner":
         return
     if entry.thermal is not None and entry.thermal.expansion:
-        faults.append(fault("rod expansion", f"{key}.thermal.expansion", entry.thermal.expansion, rod=entry.rod))
+        table.fault("rod expansion", "thermal.expansion", rod=entry.rod)
     strain = np.array(entry.strain or np.zeros(6))
     if entry.order != 2:
-        faults.append(fault("rod order", f"{key}.order", entry.order, rod=entry.rod))
+        table.fault("rod order", "order", rod=entry.rod)
     if np.any(strain[3 if entry.rod == "kirchhoff" else 0 :]):
-        faults.append(fault("rod strain", f"{key}.strain", shown(entry.strain), rod=entry.rod))
+        table.fault("rod strain", "strain", rod=entry.rod)
     if entry.rod == "string" and entry.damping:
-        faults.append(fault("string damping", f"{key}.damping", shown(entry.damping)))
+        table.fault("string damping", "damping")
 
 
 def _element(
     name: str, bodies: tuple[str, str], shape: Array, length: float, initial: Array, section: Section, entry: Any
-) -> JointDraft:
+) -> Joint:
     """A geometrically exact element; ``shape`` (6,) is the strain of its reference curve, stretch 1."""
     rest = shape - initial
-    place = Place(SE3.exp(length * rest), IDENTITY_POSE, in_bodies=True)
     strain = Strain(length, frozen(section.stiffness), frozen(rest), entry.damping, entry.order)
-    return _joint(name, "free", bodies, place, entry.heat, strain)
+    return _joint(name, "free", bodies, SE3.exp(length * rest), IDENTITY_POSE, entry.heat, strain)
 
 
 def _hinge(
     name: str, bodies: tuple[str, str], shape: Array, length: float, initial: Array, section: Section, entry: Any
-) -> JointDraft:
+) -> Joint:
     """A spherical joint in the middle of an element, its frames one another's half a rotation away from rest."""
     half = SE3.exp(0.5 * length * shape)
     turn = SE3.exp(np.append(0.5 * length * initial[:3], np.zeros(3)))
-    place = Place(SE3.compose(half, SE3.inverse(turn)), SE3.compose(SE3.inverse(half), turn), in_bodies=True)
-    joint = _joint(name, "spherical", bodies, place, entry.heat)
+    frames = SE3.compose(half, SE3.inverse(turn)), SE3.compose(SE3.inverse(half), turn)
+    joint = _joint(name, "spherical", bodies, *frames, entry.heat)
     if entry.rod == "string":
         return joint
     stiffness = section.stiffness[:3] / length
-    return replace(joint, stiffness=stiffness, friction=np.diag(entry.damping * stiffness))
+    return replace(joint, stiffness=frozen(stiffness), friction=frozen(np.diag(entry.damping * stiffness)))
 
 
 def _nodes(name: str, entry: Any, section: Section, frames: list[Array], lengths: Array, world: World) -> Scene:
@@ -206,10 +200,11 @@ def _surfaces(entry: Any, sides: tuple[Array, Array]) -> dict[str, Surface]:
     if entry.surface is None:
         return {}
     radius = entry.surface.radius or _radius(entry.section)
+    law = entry.surface.model_dump(exclude={"radius", "heat"})
     found: dict[str, Surface] = {}
     for i, (ahead, behind) in enumerate(np.array(sides).T.tolist()):
-        pose = np.array([*_TURNED, 0.25 * (ahead - behind), 0.0, 0.0])
-        found[str(i)] = Surface(str(i), str(i), {"capsule": [radius, 0.5 * (ahead + behind)]}, frozen(pose))
+        shape, at = {"capsule": [radius, 0.5 * (ahead + behind)]}, [0.25 * (ahead - behind), 0.0, 0.0]
+        found[str(i)] = Surface(body=str(i), shape=shape, position=at, rotation=list(_TURNED), **law).called(str(i))
     return found
 
 
@@ -245,13 +240,14 @@ def _shape(outline: tuple[float, ...], length: float, shift: float) -> dict[str,
 
 
 def _joint(
-    name: str, kind: str, bodies: tuple[str, str], place: Place, heat: str = ENVIRONMENT, strain: Strain | None = None
-) -> JointDraft:
+    name: str, kind: str, bodies: tuple[str, str], frame1: Array, frame2: Array, heat: str = ENVIRONMENT,
+    strain: Strain | None = None,
+) -> Joint:  # fmt: skip
+    """A joint of a beam, its coordinates and rates yet to be measured."""
     d = {"free": 6, "spherical": 3, "fixed": 0}[kind]
-    none = np.zeros(d)
-    return JointDraft(
-        name, kind, *bodies, place, 0.0, np.zeros((d, d)), none, none, heat, none, None, None, None, strain
-    )
+    none, frames = frozen(np.zeros(d)), (frozen(frame1), frozen(frame2))
+    loss = frozen(np.zeros((d, d)))
+    return Joint(name, kind, *bodies, *frames, 0.0, loss, none, none, heat, none, None, none, none, strain=strain)
 
 
 def _settled(strain: Array) -> Array:
@@ -259,7 +255,7 @@ def _settled(strain: Array) -> Array:
     return np.where(np.abs(strain) <= NOISE * np.abs(strain).max(), 0.0, strain)
 
 
-def _placed(table: Checked[Any], key: str, faults: list[Fault]) -> tuple[list[Array], list[Array]] | None:
+def _placed(table: Checked[Any]) -> tuple[list[Array], list[Array]] | None:
     """Result of `curve` of a table; None, with a fault, where they cannot be told."""
     entry = table.entry
     if not table.sound("from", "to", "points", "up", "elements"):
@@ -267,23 +263,23 @@ def _placed(table: Checked[Any], key: str, faults: list[Fault]) -> tuple[list[Ar
     ends = getattr(entry, "from"), entry.to
     if (entry.points is None) == (ends == (None, None)) or (ends != (None, None) and None in ends):
         given = [word for word in ("from", "to", "points") if getattr(entry, word) is not None]
-        faults.append(fault("beam place", key, " and ".join(given) or "nothing that says where the beam is"))
+        table.fault("beam place", found=" and ".join(given) or "nothing that says where the beam is")
         return None
     points = np.array(entry.points if entry.points is not None else ends, dtype=float)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     short = np.flatnonzero(gaps <= NOISE * max(float(np.abs(points).max()), TINY))
     if short.size:
-        where = f"{key}.points[{short[0] + 1}]" if entry.points is not None else f"{key}.to"
-        faults.append(fault("beam points", where, shown(points[short[0] + 1].tolist())))
+        where = f"points[{short[0] + 1}]" if entry.points is not None else "to"
+        table.fault("beam points", where, shown(points[short[0] + 1].tolist()))
         return None
     segments = len(points) - 1
     elements = entry.elements or segments
     if elements % segments or elements > MOST_ELEMENTS:
-        faults.append(fault("beam elements", f"{key}.elements", elements, segments=segments, most=MOST_ELEMENTS))
+        table.fault("beam elements", "elements", elements, segments=segments, most=MOST_ELEMENTS)
         return None
     found = curve(points, None if entry.up is None else np.array(entry.up), elements)
     if found is None:
-        faults.append(fault("up", f"{key}.up", "nothing" if entry.up is None else shown(entry.up)))
+        table.fault("up", "up", "nothing" if entry.up is None else None)
     return found
 
 

@@ -1,30 +1,33 @@
-"""World, bodies and joints of a resolved scene."""
+"""World and bodies of a scene: their tables in files, and what they are when these are resolved."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import (
-    ENVIRONMENT,
-    GROUND,
-    NON_NEGATIVE,
-    POSE,
-    POSITIVE,
-    TWIST,
-    Measured,
-    Named,
-    Number,
-    SceneElement,
-    frozen,
-)
-from ephs.mechanics.scene.flexible import Strain
-from ephs.mechanics.shapes.dry import Dry
-from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.scene import values
+from ephs.mechanics.scene.checked import Checked
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, SceneElement, frozen
+from ephs.mechanics.scene.element import Number as Measure
+from ephs.mechanics.scene.errors import Fault
+from ephs.mechanics.scene.homogeneous import mass_and_moments
+from ephs.mechanics.scene.inertia import mass_and_inertia
+from ephs.mechanics.scene.rotations import Rotation
+from ephs.mechanics.scene.schema_numbers import (
+    Entry,
+    Extents,
+    Inertia,
+    NonNegative,
+    Positive,
+    Sizes,
+    Text,
+    Vector,
+    key,
+)  # fmt: skip
+from ephs.mechanics.scene.text import MESHES, file_inside
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.motion_law import MotionLaw
 
 IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -34,12 +37,12 @@ IDENTITY_POSE = frozen([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 class World(Measured):
     """Gravity, and the reference environment."""
 
-    gravity: Annotated[Array, Number(length=1, time=-2, count=3), "gravity in the world, m/s²"] = field(
+    gravity: Annotated[Array, Measure(length=1, time=-2, count=3), "gravity in the world, m/s²"] = field(
         default_factory=lambda: frozen([0.0, 0.0, -9.81])
     )
-    temperature: Annotated[float, Number(least=POSITIVE), "temperature of the reference environment, K"] = 293.15
+    temperature: Annotated[float, Measure(least=POSITIVE), "temperature of the reference environment, K"] = 293.15
     pressure: Annotated[
-        float, Number(energy=1, length=-3, least=POSITIVE), "pressure of the reference environment, Pa"
+        float, Measure(energy=1, length=-3, least=POSITIVE), "pressure of the reference environment, Pa"
     ] = 101325.0
 
 
@@ -59,86 +62,101 @@ class Body(SceneElement):
     """
 
     name: str
-    mass: Annotated[float, Number(energy=1, length=-2, time=2, least=NON_NEGATIVE)]
-    inertia: Annotated[Array, Number(energy=1, time=2, count=3, square=True)]
+    mass: Annotated[float, Measure(energy=1, length=-2, time=2, least=NON_NEGATIVE)]
+    inertia: Annotated[Array, Measure(energy=1, time=2, count=3, square=True)]
     pose: Annotated[Array, POSE]
     twist: Annotated[Array, TWIST]
     shape: Mapping[str, Any] | None = None
     shapes: tuple[Mapping[str, Any], ...] = ()
 
 
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Joint(SceneElement):
-    """A joint of body 2 on body 1, through a lower pair or a universal joint.
+class ShapeEntry(Entry):
+    """``shape``: one of four, and its pose in the body."""
 
-    Attributes
-    ----------
-    kind : name of the pair (a key of the registry of pairs), or ``"universal"``
-    body1, body2 : a body's name (dotted for a body of a part), or ``"ground"``
-    frame1 : (7,) pose of the joint frame C1 in the centre-of-mass frame of body 1 (in the world for ground)
-    frame2 : (7,) pose of the joint frame C2 in body 2, likewise
-    pitch : m/rad, of a screw
-    friction : (d, d) symmetric, positive semidefinite, on the joint twist u_r
-    stiffness, rest : (d,) of the potential ``½ k (coordinate − rest)²``
-    heat : where the friction heat goes, ``"environment"`` or the name of a thermal node
-    drive : (d,) constant generalised force on u_r
-    motion : the prescribed motion law of a single degree of freedom, or None
-    coordinate : (size,) initial element of the pair's group; the two angles of a universal joint
-    rate : (d,) initial u_r, the twist of C2 relative to C1 in C2; of a universal joint the two angles' rates
-    limits, stop : (2,) least and largest coordinate of one degree of freedom, nan for none, and its stops' law; or None
-    both dry : dry friction of a joint with one degree of freedom, None without
-    middle : (7,) universal only: constant pose from the frame that follows the first revolute (C1 turned by
-        angle 1) to the frame before the second, whose z axis is the second axis; None otherwise
-    strain : of a beam element, which is a free joint; then friction and stiffness are 0
+    box: Extents | None = key("edge lengths, m", None)
+    sphere: Positive | None = key("radius, m", None)
+    cylinder: Sizes | None = key("radius and length along z, m", None)
+    mesh: Text | None = key("a mesh file (.stl .obj .ply .glb .off) in the scene file's folder, or below", None)
+    scale: Vector | None = key("scale of a mesh along its axes", None)
+    position: Vector | None = key("origin in the centre-of-mass frame, m", None)
+    rotation: Rotation | None = key("orientation there, [w, x, y, z] or a table", None)
+
+
+class BodyEntry(Entry):
+    """``[bodies.NAME]``"""
+
+    mass: NonNegative | None = key("kg; required unless density is given; 0 only with inertia 0", None)
+    inertia: Inertia | None = key(
+        "about the centre of mass, body axes: xx yy zz [xy xz yz], kg m²; default: from the shapes, homogeneous", None
+    )
+    density: Positive | None = key("density of the shapes, kg/m³; replaces mass and inertia", None)
+    position: Vector | None = key("centre of mass in the world, m", None)
+    rotation: Rotation | None = key("body to world, [w, x, y, z] or a table", None)
+    velocity: Vector | None = key("of the centre of mass, world basis, m/s", None)
+    angular_velocity: Vector | None = key("body basis, rad/s", None)
+    shape: ShapeEntry | None = key("shape for pictures, and for the inertia where none is given", None)
+    shapes: list[ShapeEntry] | None = key("list of shapes, instead of shape", None)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class BodyDraft:
+    """A body whose pose (7,) and velocity may still come from a joint: then they are None.
+
+    ``velocity`` is in the world basis, ``angular_velocity`` in body axes; None both, or neither.
     """
 
     name: str
-    kind: str
-    body1: Annotated[str, Named("body")]
-    body2: Annotated[str, Named("body")]
-    frame1: Annotated[Array, POSE]
-    frame2: Annotated[Array, POSE]
-    pitch: Annotated[float, Number(length=1)]
-    friction: Annotated[Array, Number(energy=1, time=1, others=-1, each=0, square=True)]
-    stiffness: Annotated[Array, Number(energy=1, others=-2, each=0)]
-    rest: Annotated[Array, Number(others=1, each=0)]
-    heat: Annotated[str, Named("node")]
-    drive: Annotated[Array, Number(energy=1, others=-1, each=0)]
-    motion: MotionLaw | None
-    coordinate: Array
-    rate: Annotated[Array, Number(time=-1, others=1, each=0)]
-    middle: Annotated[Array | None, POSE] = None
-    limits: Array | None = None
-    stop: Law | Impact | None = None
-    dry: Dry | None = None
-    strain: Strain | None = None
-    armature: Annotated[float, Number(energy=1, time=2, first=-2, least=NON_NEGATIVE)] = 0.0
-
-    @property
-    def dim(self) -> int:
-        """The number of freedoms d."""
-        return int(self.rate.shape[0])
+    mass: float
+    inertia: Array
+    pose: Array | None
+    velocity: Array | None
+    angular_velocity: Array | None
+    shape: Mapping[str, Any] | None
+    shapes: tuple[Mapping[str, Any], ...]
 
 
-def free_joint(body: Body) -> Joint:
-    """The implicit free joint of a body that no joint holds: of the ground and the body, both frames the
-    identity."""
-    zero = frozen(np.zeros(6))
-    return Joint(
-        name=body.name,
-        kind="free",
-        body1=GROUND,
-        body2=body.name,
-        frame1=IDENTITY_POSE,
-        frame2=IDENTITY_POSE,
-        pitch=0.0,
-        friction=frozen(np.zeros((6, 6))),
-        stiffness=zero,
-        rest=zero,
-        heat=ENVIRONMENT,
-        drive=zero,
-        motion=None,
-        coordinate=body.pose,
-        rate=body.twist,
+def resolve_body(table: Checked[BodyEntry], mode: str, folder: Path, odd: list[Fault]) -> BodyDraft:
+    """A body with its inertia checked; deviations that ``mode`` accepts are appended to ``odd``."""
+    entry, one = table.entry, table.entry.shape
+    mass, tensor = 1.0, np.eye(3)
+    if found := mass_and_moments(table):
+        mass, tensor = mass_and_inertia(table, *found, mode, odd)
+    shape = _shape(table.inner("shape", one), folder) if one and table.sound("shape") else None
+    shapes: list[Mapping[str, Any] | None] = []
+    if entry.shapes and table.sound("shapes"):
+        shapes = [_shape(table.inner(f"shapes[{i}]", each), folder) for i, each in enumerate(entry.shapes)]
+        if one is not None:
+            table.fault("both shapes", "shape", "shape and shapes")
+    placed = entry.position is not None or entry.rotation is not None
+    moving = entry.velocity is not None or entry.angular_velocity is not None
+    return BodyDraft(
+        name=table.name,
+        mass=mass,
+        inertia=tensor,
+        pose=values.pose(table) if placed else None,
+        velocity=np.array(entry.velocity or [0.0, 0.0, 0.0]) if moving else None,
+        angular_velocity=np.array(entry.angular_velocity or [0.0, 0.0, 0.0]) if moving else None,
+        shape=shape,
+        shapes=tuple(each for each in shapes if each is not None),
     )
+
+
+def _shape(table: Checked[ShapeEntry], folder: Path) -> Mapping[str, Any] | None:
+    given: dict[str, Any] = table.entry.model_dump(exclude_none=True)
+    kinds = [name for name in given if name not in ("position", "rotation", "scale")]
+    if len(kinds) != 1:
+        table.fault("shape", found=" and ".join(kinds) or "an empty table")
+        return None
+    if "scale" in given and "mesh" not in given:
+        table.fault("only mesh", "scale", kind=kinds[0])
+    if "rotation" in given:
+        given["rotation"] = values.quaternion(table).tolist()
+    if "mesh" in given:
+        file = file_inside(folder / given["mesh"], folder)
+        if file is None:
+            table.fault("mesh", "mesh")
+        elif file.suffix.lower() not in MESHES:
+            table.fault("mesh kind", "mesh", known=", ".join(MESHES))
+        given["mesh"] = str(file)
+    return given

@@ -14,19 +14,16 @@ import numpy as np
 
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.beam import thermoelastic
-from ephs.mechanics.elements.contact import contact
 from ephs.mechanics.elements.motor import armature
+from ephs.mechanics.scene.contacts import contact_points
 from ephs.mechanics.scene.demands import Demands, demands_on_parts
 from ephs.mechanics.scene.made import Made
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
 from ephs.mechanics.scene.site import INPUTS, Level, built
-from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.mechanics.shapes.pairs import Touch, touches
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
-from ephs.semantics.spaces import SE3
 from ephs.semantics.systems.kept import once
 from ephs.semantics.systems.system import Filling, System
 from ephs.solve.problem import Signal
@@ -87,10 +84,9 @@ def initial_state(scene: Scene) -> dict[Path, Array]:
 
 def _initial_state(scene: Scene) -> dict[Path, Array]:
     out: dict[Path, Array] = {}
-    poses: dict[str, Array] = {GROUND: SE3.identity()}
     for name, body in scene.all_bodies():
         at = component_path("bodies", name)
-        out[at / "pe" / "q"] = poses[name] = np.array(body.pose)
+        out[at / "pe" / "q"] = np.array(body.pose)
         if body.mass > 0.0:
             out[at / "ke" / "p"] = np.concatenate([body.inertia @ body.twist[:3], body.mass * body.twist[3:]])
     for name, j in scene.all_joints():
@@ -104,17 +100,6 @@ def _initial_state(scene: Scene) -> dict[Path, Array]:
                 out[place / "env" / "s"] = np.zeros(1)
         if j.armature:
             out[component_path("armatures", name) / "p"] = j.armature * j.rate
-    between: list[tuple[Path, tuple[str, str], tuple[Array, Array]]] = []
-    warm: list[tuple[Path, str]] = []
-    for name, c in scene.all_contacts():
-        bodies, touches = contact_points(scene, c)
-        at = component_path("contacts", name)
-        between += [(at / f"point{i}", bodies, (one, two)) for i, (one, two, _) in enumerate(touches)]
-        warm.append((at, c.heat))
-    out |= {at / "env" / "s": np.zeros(1) for at, heat in warm if heat == ENVIRONMENT}
-    for at, bodies, frames in between:
-        first, second = (SE3.compose(poses[body], frame) for body, frame in zip(bodies, frames, strict=True))
-        out[at / "pe" / "q_r"] = SE3.normalise(SE3.compose(SE3.inverse(first), second))
     for name, node in scene.all_thermal():
         out |= {component_path("thermal", name) / state: np.zeros(1) for state in ("s", *["e"] * (node.pull > 0.0))}
     for path, level in scene.levels():
@@ -125,21 +110,6 @@ def _initial_state(scene: Scene) -> dict[Path, Array]:
     for value in out.values():
         value.flags.writeable = False
     return out
-
-
-def contact_points(scene: Scene, of: Contact) -> tuple[tuple[str, str], tuple[Touch, ...]]:
-    """Bodies 1 and 2 of a contact, and its gaps with their frames on these; made once and kept with the scene."""
-
-    def made() -> dict[tuple[str, str], tuple[tuple[str, str], tuple[Touch, ...]]]:
-        surfaces: Mapping[str, Surface] = dict(scene.all_surfaces())
-        out: dict[tuple[str, str], tuple[tuple[str, str], tuple[Touch, ...]]] = {}
-        for _, each in scene.all_contacts():
-            one, other = (surfaces[name] for name in each.surfaces)
-            points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
-            out[each.surfaces] = ((other.body, one.body) if swapped else (one.body, other.body)), points
-        return out
-
-    return once(scene, "contact points", made)[of.surfaces]
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Signal]:
@@ -274,14 +244,8 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
             at = _at("drives", name)
             b.add(Path(["armatures", name]), armature(b.junctions[at].quantity, j.armature), {"p": str(at)})
     own = built(scene)
-    b.take(own, "springs")
-    for name, c in scene.contacts.items():
-        ends, points = contact_points(scene, c)
-        ports = {"p1": b.momentum(ends[0]), "p2": b.momentum(ends[1])}
-        if c.heat != ENVIRONMENT:
-            ports["s"] = b.entropy(c.heat)
-        b.add(Path(["contacts", name]), contact(points, c.law, heat=c.heat != ENVIRONMENT), ports)
-    b.take(own, "tendons")
+    for section in ("springs", "contacts", "tendons"):
+        b.take(own, section)
     for name, node in scene.thermal.items():
         ports = {"s": b.entropy(name)} | ({"e": b.lengthening(name)} if node.pull else {})
         b.add(Path(["thermal", name]), _storing(node), ports)

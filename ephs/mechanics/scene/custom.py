@@ -8,6 +8,7 @@ part follow from these.
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 
 import numpy as np
@@ -18,7 +19,8 @@ from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rules import KeyRule
 from ephs.mechanics.scene.schema_numbers import Entry
 from ephs.mechanics.scene.units import dimension, written
-from ephs.operad import Path, PatternError
+from ephs.operad import Path as Name
+from ephs.operad import PatternError
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -127,6 +129,8 @@ class Element(Entry):
     """Keys that are points, and the keys of their bodies."""
     rules: ClassVar[tuple[KeyRule, ...]] = ()
     _name: str = PrivateAttr("")
+    _folder: Path = PrivateAttr(Path())
+    """Folder of the scene file, for files that it names."""
 
     def __init_subclass__(cls, **_: str) -> None:
         super().__init_subclass__()
@@ -169,11 +173,16 @@ class Element(Entry):
             The table is not sound.
         """
         try:
-            found = cls.model_validate({key: value for key, value in table.items() if key != "name"})
+            found = cls.model_validate({key: value for key, value in cls._upgraded(table).items() if key != "name"})
         except ValidationError as error:
             where, what = error.errors(include_url=False)[0]["loc"], error.errors(include_url=False)[0]["msg"]
             raise ValueError(f"{cls.section}.{name}.{'.'.join(map(str, where))}: {what}") from None
         return found.normalised().called(name)
+
+    @classmethod
+    def _upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The table of an older result file with the keys of today."""
+        return table
 
     def normalised(self) -> Self:
         """Itself with one number written as a list where it may be both, and the like."""
@@ -256,6 +265,13 @@ class Element(Entry):
     def __str__(self) -> str:
         """In a few words."""
         return " – ".join(name for _, _, name in self.references()) or self.said
+
+
+def read_in(element: Element, name: str, folder: Path = Path()) -> Element:
+    """The element with a name, and while its file is read with the folder of this."""
+    found = element.called(name)
+    found._folder = folder
+    return found
 
 
 def _extra(given: Any) -> _Hidden:
@@ -348,7 +364,7 @@ def _forms(schema: Mapping[str, Any]) -> set[str]:
 
 def _is_name(text: str) -> bool:
     try:
-        Path([text])
+        Name([text])
     except PatternError:
         return False
     return True

@@ -30,17 +30,11 @@ class Demands:
 def demands_on_parts(scene: Scene, demands: Demands) -> Demands:
     """Ports that the level above and this level's joints and other elements need from its parts."""
     joints = scene.joints.values()
-    bodies = {name for j in joints for name in (j.body1, j.body2)} | _touching(scene)
-    nodes = {x.heat for x in (*joints, *scene.contacts.values())}
+    bodies = {name for j in joints for name in (j.body1, j.body2)}
+    nodes = {x.heat for x in joints}
     turned = {name for name, j in scene.joints.items() if j.armature}
     for path in built(scene).junctions:
         of = {"momenta": bodies, "entropies": nodes, "drives": turned}.get(path[0])
         if of is not None:
             of.add(".".join(path[1:]))
     return Demands(demands.bodies | bodies, demands.nodes | nodes, demands.joints | turned)
-
-
-def _touching(scene: Scene) -> set[str]:
-    """The bodies of this level's own contacts, as seen from it."""
-    surfaces = dict(scene.all_surfaces())
-    return {surfaces[name].body for c in scene.contacts.values() for name in c.surfaces}

@@ -9,14 +9,12 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
-from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ELEMENTS, IDENTITY_POSE, Scene, World, frozen
 from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.scene.registry import elements_from
-from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import Law
@@ -66,20 +64,16 @@ def _array(value: Any) -> Any:
     return None if value is None else frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
 
 
-def _rows(array: dict[str, Any]) -> Any:
-    """An array of an older file."""
-    return np.reshape(array["values"], array["shape"]).tolist()
+def _rows(value: Any) -> Any:
+    """A value; an array of an older file as nested lists."""
+    is_array = isinstance(value, Mapping) and value.keys() == {"shape", "values"}
+    return np.reshape(value["values"], value["shape"]).tolist() if is_array else value
 
 
 def _value(cls: Any, data: dict[str, Any]) -> Any:
     """A value, with its arrays and the laws in it."""
     if issubclass(cls, Element):
-        plain = {key: _rows(value) if isinstance(value, dict) else value for key, value in data.items()}
-        if cls is Actuator:  # older files have a place for their heat
-            plain.pop("heat", None)
-        if cls is Spring and "body1" in plain:  # older files name each end
-            plain["bodies"] = [plain.pop("body1"), plain.pop("body2")]
-        return cls.of_table(data["name"], plain)
+        return cls.of_table(data["name"], {key: _rows(value) for key, value in data.items()})
 
     def made(key: str, value: Any) -> Any:
         if np.ndarray in types[key]:
@@ -100,7 +94,6 @@ _INSIDE: Mapping[str, Callable[[Any], Any]] = {
     "motion": law_from,
     "dry": lambda of: Dry(**of),
     "stop": _law,
-    "law": _law,
     "strain": lambda of: _value(Strain, of),
 }
 

@@ -7,18 +7,18 @@ remembered as spoiled, so that the checks after this one can look at the rest of
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, final, get_args
+from typing import Any, TypeVar, final, get_args
 
 from pydantic import ValidationError, WrapValidator
 
+from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nearest_name, shown
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import FORMS
 from ephs.mechanics.scene.schema import FILE_KEYS, SECTIONS, AssemblyEntry, WorldEntry
-from ephs.mechanics.scene.schema_flexible import SectionEntry
 from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
-from ephs.mechanics.scene.schema_touching import SurfaceShapeEntry
+from ephs.mechanics.scene.sections import SectionEntry
 
 LONGEST_NAME = 200
 E = TypeVar("E", bound=Entry)
@@ -30,9 +30,6 @@ _NEUTRAL: dict[str, Any] = {
     "capacity": 1.0,
     "temperature": 1.0,
     "use": "?",
-    "body": "ground",
-    "shape": SurfaceShapeEntry(),
-    "surfaces": ["?", "?"],
     "section": SectionEntry(),
 }
 
@@ -57,19 +54,6 @@ _EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
     "less_than_equal": lambda ctx: ("range", f"a number not above {ctx['le']:g}"),
     "literal_error": lambda ctx: ("range", str(ctx["expected"])),
 }
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Checked(Generic[E]):
-    """A validated table, and the keys in it that had faults."""
-
-    entry: E
-    spoiled: frozenset[str] = frozenset()
-
-    def sound(self, *keys: str) -> bool:
-        """Whether none of these keys had a fault."""
-        return self.spoiled.isdisjoint(keys)
 
 
 @final
@@ -116,7 +100,7 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
     else:
         spoiled = set[str]()
         try:
-            return Checked(model.model_validate(raw))
+            return Checked(model.model_validate(raw), key, faults)
         except ValidationError as error:
             items = error.errors(include_url=False)
             misspelled = _misspelled(model, raw, items)
@@ -127,26 +111,10 @@ def validate(model: type[E], raw: Any, key: str, faults: list[Fault]) -> Checked
             spoiled |= misspelled
     sound = {k: v for k, v in raw.items() if k not in spoiled}
     if issubclass(model, Element):
-        return Checked(model.model_construct(**sound), frozenset(spoiled))
+        return Checked(model.model_construct(**sound), key, faults, frozenset(spoiled))
     required = {k for k, field in model.model_fields.items() if field.is_required()}
     neutral = {k: _NEUTRAL[k] for k in spoiled & required}
-    return Checked(model.model_validate({**sound, **neutral}), frozenset(spoiled))
-
-
-def shown(value: Any) -> str:
-    """A value in the file's notation, shortened."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "a table"
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, float):
-        return "nan" if math.isnan(value) else repr(value)
-    if isinstance(value, list):
-        text = "[" + ", ".join(shown(entry) for entry in value) + "]"
-        return text if len(text) <= 60 else f"{text[:57]}…] of {len(value)} entries"
-    return str(value)
+    return Checked(model.model_validate({**sound, **neutral}), key, faults, frozenset(spoiled))
 
 
 def _check_format(raw: Mapping[str, Any], faults: list[Fault]) -> None:

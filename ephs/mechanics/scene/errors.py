@@ -1,8 +1,9 @@
 """Faults of scenes: one exception for the layer, every text in one table."""
 
+import math
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from heapq import nsmallest
 from typing import Any, final
@@ -159,7 +160,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     "table": ("a table", "write it as [{key}] with keys below"),
     "type": ("{what}", "correct the value"),
     "length": ("{what}", "correct the number of entries"),
-    "one freedom": ("a number", "a pair with one degree of freedom takes one number"),
     "large": ("a number of at most {most:g} in size", "check the unit"),
     "finite": ("a finite number", "nan and inf are not allowed"),
     "range": ("{what}", "correct the value"),
@@ -192,24 +192,9 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "not built": ("an element that can be built", "correct its values"),
     "unknown surface": ("a surface", "{hint}"),
-    "convex mesh": ("an STL file of a convex body", "use its convex hull, or several convex pieces"),
     "many faces": (
         "at most {most} where it meets other shapes than planes",
         "take fewer points, or several simple shapes, or put both surfaces into one group",
-    ),
-    "solid points": ("points of a body with volume", "take a plane or a thin box for what is flat"),
-    "surface shape": (
-        "one of sphere, capsule, cylinder, box, plane = {{}}, mesh, points",
-        "a surface has exactly one shape",
-    ),
-    "contact bodies": ("surfaces of two different bodies", "name surfaces of two bodies, or of a body and the ground"),
-    "contact still": ("surfaces that can move relative to each other", "remove this contact"),
-    "contact twice": ("a pair of surfaces without another contact", "remove one of the two contacts"),
-    "surface pair": ("one plane at most", "list the pairs in contacts, or use other shapes"),
-    "two exponents": ("one exponent", "give both surfaces the same exponent, or one to the contact"),
-    "no stiffness": (
-        "a stiffness of a surface or of the contact, or a restitution of both surfaces or the contact",
-        "add one of these keys",
     ),
     "hard and soft": ("stiffness or restitution", "hard contacts have no {soft}: remove one of the two"),
     "hard overlap": (
@@ -346,6 +331,22 @@ def fault(code: str, key: str, found: object, **values: Any) -> Fault:
     key = legible(key)
     words = {name: legible(value) if isinstance(value, str) else value for name, value in values.items()}
     return Fault(key, legible(str(found)), expected.format(key=key, **words), advice.format(key=key, **words))
+
+
+def shown(value: Any) -> str:
+    """A value in the file's notation, shortened."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, float):
+        return "nan" if math.isnan(value) else repr(value)
+    if isinstance(value, list):
+        text = "[" + ", ".join(shown(entry) for entry in value) + "]"
+        return text if len(text) <= 60 else f"{text[:57]}…] of {len(value)} entries"
+    return str(value)
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:

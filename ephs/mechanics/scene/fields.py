@@ -7,7 +7,6 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.model import (
@@ -23,9 +22,8 @@ from ephs.mechanics.scene.model import (
     mapped,
     with_sections,
 )
-from ephs.mechanics.scene.motions import changed, number_of_law
+from ephs.mechanics.scene.motions import changed
 from ephs.mechanics.scene.registry import REGISTERED
-from ephs.mechanics.scene.surfaces import Contact
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -107,22 +105,6 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
         return _edited(scene, kind, name, edited)
 
     return Field(get, put, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
-
-
-def _law(key: str, least: tuple[float, bool] | None = None) -> Field:
-    """A number of the law of contacts that have it: hard ones have no stiffness, soft ones no restitution."""
-
-    def get(scene: Scene, name: str) -> Array:
-        value = getattr(_thing(scene, "contacts", name).law, key, None)
-        return np.zeros(0) if value is None else np.asarray(value, dtype=float)
-
-    def put(scene: Scene, name: str, values: Array) -> Scene:
-        def edited(contact: Contact) -> Contact:
-            return replace(contact, law=replace(contact.law, **{key: float(values)}))
-
-        return _edited(scene, "contacts", name, edited)
-
-    return Field(get, put, least)
 
 
 def _world(key: str) -> Field:
@@ -254,38 +236,28 @@ def _put_coordinate(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "joints", name, lambda j: replace(j, coordinate=element))
 
 
-def _motion(key: str) -> Field:
-    """A number of a prescribed motion, if there is one."""
+def _law(law: str, key: str, change: Callable[[Joint, str, float], Joint], moves: str = "") -> Field:
+    """A number of a joint's prescribed motion or dry friction, if there is one."""
 
     def get(scene: Scene, name: str) -> Array:
-        number = number_of_law(scene.joint(name).motion, key)
+        of: Any = getattr(scene.joint(name), law)
+        number = None if of is None else dict(of.numbers).get(key)
         return np.zeros(0) if number is None else np.array([number])
 
     def put(scene: Scene, name: str, values: Array) -> Scene:
-        def edit(joint: Joint) -> Joint:
-            law = changed(joint.motion, key, float(values[0]))
-            return replace(joint, motion=law, rate=frozen(np.array([law.rate(0.0)])))
+        return _edited(scene, "joints", name, lambda joint: change(joint, key, float(values[0])))
 
-        return _edited(scene, "joints", name, edit)
-
-    return Field(get, put, moves="state")
+    return Field(get, put, moves=moves)
 
 
-def _dry(key: str) -> Field:
-    """A number of dry friction, if there is any."""
+def _led(joint: Joint, key: str, value: float) -> Joint:
+    law = changed(joint.motion, key, value)
+    return replace(joint, motion=law, rate=frozen(np.array([law.rate(0.0)])))
 
-    def get(scene: Scene, name: str) -> Array:
-        dry = scene.joint(name).dry
-        return np.zeros(0) if dry is None else np.array([dict(dry.numbers)[key]])
 
-    def put(scene: Scene, name: str, values: Array) -> Scene:
-        def edit(joint: Joint) -> Joint:
-            assert joint.dry is not None
-            return replace(joint, dry=replace(joint.dry, **{key: float(values[0])}))
-
-        return _edited(scene, "joints", name, edit)
-
-    return Field(get, put)
+def _rubbed(joint: Joint, key: str, value: float) -> Joint:
+    assert joint.dry is not None
+    return replace(joint, dry=replace(joint.dry, **{key: value}))
 
 
 def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
@@ -309,7 +281,7 @@ def _registered(kind: type[Element]) -> dict[str, Field]:
     def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         from ephs.mechanics.scene.resolve_elements import number_faults
 
-        return list(number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}"))
+        return number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}")
 
     return {key: _attribute(kind.section, key, faults=faults) for key in kind.numbers}
 
@@ -333,12 +305,12 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     "joints": {
         "pitch": _attribute("joints", "pitch", moves="frame"),
         "friction": _attribute("joints", "friction", spread=True, faults=_friction_faults),
-        **{f"dry.{key}": _dry(key) for key in ("coulomb", "static", "stribeck", "slip")},
+        **{f"dry.{key}": _law("dry", key, _rubbed) for key in ("coulomb", "static", "stribeck", "slip")},
         "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
         "rest": _attribute("joints", "rest", faults=_stiffness_faults),
         "drive": _attribute("joints", "drive"),
         "coordinate": Field(_coordinate, _put_coordinate, moves="state"),
-        **{f"motion.{key}": _motion(key) for key in ("rate", "amplitude", "frequency", "phase")},
+        **{f"motion.{key}": _law("motion", key, _led, "state") for key in ("rate", "amplitude", "frequency", "phase")},
         "rate": _attribute("joints", "rate", moves="state"),
         "at": Field(_at, _put_at, moves="frame"),
         "frame1.position": _frame("frame1"),
@@ -346,14 +318,6 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     },
     **{section: _registered(KINDS[section]) for section in ("springs", "tendons", *ATTACHED)},
     "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
-    **{section: _registered(KINDS[section]) for section in ("conduction", "markers")},
-    "contacts": {
-        "stiffness": _law("stiffness", POSITIVE),
-        "loss": _law("loss", NON_NEGATIVE),
-        "friction": _law("friction", NON_NEGATIVE),
-        "slip": _law("slip", POSITIVE),
-        "rolling": _law("rolling", NON_NEGATIVE),
-        "spinning": _law("spinning", NON_NEGATIVE),
-    },
+    **{section: _registered(KINDS[section]) for section in ("conduction", "markers", "contacts")},
 }
 """Kind of element -> key of the scene file -> its numbers."""

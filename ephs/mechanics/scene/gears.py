@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.elements.gear import gear
 from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import ENVIRONMENT
-from ephs.mechanics.scene.rules import rule
+from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Names, NonNegative, Number, Numbers, Text
 from ephs.mechanics.scene.site import Site
 from ephs.semantics.bundles.bundle import Array
@@ -29,7 +29,7 @@ def different(element: Any) -> bool:
     expected="{count} numbers: one for each joint; of a gear, one for each joint after the first",
     advice="correct the number of entries",
 )
-def counted(element: Any) -> bool | Mapping[str, object]:
+def counted(element: Any) -> Told:
     """Whether there are as many ratios as an element has to have."""
     return np.size(element.ratio) in element.counts or {"count": max(element.counts)}
 
@@ -63,7 +63,7 @@ class Gear(Element, section="gears", said="linear relations between the rates of
         "joints", "ratio", "stiffness", at="", placed=True, found="{found}",
         expected="a rate of {first} of {rate:.6g}", advice="correct the initial rates; they must satisfy the gear",
     )  # fmt: skip
-    def turning(self, site: Site) -> bool | Mapping[str, object]:
+    def turning(self, site: Site) -> Told:
         """Whether the initial rates satisfy it, where it is rigid."""
         first, *others = rates = [float(site.rate(joint)[0]) for joint in self.joints]
         rest = [by * rate for by, rate in zip(np.atleast_1d(self.ratio), others, strict=True)]

@@ -5,11 +5,11 @@ Poses are 7-vectors ``[w, x, y, z, rx, ry, rz]``; every twist is left-trivialise
 """
 
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.scene.bodies import IDENTITY_POSE, Joint
+from ephs.mechanics.scene.bodies import IDENTITY_POSE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces import rotations as so3
@@ -18,6 +18,9 @@ from ephs.semantics.spaces.codes import SO3 as SO3_CODE
 from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.spaces.rank import ALIGNED, DIRECTION
+
+if TYPE_CHECKING:
+    from ephs.mechanics.scene.joints import Joint
 
 UNIVERSAL = "universal"
 # Pairs whose degrees of freedom do not depend on the direction of the joint axes.
@@ -104,7 +107,7 @@ def coupling(kind: str, pitch: float = 0.0, middle: Array | None = None) -> Coup
     return Coupling(pair(kind, pitch=pitch) if "pitch" in PAIRS[kind].parameters else pair(kind))
 
 
-def coupling_of(joint: Joint) -> Coupling:
+def coupling_of(joint: "Joint") -> Coupling:
     """The coupling of a joint."""
     return coupling(joint.kind, joint.pitch, joint.middle)
 

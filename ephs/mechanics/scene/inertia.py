@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
+from ephs.mechanics.scene.checked import Checked
+from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen, symmetric_eigenvalues
@@ -22,7 +22,7 @@ GYRATION = 1e-20
 
 
 def mass_and_inertia(
-    mass: float, moments: list[float], key: str, mode: str, faults: list[Fault], odd: list[Fault]
+    table: Checked[Any], mass: float, moments: list[float], mode: str, odd: list[Fault]
 ) -> tuple[float, Array]:
     """The mass, and the inertia tensor (3, 3), of a body.
 
@@ -31,14 +31,14 @@ def mass_and_inertia(
     moments
         xx yy zz [xy xz yz].
     mode
-        ``"strict"``: what is impossible is appended to ``faults``; ``"warn"``: it is kept, and appended to ``odd``;
+        ``"strict"``: what is impossible is a fault of the table; ``"warn"``: it is kept, and appended to ``odd``;
         ``"nearest"``: the possible tensor nearest to it is taken, and both are appended to ``odd``.
     """
     xx, yy, zz, xy, xz, yz = (*moments, 0.0, 0.0, 0.0)[:6]
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    strict, where = mode == "strict", f"{key}.inertia"
+    strict, where = mode == "strict", f"{table.key}.inertia"
     if mass == 0.0 and strict and tensor.any():
-        faults.append(fault("massless", where, shown(moments)))
+        table.fault("massless", "inertia", shown(moments))
         return mass, tensor
     if not tensor.any() and mass == 0.0:
         return mass, tensor
@@ -48,12 +48,12 @@ def mass_and_inertia(
         if not wrong and principal[0] <= 0.1 * TINY * principal[2]:
             wrong = "inertia singular"
         if wrong:
-            faults.append(fault(wrong, where, _text(principal)))
+            table.fault(wrong, "inertia", _text(principal))
         return mass, tensor
     if wrong and mode == "nearest":
         tensor = nearest_inertia(tensor)
         odd.append(fault("inertia nearest", where, _text(principal), taken=_text(symmetric_eigenvalues(tensor))))
-    mass, tensor = _regular(mass, tensor, key, odd)
+    mass, tensor = _regular(mass, tensor, table.key, odd)
     principal = symmetric_eigenvalues(tensor)
     if mode == "warn" and _wrong(principal):
         odd.append(fault("inertia kept", where, _text(principal)))

@@ -11,18 +11,33 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene import resolve, values
+from ephs.mechanics.scene import values
 from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
-from ephs.mechanics.scene.entries import Document, read_document, shown
-from ephs.mechanics.scene.errors import Fault, ModelWarning, SceneError, SceneWarning, fault, legible, told, warn_caller
+from ephs.mechanics.scene.bodies import resolve_body
+from ephs.mechanics.scene.contacts import overlaps
+from ephs.mechanics.scene.entries import Document, read_document
+from ephs.mechanics.scene.errors import (
+    Fault,
+    ModelWarning,
+    SceneError,
+    SceneWarning,
+    fault,
+    legible,
+    shown,
+    told,
+    warn_caller,
+)
+from ephs.mechanics.scene.joints import Asked, resolve_joint
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved
-from ephs.mechanics.scene.resolve_elements import placed_faults, resolve_elements, settled
-from ephs.mechanics.scene.state import Asked, adjusted
-from ephs.mechanics.scene.text import file_text, lost
-from ephs.mechanics.scene.touching import Laws, overlaps, resolve_contacts, resolve_surfaces, with_stops
+from ephs.mechanics.scene.resolve_elements import Names, placed_faults, resolve_elements, settled, with_contacts
+from ephs.mechanics.scene.schema_elements import attributes
+from ephs.mechanics.scene.state import Snapshot, adjusted
+from ephs.mechanics.scene.stops import beyond, with_stops
+from ephs.mechanics.scene.text import file_inside, file_text, lost
+from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
 from ephs.operad.collector import paused_collector
@@ -57,7 +72,6 @@ class _Reading:
     odd: list[Fault] = field(default_factory=list)
     left: list[str] = field(default_factory=list)
     asked: dict[str, Asked] = field(default_factory=dict)
-    laws: dict[str, Laws] = field(default_factory=dict)
 
 
 @paused_collector()
@@ -124,24 +138,23 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     parts, lost = _parts(document, path, world, stack, r)
     _check_names(document, faults)
     sections = document.sections
-    rods = _beams(document, world, faults)
+    rods = _beams(document, world)
     parts |= {name: rod.nodes for name, rod in rods.items()}
-    r.laws.update({name: dict.fromkeys(rod.nodes.surfaces, rod.law) for name, rod in rods.items() if rod.law})
     warm = {name for rod in rods.values() for name in rod.thermal}
     names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
-    for name, table in sections["beams"].items():
-        check_beam(name, table, names, faults)
+    for table in sections["beams"].values():
+        check_beam(table, names)
     mode = r.inertia or document.assembly.inertia
-    bodies = [resolve.resolve_body(n, t, mode, path.parent, faults, r.odd) for n, t in sections["bodies"].items()]
-    joints = [resolve.resolve_joint(n, t, names, faults) for n, t in sections["joints"].items()]
-    thermal = resolve.resolve_thermal(document)
-    surfaces = resolve_surfaces(document, names, path.parent, faults)
-    elements = resolve_elements(document, parts, names, faults)
+    bodies = [resolve_body(table, mode, path.parent, r.odd) for table in sections["bodies"].values()]
+    joints = [resolve_joint(table, names) for table in sections["joints"].values()]
+    stores = sections["thermal"].items()
+    thermal = {name: ThermalNode(name=name, **attributes(ThermalNode, table.entry)) for name, table in stores}
+    elements = resolve_elements(document, parts, names, path.parent, faults)
     if faults:
         return None
-    drafts = [*(j for j in joints if j is not None), *(j for rod in rods.values() for j in rod.joints)]
+    drafts = [*filter(None, joints), *(start for rod in rods.values() for start in rod.joints)]
     placed, coupled, open_joints = assemble(bodies, drafts, parts, world.gravity)
-    r.asked.update({j.name: Asked(j.coordinates if j.place.in_bodies else None, j.rate) for j in drafts})
+    r.asked.update({joint.name: asked for joint, asked in drafts})
     elements["conduction"] |= {name: x for rod in rods.values() for name, x in rod.conduction.items()}
     scene = Scene(
         document.name,
@@ -151,22 +164,20 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
         thermal=thermal | {name: x for rod in rods.values() for name, x in rod.thermal.items()},
         parts=parts,
         source=str(path),
-        surfaces=surfaces,
         beams={name: rod.beam for name, rod in rods.items()},
     )
-    scene = settled(with_sections(scene, elements))
-    contacts, laws = resolve_contacts(document, scene, r.laws, names, faults)
+    scene = with_contacts(with_sections(scene, elements), faults)
     if faults:
         return None
-    scene = with_stops(document, replace(scene, contacts=contacts), faults)
+    scene = with_stops(document, settled(scene))
     if faults:
         return None
-    r.odd.extend(overlaps(scene, faults))
+    touched = bool(scene.contacts) or any(joint.limits is not None for _, joint in scene.all_joints())
+    length = Snapshot.of(scene).scale(world.gravity).length if touched else 1.0
+    r.odd.extend([*beyond(scene, length, faults), *overlaps(scene, length, faults)])
     faults += placed_faults(scene)
     if faults:
         return None
-    r.laws.clear()
-    r.laws[""] = laws
     if r.adjust:
         scene, open_joints = adjusted(scene, r.asked)
     faults += open_joints
@@ -208,7 +219,7 @@ def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
 
 
 def _world(document: Document, wanted: World | None, faults: list[Fault]) -> World:
-    own = resolve.resolve_world(document)
+    own = None if document.world is None else World(**attributes(World, document.world))
     if wanted is None:
         return own or World()
     if own is not None and _described(own) != _described(wanted):
@@ -229,58 +240,49 @@ def _parts(
     stack = (*stack, path.resolve())
     found: dict[str, Scene] = {}
     for name, table in document.sections["parts"].items():
-        entry, key = table.entry, f"parts.{name}"
-        pose = values.pose(entry.position, entry.rotation, key, faults)
+        entry, key = table.entry, table.key
+        pose = values.pose(table)
         if not table.sound("use"):
             continue
-        file = _file_inside(path.parent / entry.use, r.home)
-        if file is None:
-            faults.append(fault("outside scene", f"{key}.use", shown(entry.use)))
+        file = path.parent / entry.use
+        if file_inside(file, r.home) is None:
+            table.fault("outside scene", "use")
             continue
         r.files["parts"] += 1
         if r.files["parts"] > MOST_PARTS or len(stack) > MOST_LEVELS:
             if r.files["parts"] == MOST_PARTS + 1 or len(stack) > MOST_LEVELS:
-                faults.append(fault("many parts", f"{key}.use", "one more", most=MOST_PARTS))
+                table.fault("many parts", "use", "one more", most=MOST_PARTS)
             continue
         if file.resolve() in stack:
             chain = " → ".join(p.name for p in (*stack[stack.index(file.resolve()) :], file))
-            faults.append(fault("cycle", f"{key}.use", shown(entry.use), chain=chain))
+            table.fault("cycle", "use", chain=chain)
             continue
-        below = replace(r, faults=[], odd=[], left=[], asked={}, laws={})
+        below = replace(r, faults=[], odd=[], left=[], asked={})
         part = _read(file, world, stack, below)
         faults += [_seen_from_outside(f, key, entry.use) for f in below.faults]
         r.odd.extend(_seen_from_outside(f, key, entry.use) for f in below.odd)
         r.left.extend(f"{legible(key)}: {line}" for line in below.left)
         r.asked.update({f"{name}.{joint}": asked for joint, asked in below.asked.items()})
-        r.laws[name] = below.laws.get("", {})
         if part is not None:
             found[name] = moved(part, np.array(pose), world)
     return found, set(document.sections["parts"]) - set(found)
 
 
-def _beams(document: Document, world: World, faults: list[Fault]) -> dict[str, BeamDraft]:
+def _beams(document: Document, world: World) -> dict[str, BeamDraft]:
     """The beams with a valid place and section."""
-    drafts = {n: resolve_beam(n, t, world, faults) for n, t in document.sections["beams"].items()}
+    drafts = {name: resolve_beam(table, world) for name, table in document.sections["beams"].items()}
     found = {name: draft for name, draft in drafts.items() if draft is not None}
     for name, draft in found.items():
         kinds = {
-            "joints": [each.name for each in draft.joints],
+            "joints": [joint.name for joint, _ in draft.joints],
             "thermal": draft.thermal,
             "conduction": draft.conduction,
         }
         for kind, taken in kinds.items():
             for each in taken:
                 if each in document.sections[kind]:
-                    faults.append(fault("collision", f"{kind}.{each}", shown(each), other=f"the beam {name}"))
+                    document.sections[kind][each].fault("collision", found=shown(each), other=f"the beam {name}")
     return found
-
-
-def _file_inside(file: Path, home: Path) -> Path | None:
-    """The resolved file, if it is in a folder or below it."""
-    try:
-        return file if file.resolve().is_relative_to(home) else None
-    except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle
-        return None
 
 
 def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
@@ -288,11 +290,11 @@ def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
-def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> resolve.Names:
+def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> Names:
     bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
     thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
     sections = document.sections
-    return resolve.Names(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
+    return Names(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
 
 
 def _is_name(text: str) -> bool:

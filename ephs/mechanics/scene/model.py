@@ -12,19 +12,21 @@ from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.adjustment import Adjustment
-from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, Joint, World, free_joint
+from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body, World
 from ephs.mechanics.scene.conduction import Conduction
+from ephs.mechanics.scene.contacts import Contact
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.cylinders import Cylinder
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, SceneElement, frozen
 from ephs.mechanics.scene.flexible import Beam
 from ephs.mechanics.scene.gas_springs import GasSpring
 from ephs.mechanics.scene.gears import Gear
+from ephs.mechanics.scene.joints import Joint, free_joint
 from ephs.mechanics.scene.loads import Load
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.motors import Motor
 from ephs.mechanics.scene.springs import Spring
-from ephs.mechanics.scene.surfaces import Contact, Surface
+from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.tendons import Tendon
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.semantics.bundles.bundle import Array
@@ -135,18 +137,13 @@ class Scene:
 
     def body(self, name: str) -> Body:
         """The body of this (dotted) name, its names seen from here."""
-        part, path, own = self._part_of(name)
-        if part is not None and own in part.bodies:
-            return part.bodies[own].seen(path)
-        return _find(dict(self.all_bodies()), name, "body")
+        return self._own("bodies", name) or _find(dict(self.all_bodies()), name, "body")
 
     def joint(self, name: str) -> Joint:
         """The joint of this (dotted) name, its names seen from here; the implicit free joint of a body
         without a joint too."""
-        part, path, own = self._part_of(name)
-        if part is not None and own in part.joints:
-            return part.joints[own].seen(path)
-        return _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
+        own = self._own("joints", name)
+        return own or _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
 
     def section(self, name: str) -> Mapping[str, Any]:
         """The elements of a section of this level, registered ones included."""
@@ -239,13 +236,14 @@ class Scene:
 
         return scene_html(self)
 
-    def _part_of(self, name: str) -> "tuple[Scene | None, str, str]":
-        """The part that a dotted name leads into, or None; the path before the last name; the last name."""
+    def _own(self, section: str, name: str) -> Any:
+        """The element of a section that a dotted name leads to, its names seen from here, or None."""
         *parts, own = name.split(".")
         scene: Scene | None = self
         for part in parts:
             scene = None if scene is None else scene.parts.get(part)
-        return scene, name[: len(name) - len(own)], own
+        found = None if scene is None else scene.section(section).get(own)
+        return None if found is None else found.seen(name[: len(name) - len(own)])
 
     def levels(self, path: str = "") -> Iterator[tuple[str, "Scene"]]:
         """The scene and all its parts, each with the path to it, empty or with a dot at its end."""

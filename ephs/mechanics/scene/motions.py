@@ -3,11 +3,26 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.schema import MotionEntry
+from ephs.mechanics.scene.checked import Checked
+from ephs.mechanics.scene.errors import shown
+from ephs.mechanics.scene.schema_numbers import Entry, Number, Series, key
 from ephs.solve.errors import OptionError
 from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
+
+
+class MotionEntry(Entry):
+    """A prescribed motion: the change of the coordinate from its initial value, in one of four forms."""
+
+    rate: Number | None = key("constant rate of the single degree of freedom, rad/s or m/s", None)
+    polynomial: Series | None = key(
+        "coefficients c₁, c₂, … of c₁ t + c₂ t² + …; rad/s, rad/s², … or m/s, m/s², …", None
+    )
+    amplitude: Number | None = key("amplitude A of the harmonic A sin(2π f t + φ), rad or m", None)
+    frequency: Number | None = key("frequency f of the harmonic, Hz", None)
+    phase: Number | None = key("phase φ of the harmonic, rad; default: 0", None)
+    times: Series | None = key("ascending times of a table, s; a spline of fifth order, at rest before and after", None)
+    displacements: Series | None = key("displacements at these times, rad or m", None)
+
 
 STILL: Final = PolynomialMotion((0.0,))
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -26,17 +41,18 @@ _MAKE: Final[Mapping[str, Callable[[Any], MotionLaw]]] = {
 }
 
 
-def law_of(entry: MotionEntry, key: str, faults: list[Fault]) -> MotionLaw:
+def law_of(table: Checked[MotionEntry]) -> MotionLaw:
     """The motion law of a table; rest, and a fault, if the table is invalid."""
-    given = {name for keys in _KEYS.values() for name in keys if getattr(entry, name) is not None}
+    entry = table.entry
+    given = {name for name, value in entry if value is not None}
     forms = [form for form, keys in _KEYS.items() if given <= set(keys) and given >= set(keys) - _OPTIONAL]
     if not forms:
-        faults.append(fault("motion form", key, ", ".join(sorted(given)) or "an empty table"))
+        table.fault("motion form", found=", ".join(sorted(given)) or "an empty table")
         return STILL
     try:
         return _MAKE[forms[0]](entry)
     except OptionError as error:
-        faults.append(fault("motion number", f"{key}.{error.key}", shown(error.found), expected=error.expected))
+        table.fault("motion number", error.key, shown(error.found), expected=error.expected)
         return STILL
 
 
@@ -55,11 +71,6 @@ def law_from(data: Any) -> MotionLaw | None:
 def first_rate(law: MotionLaw | None) -> float | None:
     """The rate of a motion law at the start; None without."""
     return None if law is None else law.rate(0.0)
-
-
-def number_of_law(of: MotionLaw | None, key: str) -> float | None:
-    """A number of a motion law by its name; None where it has none of that name."""
-    return None if of is None else dict(of.numbers).get(key)
 
 
 def changed(of: MotionLaw | None, key: str, value: float) -> MotionLaw:

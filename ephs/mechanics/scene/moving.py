@@ -24,7 +24,6 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
                 **dict.fromkeys((*KINDS, *REGISTERED), lambda _, x: x.moved(pose)),
                 "bodies": lambda _, b: replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose)))),
                 "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
-                "surfaces": lambda _, s: replace(s, frame=frame(s.body, s.frame)),
             },
             world,
         ),

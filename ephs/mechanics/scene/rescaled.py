@@ -9,7 +9,6 @@ from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, SceneElement
 from ephs.mechanics.scene.geometry import Coupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
-from ephs.mechanics.scene.surfaces import Contact, Surface
 from ephs.semantics.bundles.bundle import Array
 
 
@@ -27,11 +26,6 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
             case Element():
                 tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
                 return x.rescaled(*units, _firsts(tied, length))
-            case Surface():
-                sizes = {kind: size and (np.asarray(size) * length).tolist() for kind, size in x.shape.items()}
-                return replace(x.rescaled(*units), shape=sizes)
-            case Contact():
-                return replace(x, law=x.law.rescaled(*units))
             case _:
                 return x.rescaled(*units)
 

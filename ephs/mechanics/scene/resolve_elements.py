@@ -1,18 +1,22 @@
 """Elements of registered sections: checks of their tables, of what they name, and of their rules."""
 
-from collections.abc import Collection, Iterator, Mapping
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping, Set
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.scene.actuators import Actuator
-from ephs.mechanics.scene.custom import Element, number_of
-from ephs.mechanics.scene.element import AXIS, JOINTS, SINGLE
-from ephs.mechanics.scene.entries import Checked, Document, shown, validate
-from ephs.mechanics.scene.errors import Fault, fault, legible, unknown
+from ephs.mechanics.scene.checked import Checked
+from ephs.mechanics.scene.contacts import meeting
+from ephs.mechanics.scene.custom import Element, number_of, read_in
+from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, JOINTS, SINGLE
+from ephs.mechanics.scene.entries import Document, validate
+from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, legible, listing, shown, unknown
 from ephs.mechanics.scene.model import KINDS, Scene, elements_of, with_sections
 from ephs.mechanics.scene.registry import REGISTERED
-from ephs.mechanics.scene.resolve import Names
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.scene.site import Level, Site, built
 from ephs.operad import PatternError
@@ -21,8 +25,27 @@ from ephs.semantics.bundles.errors import SemanticsError
 _ERRORS = (SemanticsError, PatternError, ValueError, ArithmeticError)
 
 
+@final
+@dataclass(frozen=True, slots=True)
+class Names:
+    """The names that references may use; ``unknown_parts`` are parts that could not be read, of which
+    nothing is known."""
+
+    bodies: Set[str]
+    thermal: Set[str]
+    unknown_parts: Set[str]
+
+    def check(self, table: Checked[Any], name: str, at: str, what: str) -> None:
+        """Append a fault where a reference at a key is unknown; ``what`` is body or thermal."""
+        fixed, known = (GROUND, self.bodies) if what == "body" else (ENVIRONMENT, self.thermal)
+        if name == fixed or name in known or name.split(".")[0] in self.unknown_parts:
+            return
+        hint = did_you_mean(name, [*known, fixed], f"there are: {listing(known)}")
+        table.fault(f"unknown {what}", at, f'"{name}"', hint=hint)
+
+
 def resolve_elements(
-    document: Document, parts: Mapping[str, Scene], names: Names, faults: list[Fault]
+    document: Document, parts: Mapping[str, Scene], names: Names, folder: Path, faults: list[Fault]
 ) -> dict[str, dict[str, Element]]:
     """The elements by section, checked but for what depends on where bodies are."""
     known = {
@@ -33,9 +56,10 @@ def resolve_elements(
     for section in (*KINDS, *REGISTERED):
         found[section] = {}
         for name, table in document.sections[section].items():
-            faults += check_table(table, f"{section}.{name}", names, known)
+            entry = read_in(table.entry, name, folder)
+            check_table(replace(table, entry=entry), names, known)
             if not table.spoiled:
-                found[section][name] = table.entry.normalised().called(name)
+                found[section][name] = read_in(entry.normalised(), name)
     found["actuators"] |= _pulls(document, found, faults)
     return found
 
@@ -47,6 +71,16 @@ def _pulls(document: Document, found: Mapping[str, Mapping[str, Element]], fault
         if name in found["tendons"] and of.named("tendon") != (name,):
             faults.append(fault("collision", f"actuators.{name}", shown(name), other=f"the tendon {name}"))
     return {name: Actuator(tendon=name, ratio=[-1.0]).called(name) for name in found["tendons"] if name not in given}
+
+
+def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
+    """The scene with contacts of all surfaces of its level that can meet, where its file names none."""
+    given = scene.contacts
+    found = given or {each.name: each for each in meeting(scene)}
+    for name, each in found.items():
+        key = f"contacts.{name}" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
+        faults += islice(broken(Checked(each, key), Site(scene, each, Level())), 1)
+    return replace(scene, contacts=found)
 
 
 def settled(scene: Scene) -> Scene:
@@ -62,44 +96,39 @@ def _inside(parts: Mapping[str, Scene], section: str) -> Iterator[str]:
         yield from (f"{part}.{name}" for name, _ in scene.every(section))
 
 
-def check_table(
-    table: Checked[Element], key: str, names: Names, known: Mapping[str, Collection[str]]
-) -> Iterator[Fault]:
-    """Faults of an element's table: sizes of numbers, what it names, and its rules."""
+def check_table(table: Checked[Element], names: Names, known: Mapping[str, Collection[str]]) -> None:
+    """Append the faults of an element's table: sizes of numbers, what it names, and its rules."""
     entry, spoiled = table.entry, set(table.spoiled)
     for name in type(entry).numbers:
         if name not in spoiled and np.any(np.abs(number_of(entry, name)) > LARGEST):
             spoiled.add(name)
-            yield fault("large", f"{key}.{name}", shown(getattr(entry, name)), most=LARGEST)
-    sound = Checked(entry, frozenset(spoiled))
-    named: list[Fault] = []
+            table.fault("large", name, most=LARGEST)
     for place, kind, name in entry.references():
         of = "joint" if kind in JOINTS else kind
-        if not sound.sound(place.partition("[")[0]):
+        if place.partition("[")[0] in spoiled:
             continue
         if of in ("body", "end", "node"):
-            names.check(name, f"{key}.{place}", "thermal" if of == "node" else "body", named)
+            names.check(table, name, place, "thermal" if of == "node" else "body")
         elif of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
-            named.append(unknown(of, f"{key}.{place}", name, known[of]))
-    yield from named
-    yield from broken(sound, key)
+            table.faults.append(unknown(of, f"{table.key}.{place}", name, known[of]))
+    table.faults.extend(broken(replace(table, spoiled=frozenset(spoiled))))
 
 
-def broken(table: Checked[Element], key: str, *site: Site, adjusted: bool = False) -> Iterator[Fault]:
+def broken(table: Checked[Element], *site: Site, adjusted: bool = False) -> Iterator[Fault]:
     """The faults of rules that do not hold: of those that are asked at a site, or of the others."""
     for each in type(table.entry).rules:
         if (each.placed, each.adjusted) == (bool(site), adjusted) and table.sound(*each.keys):
             for at, found, *texts in each.texts(table.entry, *site):
                 found = found or shown(getattr(table.entry, at) if at else {})
-                yield Fault(*map(legible, (f"{key}.{at}".rstrip("."), found, *texts)))
+                yield Fault(*map(legible, (f"{table.key}.{at}".rstrip("."), found, *texts)))
 
 
 def placed_faults(scene: Scene, *, adjusted: bool = False) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
     own = list(elements_of(scene))
     if adjusted:
-        sites = [(f"{x.section}.{x.name}", Checked(x), Site(scene, x, Level())) for x in own]
-        return [each for key, table, site in sites for each in broken(table, key, site, adjusted=True)]
+        sites = [(Checked(x, f"{x.section}.{x.name}"), Site(scene, x, Level())) for x in own]
+        return [each for table, site in sites for each in broken(table, site, adjusted=True)]
     faults = [each for element in own for each in _placed(scene, element)]
     if not faults and any(scene.elements.values()):  # those that users wrote may not be built
         try:
@@ -110,14 +139,13 @@ def placed_faults(scene: Scene, *, adjusted: bool = False) -> list[Fault]:
 
 
 def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
-    key = f"{element.section}.{element.name}"
-    odd: list[Fault] = []
+    table = Checked(element, f"{element.section}.{element.name}")
     for place, kind, name in element.references():
         if kind in (AXIS, SINGLE):
             joint, what = scene.joint(name), "motor joint" if kind == AXIS else "gear freedoms"
             if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
-                odd.append(fault(what, f"{key}.{place}", f"{name}, {joint.kind}"))
-    yield from odd or broken(Checked(element), key, Site(scene, element, Level()))
+                table.fault(what, place, f"{name}, {joint.kind}")
+    yield from table.faults or broken(table, Site(scene, element, Level()))
 
 
 def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
@@ -127,14 +155,12 @@ def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
         yield fault("not built", f"{element.section}.{element.name}", str(error))
 
 
-def number_faults(element: Element, key: str) -> Iterator[Fault]:
+def number_faults(element: Element, key: str) -> list[Fault]:
     """Faults of an element with other numbers: those that its table would have."""
     values: dict[str, Any] = {name: getattr(element, name) for name in type(element).model_fields}
     faults: list[Fault] = []
-    table = validate(type(element), values, key, faults)
-    yield from faults
-    everything = Names(_Everything(), _Everything(), set())
-    yield from check_table(table, key, everything, {})
+    check_table(validate(type(element), values, key, faults), Names(_Everything(), _Everything(), set()), {})
+    return faults
 
 
 class _Everything(set[str]):

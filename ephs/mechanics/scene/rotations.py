@@ -8,8 +8,12 @@ import numpy as np
 from pydantic import TypeAdapter, WrapValidator
 from pydantic_core import PydanticCustomError
 
+from ephs.mechanics.scene.errors import TEXTS, shown
+from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Entry, Number, Quaternion, Vector, key
 
+TOLERANCE = 1e-6
+"""Most by which the norm of a given quaternion differs from 1."""
 FORMS = "rpy, rpy_deg, or axis with angle or angle_deg"
 
 
@@ -65,3 +69,10 @@ def _rotation(value: Any, _handler: Any) -> list[float]:
 
 Rotation = Annotated[list[float], WrapValidator(_rotation, json_schema_input_type=Quaternion | RotationEntry)]
 """Validated to a quaternion [w, x, y, z]."""
+
+
+@rule("rotation", found="{found}", expected=TEXTS["quaternion"][0], advice=TEXTS["quaternion"][1])
+def turned(element: Any) -> Told:
+    """Whether the rotation of an element is a unit quaternion."""
+    size = 1.0 if element.rotation is None else float(np.linalg.norm(element.rotation))
+    return abs(size - 1.0) <= TOLERANCE or {"found": f"{shown(element.rotation)} of norm {size:.9g}"}

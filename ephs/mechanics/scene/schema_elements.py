@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Annotated, Any, Final
 
+import numpy as np
 from pydantic import Field, create_model
 
 from ephs.mechanics.scene import schema_numbers as forms
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Measured, Number, part_of
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Measured, Number, frozen, part_of
 
 _RANGES: Final[Mapping[Any, Any]] = {
     None: forms.Number,
@@ -34,3 +35,14 @@ def _key(of: Any, number: Number, said: str) -> tuple[Any, Any]:
     else:
         form = _RANGES[number.least]
     return form, forms.key(said, ... if default is MISSING else default)
+
+
+def attributes(kind: type[Measured], entry: Any) -> dict[str, Any]:
+    """The attributes of an element that are keys of its table, as it has them."""
+    given: dict[str, Any] = {}
+    for key in {each.name for each in fields(kind)} & set(type(entry).model_fields):  # pyright: ignore[reportArgumentType]
+        value, number = getattr(entry, key), kind.numbers.get(key)
+        if number is not None and number.shape(0) and value is not None:
+            value = frozen(np.atleast_1d(np.asarray(value, dtype=float)))
+        given[key] = tuple(value) if isinstance(value, list) else value
+    return given

@@ -6,13 +6,13 @@ Torsion of rectangles by Saint-Venant's series.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, final
+from typing import Annotated, Any, final
 
 import numpy as np
+from pydantic import Field
 
-from ephs.mechanics.scene.entries import shown
-from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.schema_flexible import SectionEntry
+from ephs.mechanics.scene.checked import Checked
+from ephs.mechanics.scene.schema_numbers import Entry, Extents, Number, Positive, Sizes, key
 from ephs.semantics.bundles.bundle import Array
 
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
@@ -22,6 +22,23 @@ IRON = 7870.0
 """Density in kg/m³."""
 SHAPES = ("circle", "tube", "rectangle")
 MATERIAL = ("E", "nu", "rho")
+
+
+class SectionEntry(Entry):
+    """``section``: numbers, or a shape with E, nu and rho."""
+
+    EA: Positive | None = key("axial stiffness, N", None)
+    GA: Sizes | None = key("shear stiffness along axes 2 and 3, N", None)
+    GJ: Positive | None = key("torsional stiffness, N m²", None)
+    EI: Sizes | None = key("bending stiffness about axes 2 and 3, N m²", None)
+    rhoA: Positive | None = key("mass per length, kg/m", None)
+    rhoI: Extents | None = key("inertia per length about axes 1, 2, 3, kg m", None)
+    circle: Positive | None = key("radius, m", None)
+    tube: Sizes | None = key("outer and inner radius, m", None)
+    rectangle: Sizes | None = key("width along axis 3 and height along axis 2, m", None)
+    E: Positive | None = key("Young's modulus, N/m²", None)
+    nu: Annotated[Number, Field(gt=-1.0, le=0.5)] | None = key("Poisson's ratio", None)
+    rho: Positive | None = key("density, kg/m³", None)
 
 
 @final
@@ -76,23 +93,23 @@ def _of(
     return Section(np.array(bending + axial), float(rho * area), inertia, outline)
 
 
-def resolve_section(entry: SectionEntry, key: str, faults: list[Fault], rod: str) -> Section | None:
+def resolve_section(table: Checked[SectionEntry], rod: str) -> Section | None:
     """The section of a table for a kind of rod; None, with a fault, for missing or excess keys."""
-    given: Mapping[str, Any] = {name: value for name, value in entry.model_dump().items() if value is not None}
+    given: Mapping[str, Any] = table.entry.model_dump(exclude_none=True)
     shapes = [name for name in given if name in SHAPES]
     if len(shapes) > 1 or (shapes and any(name in NUMBERS for name in given)):
         names = [name for name in given if name in (*SHAPES, *NUMBERS)]
-        faults.append(fault("section", key, f"{', '.join(names[:-1])} and {names[-1]}"))
+        table.fault("section", found=f"{', '.join(names[:-1])} and {names[-1]}")
         return None
     needed = MATERIAL if shapes else NEEDED[rod]
     missing = [name for name in needed if name not in given]
     if missing:
         found = "an empty table" if not given else f"a table without {', '.join(missing)}"
-        faults.append(fault("section", key, found))
+        table.fault("section", found=found)
         return None
     spare = [name for name in given if name not in ((*MATERIAL, *shapes) if shapes else NUMBERS)]
     if spare:
-        faults.append(fault("section", f"{key}.{spare[0]}", shown(given[spare[0]])))
+        table.fault("section", spare[0])
         return None
     if not shapes:
         full = {"GJ": 0.0, "EI": [0.0, 0.0], "EA": 0.0, "GA": [0.0, 0.0], "rhoI": [0.0, 0.0, 0.0]} | given
@@ -105,7 +122,7 @@ def resolve_section(entry: SectionEntry, key: str, faults: list[Fault], rod: str
     sizes = given[shapes[0]]
     if shapes == ["tube"]:
         if not sizes[1] < sizes[0]:
-            faults.append(fault("tube", f"{key}.tube", shown(sizes)))
+            table.fault("tube", "tube")
             return None
         return tube(*sizes, **material)
     return rectangle(*sizes, **material)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.scene.custom import Element
     from ephs.mechanics.scene.model import Scene
+    from ephs.mechanics.scene.surfaces import Surface
 
 INPUTS = "inputs"
 """First name of the outer ports of elements."""
@@ -98,9 +99,11 @@ class Site:
         return SE3.compose(self.pose(body), translation(self.point(body, at)))[4:]
 
     def between(self, body1: str, at1: "ArrayLike", body2: str, at2: "ArrayLike") -> Array:
-        """(7,) at the start, pose of the frame at a point of body 2 in that at a point of body 1."""
+        """(7,) at the start, pose of the frame at a point (3,) of body 2, or that is a pose (7,) in it, in that of
+        body 1."""
         frames = [
-            SE3.compose(self.pose(body), translation(self.point(body, at))) for body, at in ((body1, at1), (body2, at2))
+            SE3.compose(self.pose(body), translation(self.point(body, at)) if np.size(at) == 3 else np.asarray(at))
+            for body, at in ((body1, at1), (body2, at2))
         ]
         return SE3.normalise(SE3.compose(SE3.inverse(frames[0]), frames[1]))
 
@@ -204,9 +207,16 @@ class Site:
     def _known(self, *kinds: str, name: str) -> None:
         """Only what keys name is connected: parts expose no other junctions."""
         named = [each for kind in kinds for each in self.element.named(kind)]
+        if "body" in kinds:
+            named += [surfaces_of(self.scene)[each].body for each in self.element.named("surface")]
         if name not in named:
             expected = f"one that its keys name: {', '.join(named) or 'there is none'}"
             raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
+
+
+def surfaces_of(scene: "Scene") -> "Mapping[str, Surface]":
+    """Surfaces by dotted name; made once and kept with the scene."""
+    return once(scene, "surfaces", lambda: dict(scene.all_surfaces()))
 
 
 def built(scene: "Scene") -> Level:

@@ -10,13 +10,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
-from ephs.mechanics.scene.surfaces import Contact, Surface
-from ephs.mechanics.shapes.pairs import SIZES
+from ephs.mechanics.scene.resolve_elements import broken
 from ephs.operad import Path as Name
 
 Sizes: TypeAlias = dict[str, tuple[Any, tuple[int, ...]]]
@@ -36,6 +36,9 @@ def check_scene(scene: Scene) -> None:
             array = np.asarray(value)
             if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
                 raise ValueError(f"{legible(name)}.{key} is {legible(str(value))}, expected finite numbers {shape}")
+    for name, each in _all(scene):
+        if isinstance(each, Element) and (wrong := next(broken(Checked(each, name)), None)):
+            raise ValueError(str(wrong))
     _check_names(scene)
     there = {
         "body": {name for name, _ in scene.all_bodies()},
@@ -93,21 +96,8 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
         match each:
             case Joint():
                 yield name, _joint(name, each)
-            case Surface():
-                yield name, each.values() | _surface(name, each)
-            case Contact():
-                yield name, {key: (number, ()) for key, number in each.law.numbers}
             case SceneElement():
                 yield name, each.values()
-
-
-def _surface(name: str, surface: Surface) -> Sizes:
-    ((kind, sizes),) = surface.shape.items()
-    if kind not in SIZES:
-        raise ValueError(f"surface {legible(name)} is a {legible(str(kind))}")
-    known = SIZES[kind]
-    expected: tuple[int, ...] = np.shape(sizes) if known is None else known
-    return {kind: (sizes, expected)} if kind != "plane" else {}
 
 
 def _joint(name: str, j: Joint) -> Sizes:

@@ -1,6 +1,7 @@
 """Springs and dampers between two points of bodies."""
 
-from typing import final
+from collections.abc import Mapping
+from typing import Any, final
 
 import numpy as np
 
@@ -43,6 +44,11 @@ class Spring(Element, section="springs", said="springs and dampers between two p
         """Whether it has a direction at the start."""
         one, two = (site.in_world(*end) for end in zip(self.bodies, (self.at1, self.at2), strict=True))
         return float(np.linalg.norm(one - two)) >= ASSEMBLY * self.length
+
+    @classmethod
+    def _upgraded(cls, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        given = dict(table)
+        return given | ({"bodies": [given.pop("body1"), given.pop("body2")]} if "body1" in given else {})
 
     def build(self, site: Site) -> None:
         (one, other), warm = self.bodies, site.heated(self.heat)

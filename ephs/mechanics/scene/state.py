@@ -16,6 +16,7 @@ from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.following import stretched, tied
 from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.joints import Asked
 from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
@@ -128,15 +129,6 @@ def with_state(
     if faults:
         raise SceneError(where, faults)
     return rebuilt(scene, now, poses, twists, xs)
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Asked:
-    """State of a joint by the file: coordinates (d,) and rate (d,), None where not given."""
-
-    coordinates: Array | None
-    rate: Array | None
 
 
 def adjusted(scene: Scene, asked: Mapping[str, Asked]) -> tuple[Scene, list[Fault]]:

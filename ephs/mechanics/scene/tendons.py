@@ -10,7 +10,7 @@ from pydantic import Field
 from ephs.mechanics.elements.tendon import tendon
 from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import ENVIRONMENT
-from ephs.mechanics.scene.rules import rule
+from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Flag, Names, NonNegative, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.operad import quantity
@@ -49,7 +49,7 @@ class Tendon(Element, section="tendons", said="tendons through points of bodies"
         "points", "bodies", found="{found}", expected="{count} points, one for each body",
         advice="correct the number of points",
     )  # fmt: skip
-    def counted(self) -> bool | Mapping[str, object]:
+    def counted(self) -> Told:
         """Whether each of its bodies carries a point."""
         found, count = len(self.points), len(self.bodies)
         return found == count or {"found": found, "count": count}

@@ -21,6 +21,15 @@ def nearest_file(file: Path, endings: Sequence[str] = READABLE) -> Path | None:
     return next((path for path, found in known.items() if found == name), None)
 
 
+def file_inside(file: Path, folder: Path) -> Path | None:
+    """The resolved file, if it is in a folder or below it."""
+    try:
+        found = file.resolve()
+        return found if found.is_relative_to(folder.resolve()) else None
+    except (OSError, ValueError, RuntimeError):  # a name that no file can have, links that lead in a circle
+        return None
+
+
 def lost(file: Path) -> str:
     """Advice where a path leads to no file that can be read."""
     near = nearest_file(file, MESHES if file.suffix.lower() in MESHES else READABLE)

@@ -39,8 +39,7 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
     return [
         *(("body", name, f"{body.mass:g} kg") for name, body in scene.all_bodies()),
         *(("joint", name, f"{j.kind}, {j.body1} – {j.body2}") for name, j in scene.all_joints()),
-        *_told(scene, "springs"),
-        *(("contact", name, " – ".join(c.surfaces)) for name, c in scene.all_contacts()),
+        *_told(scene, "springs", "contacts"),
         *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
         *_told(scene, "tendons", "loads"),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),

@@ -34,10 +34,6 @@ from ephs.semantics.spaces import SE3
 Touch = tuple[Array, Array, Gap]
 """Frames (7,) on the first and on the second surface's body, and the gap between them."""
 Shape = Mapping[str, Any]
-SIZES: Final[Mapping[str, tuple[int, ...] | None]] = {
-    "plane": (), "sphere": (), "capsule": (2,), "cylinder": (2,), "box": (3,), "mesh": None
-}  # fmt: skip
-"""Shapes -> shape of their sizes in m; a plane has none, a mesh (n, 3) vertices."""
 
 
 def touches(shape1: Shape, frame1: Array, shape2: Shape, frame2: Array) -> tuple[tuple[Touch, ...], bool]:

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
 from ephs.mechanics.scene import SceneError
+from ephs.mechanics.scene.bodies import BodyEntry
 from ephs.mechanics.scene.entries import validate
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.rotations import RotationEntry
-from ephs.mechanics.scene.schema import BodyEntry
 from tests.written import scene_of_text
 
 ANGLES = st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3)
@@ -46,7 +46,7 @@ def test_an_axis_and_an_angle_are_a_rotation_vector(axis, angle):
 
 def moments_of(raw):
     faults = []
-    found = mass_and_moments(validate(BodyEntry, raw, "bodies.a", faults), "bodies.a", faults)
+    found = mass_and_moments(validate(BodyEntry, raw, "bodies.a", faults))
     assert not faults
     return found
 
