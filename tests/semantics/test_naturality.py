@@ -1,9 +1,5 @@
 """Discretising commutes with composing for gradients of one storage alone; what does not commute fails as measured."""
 
-from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,18 +9,14 @@ import ephs
 from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.scene.geometry import coupling_of
-from ephs.operad import Directory, Path
-from ephs.semantics import Reference, System
+from ephs.operad import Path
+from ephs.semantics import Reference
 from ephs.semantics.meaning.step import solved as solve
 from ephs.semantics.primitives.behaviour import GRADIENTS, Natural
-from ephs.semantics.spaces import SE3, manifold
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
 
 REFERENCE = Reference()
-SCENES = File(__file__).parents[2] / "scenes"
 K, CUBIC, M, D = 1.0, 2.0, 1.3, 0.4
 ROUNDING = float(np.finfo(float).eps)
 
@@ -100,40 +92,3 @@ def test_the_average_gradient_of_the_parts_is_that_of_the_whole():
         0.5 * w * np.array([K * x[0] + CUBIC * x[0] ** 3, x[1] / M]) for w, x in zip(weights, points, strict=True)
     )
     assert np.abs(average - of_parts("average")).max() <= 4.0 * ROUNDING * np.abs(average).max()
-
-
-def velocity_level(system):
-    """The system with its joint relation at the middle of a step in place of the joint's own discrete relation."""
-    parts = {}
-    for box, part in system.fillings.items():
-        if isinstance(part, System):
-            parts[box] = velocity_level(part)
-        else:
-            parts[box] = replace(part, discrete=None, kernel=None) if part.name == "holonomic" else part
-    return System(system.pattern, Directory(parts))
-
-
-def gap(h, *, exact):
-    """How far q₁ o₁ I(q_r) and q₂ o₂ are apart after one step of two bodies on a spherical joint."""
-    scene = ephs.load(SCENES / "mbs.toml")
-    problem = problem_of_scene(scene)
-    system = problem.system if exact else velocity_level(problem.system)
-    solved = solve(system, problem.initial, Natural(REFERENCE, h), problem.inputs(0.0, problem.initial))
-    (link,) = scene.joints.values()
-
-    def end(path):
-        return manifold(system.states[path].space).retract(problem.initial[path], h * solved.rates[path])
-
-    first, second = (end(Path.of(f"bodies.{body}.pe.q")) for body in (link.body1, link.body2))
-    relative = coupling_of(link).pair.include(end(Path.of(f"joints.{link.name}.pe.q_r")))
-    one = SE3.compose(SE3.compose(first, link.frame1), relative)
-    return float(np.abs(SE3.log(SE3.compose(SE3.inverse(SE3.compose(second, link.frame2)), one))).max())
-
-
-def test_a_velocity_relation_at_the_middle_of_a_step_loses_the_position():
-    """Index reduction does not commute: a step's gap is of third order. The joint's own discrete relation has none."""
-    found = [gap(h, exact=False) for h in (0.1, 0.05, 0.025)]
-    assert found[0] == pytest.approx(6.3e-4, rel=0.05)
-    for one, other in pairwise(found):
-        assert one / other == pytest.approx(8.0, rel=0.12)
-    assert max(gap(h, exact=True) for h in (0.1, 0.05, 0.025)) <= 1e-14
