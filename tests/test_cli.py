@@ -3,7 +3,6 @@
 import inspect
 import json
 import re
-import subprocess
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,8 +21,6 @@ from ephs.cli.sweep import sweep
 from ephs.semantics.systems.report import CheckItem
 from ephs.solve.auditing.findings import Audit, Finding
 from examples.failures import CASES, Case
-
-ROOT = Path(__file__).resolve().parents[1]
 
 
 class FakeSystem:
@@ -138,16 +135,6 @@ def test_a_run_that_does_not_pass_its_audit_is_saved_and_exits_with_4(house, mon
     assert capsys.readouterr().err.splitlines().count(f"crank.toml: {finding}") == said
 
 
-def test_run_writes_the_result_folder(house, capsys):
-    assert cli.main(["run", "crank.toml", "--until", "2"]) == 0
-    folder = Path("out/crank")
-    assert sorted(file.name for file in folder.iterdir()) == ["report.html", "run.json", "solution.nc", "summary.json"]
-    assert json.loads((folder / "summary.json").read_text()) == FakeSolution().summary()
-    said = capsys.readouterr()
-    assert str(folder / "report.html") in said.out
-    assert said.err == ""
-
-
 def test_run_passes_on_what_was_given_and_leaves_the_defaults_alone(house):
     words = "--until 2 --method natural --step 0.01 --form paper --base free --adjust --out deep/er"
     assert cli.main(["run", "crank.toml", *words.split()]) == 0
@@ -186,13 +173,6 @@ def test_bad_words_are_named_and_exit_with_2(house, capsys, words, expected):
     assert all(word in said.err for word in expected), said.err
     assert said.out == ""
     assert "Traceback" not in said.err
-
-
-def test_a_bad_scene_exits_with_2_and_its_own_message(house, capsys, monkeypatch):
-    message = "crank.toml: 1 fault\n  bodies.crank.mass: found -1, expected a number >= 0"
-    monkeypatch.setattr(ephs, "load", fails_with(FakeSceneError(message)))
-    assert cli.main(["run", "crank.toml", "--until", "1"]) == 2
-    assert capsys.readouterr().err == message + "\n"
 
 
 def test_a_message_without_the_file_gets_it(house, capsys, monkeypatch):
@@ -319,30 +299,6 @@ def test_a_bad_python_file_is_told_without_a_traceback(house, capsys, text, name
     said = capsys.readouterr().err
     assert said.startswith("mine.py:")
     assert all(word in said for word in expected), said
-
-
-def test_a_python_file_without_a_name_says_how(house, capsys):
-    Path("mine.py").write_text("import ephs\nosc = ephs.System()")
-    assert cli.main(["check", "mine.py"]) == 2
-    assert "mine.py:osc" in capsys.readouterr().err
-
-
-def test_alone_it_says_what_can_be_done_next():
-    done = subprocess.run([sys.executable, "-m", "ephs"], cwd=ROOT, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert all(f"ephs {command} " in done.stdout for command in ("run", "check", "draw"))
-
-
-@pytest.mark.parametrize("command", ["run", "check", "draw"])
-def test_help_needs_neither_numpy_nor_the_rooms_below(command):
-    script = (
-        f"import sys; from ephs.cli import main; code = main([{command!r}, '--help']); "
-        "loaded = [name for name in ('numpy', 'ephs.mechanics', 'ephs.show') if name in sys.modules]; "
-        "print(code, *loaded, file=sys.stderr)"
-    )
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
-    assert "Usage: ephs" in done.stdout
-    assert done.stderr == "0\n"
 
 
 @pytest.mark.parametrize("command", [run, cli.check, cli.draw, cli.convert, sweep, linearize, LoadOptions, Stepping])

@@ -133,11 +133,6 @@ def test_a_model_in_place_of_results_is_answered_with_the_run_to_make(capsys):
         assert "found a model, expected a result folder of ephs run" in said and f"first: ephs run {CRANK}" in said
 
 
-def test_pictures_of_other_endings_name_both(capsys):
-    assert main(["draw", CRANK, "-o", "picture.bmp"]) == 2
-    assert "found the ending .bmp, expected one of .svg, .tex, .png" in capsys.readouterr().err
-
-
 def test_broken_syntax_has_line_column_and_text(tmp_path, capsys):
     file = tmp_path / "scene.toml"
     file.write_text("format = 1\n[bodies.a]\nmass = 1.8 kg\n")

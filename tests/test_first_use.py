@@ -12,7 +12,6 @@ import pytest
 
 import ephs
 from ephs import library as lib
-from ephs import quantity as Q
 from ephs.cli import commands as cli
 from ephs.cli.new import TEMPLATES
 from ephs.cli.next import EXAMPLES, commands
@@ -192,10 +191,7 @@ def test_a_name_that_is_no_model_is_answered_with_the_models_of_the_file(capsys)
 
 
 def oscillator():
-    return ephs.Pattern(
-        junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum, exposed=True)},
-        boxes={"spring": {"q": "q"}, "mass": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
-    )
+    return ephs.Pattern.from_text("q: displacement; p: momentum, exposed; spring(q); mass(p); pkc(q, p)")
 
 
 def filled():
@@ -214,8 +210,6 @@ SLIPS = {
         lambda: ephs.simulate(filled(), 1.0, inputs={"p": {"flow": lambda t: None}}),
         "it returns None, perhaps for want of a return",
     ),
-    "a part of the library": (lambda: lib.sprnig, "did you mean 'spring'"),
-    "a quantity": (lambda: Q.displacment, "did you mean 'displacement'"),
     "two ways at once": (lambda: lib.thermal_capacity(c1=1.0, capacity=2.0), "expected c1 and c2, or capacity and"),
 }
 

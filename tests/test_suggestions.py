@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.cli import main
@@ -90,7 +90,7 @@ def test_draw_draws_patterns(tmp_path, capsys):
     file.write_text("\n".join(lines))
     picture, same = tmp_path / "pattern.svg", tmp_path / "same.svg"
     assert main(["draw", f"{file}:pattern", "-o", str(picture)]) == 0
-    made = Pattern({"q": junction(Q.displacement)}, {"spring": {"q": "q"}, "mass": {"q": "q"}})
+    made = Pattern.from_text("q: displacement; spring(q); mass(q)")
     ephs.show.draw(made, same)
     assert picture.read_text() == same.read_text()
     capsys.readouterr()

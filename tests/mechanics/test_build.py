@@ -1,10 +1,8 @@
 """Scenes as systems: their names, what parts expose, heat, ground, and drives."""
 
-from dataclasses import replace
 from pathlib import Path as File
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, given, settings
 
@@ -21,8 +19,7 @@ from ephs.mechanics.scene.build import (
 )
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.solve.instant import instant, mobility
+from ephs.solve.instant import mobility
 from ephs.testing import mechanisms
 
 ROOT = File(__file__).parents[2]
@@ -130,82 +127,9 @@ def test_mobility_of_trees_is_the_number_of_freedoms(scene):
     assert found.redundant == 0
 
 
-@pytest.mark.parametrize(("name", "mobile", "redundant"), [
-    ("four-bar-windows-1", 1, 3), ("andrews-squeezer", 1, 9), ("revolute-chain-4", 4, 0), ("spherical-chain-2", 6, 0),
-])  # fmt: skip
-def test_mobility_and_redundancy_of_known_mechanisms(name, mobile, redundant):
-    problem = problem_of_scene(ephs.load(ROOT / "benchmarks" / "scenes" / f"{name}.toml"))
-    found = mobility(problem.descriptor, problem.descriptor.pack(problem.initial))
-    assert (found.mobility, found.redundant) == (mobile, redundant)
-
-
-def test_a_prescribed_motion_goes_at_its_rate_and_takes_away_a_freedom():
-    scene = ephs.load(ROOT / "benchmarks" / "scenes" / "four-bar-windows-1.toml")
-    name = "j0"
-    rate = float(scene.joints[name].rate[0])
-    driven = replace(
-        scene, joints={**scene.joints, name: replace(scene.joints[name], motion=ephs.PolynomialMotion((rate,)))}
-    )
-    sol = ephs.simulate(driven, 1.0, step=0.005)
-    assert np.allclose(sol.joint(name).coordinate[:, 0], rate * sol.t, rtol=0.0, atol=1e-12)
-    assert np.allclose(sol.joint(name).rate, rate, rtol=0.0, atol=1e-12)
-    assert sol.energy_error.max() <= 1e-13
-    assert sol.summary()["mobility"] == 0
-    with pytest.raises(ephs.AssemblyError, match=r"joints\.j0.*prescribed"):
-        ephs.simulate(driven, 1.0, inputs={"joints.j0": 1.0})
-
-
 def test_heat_goes_where_it_is_sent():
     """Friction heat of the slider-crank is in the housing and, through the fins, in the environment."""
     sol = ephs.simulate(ephs.load(ROOT / "scenes" / "slider-crank.toml"), 2.0, step=0.002)
     gained = sol.ledgers.thermal - sol.ledgers.thermal[0] + sol.ledgers.environment - sol.ledgers.environment[0]
     assert np.allclose(gained, sol.heat, rtol=0.0, atol=1e-12)
     assert np.all(np.diff(sol.thermal("housing").temperature) > 0.0)
-
-
-@settings(calm, max_examples=25)
-@given(mechanisms(kinds=("revolute", "prismatic", "spherical"), loops=False, springs=False, heat=False))
-def test_accelerations_are_those_of_another_engine(scene):
-    """Pinocchio's articulated-body algorithm, in joint coordinates, against the equations with multipliers."""
-    model = pin.Model()
-    model.gravity.linear = np.array(scene.world.gravity)
-    ids, place = {"ground": 0}, {"ground": pin.SE3.Identity()}
-    kinds = {"revolute": pin.JointModelRZ, "prismatic": pin.JointModelPZ, "spherical": pin.JointModelSpherical}
-    for name, j in scene.joints.items():
-        before = place[j.body1] * _pin(j.frame1)
-        number = model.addJoint(ids[j.body1], kinds[j.kind](), before, name)
-        after = _pin(j.frame2).inverse()
-        body = scene.bodies[j.body2]
-        model.appendBodyToJoint(number, pin.Inertia(body.mass, np.zeros(3), np.array(body.inertia)), after)
-        ids[j.body2], place[j.body2] = number, after
-    q, v, tau = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
-    for name, j in scene.joints.items():
-        joint = model.joints[model.getJointId(name)]
-        q[joint.idx_q : joint.idx_q + joint.nq] = np.roll(j.coordinate, -1) if j.kind == "spherical" else j.coordinate
-        v[joint.idx_v : joint.idx_v + joint.nv] = j.rate
-        tau[joint.idx_v : joint.idx_v + joint.nv] = -j.friction @ j.rate
-    data = model.createData()
-    expected = pin.aba(model, data, q, v, tau)
-    pin.forwardKinematics(model, data, q, v, expected)
-    problem = problem_of_scene(scene)
-    now = instant(problem.descriptor, problem.reference, problem.descriptor.pack(problem.initial))
-    for name, body in scene.bodies.items():
-        momentum = now.rates[component_path("bodies", name) / "ke" / "p"]
-        ours = np.concatenate([np.linalg.solve(body.inertia, momentum[:3]), momentum[3:] / body.mass])
-        theirs = (place[name].inverse()).act(data.a[ids[name]])
-        theirs = np.concatenate([theirs.angular, theirs.linear])
-        assert np.abs(ours - theirs).max() <= 1e-8 * max(1.0, np.abs(theirs).max())
-
-
-def _pin(pose):
-    return pin.SE3(quaternion_to_matrix(pose[:4]), np.array(pose[4:]))
-
-
-def test_models_that_cannot_move_are_told_what_is_wrong(walker):
-    twice = ephs.Pattern(
-        junctions={"q": ephs.junction(ephs.quantity.displacement)}, boxes={"a": {"q": "q"}, "b": {"q": "q"}}
-    )(a=ephs.library.spring(k=1.0), b=ephs.library.spring(k=1.0))
-    report = check_model(twice)
-    assert not report.ok
-    assert "a.q and b.q" in str(report)
-    assert "holds" in str(check_model(walker))

@@ -1,32 +1,25 @@
 """The mechanical primitives, and that the compiled kernels compute what their plain definitions say."""
 
-import ctypes
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.elements import components, springs
 from ephs.mechanics.elements.closing import closing
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.tendon import tension_spring
-from ephs.operad import Path, Quantity, Space
+from ephs.operad import Path
 from ephs.operad import quantity as Q
-from ephs.semantics import Reference, Storage, StructureError, library
-from ephs.semantics.descriptor.kernel_table import DOMAIN, OK, TEMPERATURE, TURN, address_of, prototype
-from ephs.semantics.primitives.behaviour import Natural
+from ephs.semantics import Storage, StructureError, library
+from ephs.semantics.descriptor.kernel_table import DOMAIN, OK, TEMPERATURE, TURN
 from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
-from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import check_primitive, mechanisms
+from tests.mechanics.kernels import REFERENCE, Draw, agreeing
 from tests.semantics.subspace import dirac
 
-REFERENCE = Reference()
 EPS = float(np.finfo(float).eps)
-PLANE = Quantity("plane", Space("real", 2, 2), 1)
 SIZES = [0.0, 1e-10, 1e-7, 1e-4, 0.02, 0.3]
 seeds = st.integers(0, 2**20)
 END, OTHER = (
@@ -37,7 +30,6 @@ END, OTHER = (
     )
 )
 """Offsets and inertias of two bodies at a joint."""
-POINTER = ctypes.POINTER(ctypes.c_double)
 
 
 def pairs():
@@ -76,106 +68,10 @@ def primitives():
     out["heat_transfer"] = library.heat_transfer(h=2.0)
     out["mkc"] = library.mkc()
     out["environment"] = library.environment()
-    return out | traced()
-
-
-def traced():
-    """Primitives of plain functions: their kernels are made from formulas."""
-    b = np.array([[1.0, 0.3], [0.3, 2.0]])
-    ball, planar = Q.relative_pose("spherical"), Q.relative_pose("planar")
-    out = {
-        "traced scalar": ephs.storage({"q": Q.displacement}, lambda q: 0.7 * q**4 + math.cos(q)),
-        "traced ports": ephs.storage({"q": Q.displacement, "v": Q.volume}, lambda q, v: np.cosh(q) * (1.0 + v**4)),
-        "traced heat": ephs.storage({"s": Q.entropy}, lambda s: 3e4 * math.exp(s / 100.0)),
-        "traced vector": ephs.storage({"x": PLANE}, lambda x: 0.5 * x @ b @ x + np.sin(x[0] * x[1])),
-        "traced rotation": ephs.storage({"q": ball}, lambda q: 2.0 * (q[1:] @ q[1:]) * q[0] ** 2),
-        "traced planar": ephs.storage({"q": planar}, lambda q: np.cos(q[0]) * q[1] + q[2] ** 2),
-        "traced pose": ephs.storage({"q": Q.pose}, lambda q: 9.81 * q[6] + q[1] ** 2 + q[4] * q[5] * q[2] ** 2),
-        "traced direct pose": ephs.storage(
-            {"q": Q.direct_pose}, lambda q: 9.81 * q[6] * q[1] * q[0] + np.sqrt(1.0 + q[4] ** 2)
-        ),
-        "traced gyrator": ephs.gyrator(
-            {"b": Q.flux_linkage, "p": Q.angular_momentum, "~bs": Q.flux_linkage, "~q": Q.angle},
-            lambda bs, q: np.tanh(bs) * np.cos(q) * np.array([[0.0, 1.0], [-1.0, 0.0]]),
-        ),
-        "traced transformer": ephs.transformer(
-            {"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[0.3 * math.sin(q)]]
-        ),
-        "traced constraint": ephs.constraint(
-            {"p": Q.body_momentum, "p2": Q.momentum, "~q": Q.pose},
-            lambda q: [[q[1] * q[0], q[2] ** 2, 0.0, q[4], 0.0, 1.0, q[5]]]
-        ),
-        "traced friction": ephs.irreversible(
-            {"p": Q.momentum, "s": Q.entropy}, lambda p, s: abs(p) * np.array([[s, -p], [-p, p * p / s]])
-        ),
-        "traced piston friction": ephs.irreversible(
-            {"p": Q.momentum, "s": Q.entropy, "~v": Q.volume},
-            lambda p, s, v: 0.3 / v * np.array([[s, -p], [-p, p * p / s]]),
-        ),
-    }  # fmt: skip
-    assert [name for name, primitive in out.items() if primitive.kernel is None] == []
     return out
 
 
 PRIMITIVES = primitives()
-
-
-class Draw:
-    """Random arguments of a discrete relation."""
-
-    def __init__(self, primitive, seed, size):
-        rng = np.random.default_rng(seed)
-        self.primitive, self.h = primitive, 10.0 ** rng.uniform(-4.0, -1.0)
-        self.n = primitive.bundle.size
-        self.k = getattr(primitive, "multipliers", 0)
-        dims = [primitive.interface[p].quantity.space.dim for p in primitive.reads]
-        self.x = random_point(primitive.bundle, primitive.reads, rng)
-        for value in self.x.values():  # rotations of half a turn have two logarithms: keep off
-            if value.size in (4, 7) and abs(value[0]) < 0.3:
-                value[0] = 1.0
-                value[:4] /= np.linalg.norm(value[:4])
-        self.v = size * rng.standard_normal(sum(dims))
-        self.e, self.lam = random_efforts(primitive.bundle, rng), rng.standard_normal(self.k)
-        self.splits = np.cumsum(dims)[:-1]
-
-    def steps(self, v):
-        return dict(zip(self.primitive.reads, np.split(v, self.splits), strict=True)) if self.primitive.reads else {}
-
-    def plain(self, z):
-        """The oracle at z = (e, λ, v), or at v for a storage."""
-        if isinstance(self.primitive, Storage):
-            return self.primitive.discrete_effort(self.x, z, REFERENCE)
-        local = Natural(REFERENCE, self.h).behaviour(self.primitive, self.x)
-        rates = {p: v / self.h for p, v in self.steps(z[self.n + self.k :]).items()}
-        return np.concatenate(local.relate(z[: self.n], z[self.n : self.n + self.k], rates))
-
-    @property
-    def z(self):
-        return self.v if isinstance(self.primitive, Storage) else np.concatenate([self.e, self.lam, self.v])
-
-    def compiled(self):
-        """Status, values, Jacobian, and a storage's energy, of the kernel."""
-        address, numbers, _ = address_of(self.primitive)
-        n, k, m = self.n, self.k, self.v.size
-        x = np.concatenate([*(self.x[p] for p in self.primitive.reads), [0.0]])
-        dims = np.array([n, k, m, x.size - 1], dtype=np.int64)
-        scal = np.array([self.h, REFERENCE.temperature, REFERENCE.pressure])
-        arrays = [scal, np.array([*numbers, 0.0]), x, np.append(self.v, 0.0), np.append(self.e, 0.0)]
-        arrays += [
-            np.append(self.lam, 0.0),
-            np.zeros(n * n + n + 1),
-            np.zeros(k + 2),
-            np.zeros((n + k) * (n + k + m) + 1),
-            np.zeros(2048),
-        ]
-        status = prototype(address)(
-            dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *[a.ctypes.data_as(POINTER) for a in arrays]
-        )
-        if isinstance(self.primitive, Storage):
-            return status, arrays[4][:n], arrays[6][: n * n].reshape(n, n), arrays[7][0]
-        width = n + k + m
-        values = np.concatenate([arrays[6][:n], arrays[7][:k]])
-        return status, values, arrays[8][: (n + k) * width].reshape(n + k, width), 0.0
 
 
 @pytest.mark.parametrize("name", PRIMITIVES)
@@ -183,19 +79,7 @@ class Draw:
 @given(seed=seeds, size=st.sampled_from(SIZES))
 def test_a_kernel_is_its_plain_definition(name, seed, size):
     draw = Draw(PRIMITIVES[name], seed, size)
-    expected = draw.plain(draw.z)
-    status, values, jacobian, energy = draw.compiled()
-    assert status == OK
-    scale = max(1.0, np.abs(expected).max(initial=0.0))
-    assert np.abs(values - expected).max(initial=0.0) <= 2e-13 * scale
-    # the correction of a traced gradient turns with the increment: there differences must be shorter than that
-    delta = 1e-6 if name.startswith("traced") and size == 1e-4 else 1e-5
-    columns = [
-        (draw.plain(draw.z + step) - draw.plain(draw.z - step)) / (2.0 * delta) for step in delta * np.eye(draw.z.size)
-    ]
-    differences = np.array(columns).T.reshape(jacobian.shape)
-    # differences, and the differenced slopes of springs, are good to about eight digits
-    assert np.abs(jacobian - differences).max(initial=0.0) <= 3e-6 * max(1.0, np.abs(differences).max(initial=0.0))
+    energy = agreeing(draw)
     if isinstance(draw.primitive, Storage) and not draw.primitive.environment:
         there = draw.primitive.energy(draw.primitive.retract(draw.x, draw.v))
         assert abs(energy - there) <= 4e-15 * max(1.0, abs(there))

@@ -20,7 +20,6 @@ from ephs.operad import Path
 from ephs.semantics import Reference, StructureError, System
 from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.semantics.systems.system import as_system
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 from tests.semantics.subspace import Subspace, subspace_of
 
@@ -42,16 +41,6 @@ def test_a_body_has_four_boxes_and_a_joint_seven():
         assert sorted(map(str, pattern.interface)) == ["p1", "p2"]
 
 
-def test_the_flat_multibody_system_has_nine_junctions_and_fifteen_boxes():
-    system = TwoBodies.draw("revolute", 1).system.flatten()
-    names = {f"body{i}.q" for i in (1, 2)} | {f"joint.{j}" for j in ("p_j1", "p_j2", "p_r", "q_r", "s")} | {"p1", "p2"}
-    assert set(map(str, system.pattern.junctions)) == names
-    assert len(system.pattern.boxes) == 15
-    body = body_pattern()
-    joints = joint_pattern(pair("revolute"))
-    assert system.pattern == mbs_pattern().substitute(body1=body, body2=body, joint=joints)
-
-
 # ---- bodies ----------------------------------------------------------------------------------------------------
 
 
@@ -71,25 +60,6 @@ def test_a_body_means_newton_and_euler(seed):
         point = np.concatenate([*(rates[str(path)] for path, _ in relation.rates), f, u, [1.0]])
         assert subspace_of(relation).contains(point) <= 1e-13
         assert relation.dimension == 7
-
-
-def test_in_the_direct_product_a_twist_has_the_velocity_of_the_world():
-    p = np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
-    body = rigid_body(2.0, [1.0, 2.0, 2.5], (0.0, 0.0, 0.0), group="SO3xR3")
-    system = as_system(body)
-    closed = system.relation(route="nested").at({"ke.p": p, "pe.q": SE3.exp(np.ones(6))})
-    rates = subspace_of(closed)
-    assert rates.ambient == 6 + 6 + 6 + 6 + 1
-    free = np.concatenate(
-        [
-            [*np.cross(p[:3], p[:3] / [1.0, 2.0, 2.5]), 0.0, 0.0, 0.0],
-            p / [1, 2, 2.5, 2, 2, 2],
-            np.zeros(6),
-            p / [1, 2, 2.5, 2, 2, 2],
-            [1.0],
-        ]
-    )
-    assert rates.contains(free) <= 1e-14
 
 
 def test_a_massless_frame_has_no_kinetic_energy():
@@ -164,30 +134,6 @@ def _scaled(relation, d):
         move[i, j] = 1.0
     move[-1, -1] = 1.0
     return Subspace(move @ subspace_of(relation).basis)
-
-
-@pytest.mark.parametrize("kind", kinds())
-@few
-@given(seed=seeds)
-def test_the_constraint_row_as_it_is_printed_is_another_relation(kind, seed):
-    """With Ad_{o₁}, Ad_{o₂} in place of their inverses the joint would take power from nowhere."""
-    two = TwoBodies.draw(kind, seed)
-    back = SE3.adjoint(SE3.inverse(two.of.include(two.x)))
-    printed = np.hstack([back @ SE3.adjoint(two.offsets[0]), -SE3.adjoint(two.offsets[1]), two.of.basis])
-    # the rows as kernels on the efforts (u₁, u₂, u_r)
-    right, wrong = Subspace.from_kernel(two.rows), Subspace.from_kernel(printed)
-    assert right.distance(wrong) > 0.05
-    # flows from the correct row, efforts from the printed one: ⟨e|f⟩ does not vanish
-    lam = np.random.default_rng(seed).standard_normal(6)
-    worst = {
-        name: np.abs(space.basis.T @ (two.rows.T @ lam)).max() for name, space in (("right", right), ("wrong", wrong))
-    }
-    assert worst["right"] <= 1e-13
-    assert worst["wrong"] > 0.05
-    # and the velocities of two bodies that move together do not satisfy it
-    moving = np.concatenate([two.twists, two.u_r])
-    assert np.abs(two.rows @ moving).max() <= 1e-13
-    assert np.abs(printed @ moving).max() > 0.05
 
 
 @pytest.mark.parametrize("kind", kinds())

@@ -191,20 +191,6 @@ def test_loop_from_rest_to_rest(crank):
     assert first.energy_error.max() < 1e-12
 
 
-def test_small_mechanism_moves_likewise():
-    """Its equations are solved in units of its own: a millimetre, a milligram."""
-    small = CART.replace("mass = 1.0", "mass = 1e-9").replace("[0.1, 0.1, 0.1]", "[1e-16, 1e-16, 1e-16]")
-    small = small.replace("1e-9, 1e-9, 1e-9]", "1e-24, 1e-24, 1e-24]").replace("-1.0]", "-1e-3]")
-    small = small.replace("friction = 0.05\n", "")
-    text = "{ amplitude = 1e-4, frequency = 25.0, phase = 0.3 }"
-    sol = ephs.simulate(loaded(small.replace("{motion}", text)), 0.03, method="rk87", rtol=1e-9)
-    law = ephs.HarmonicMotion(0.1, 25.0 / 1000.0**0.5, 0.3)
-    slopes = lambda t, y: [y[1], law.acceleration(t) * np.cos(y[0]) - GRAVITY * np.sin(y[0])]  # noqa: E731
-    end = 0.03 * 1000.0**0.5
-    wanted = solve_ivp(slopes, (0.0, end), [0.0, law.rate(0.0)], method="DOP853", rtol=1e-12, atol=1e-12).y[0, -1]
-    assert sol.joint("pivot").coordinate[-1, 0] == pytest.approx(wanted, abs=1e-6)
-
-
 def test_system_by_hand_takes_a_law():
     """An effort at a joint's port; a function without derivative is left to the natural methods."""
     scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
-from ephs import quantity as Q
 from ephs.show.panels import motion_panels
 from ephs.show.report import write_report
 from tests.mechanics.methods.test_by_hand import four_bar
@@ -94,10 +93,7 @@ def test_joints_of_a_system_are_in_its_report_its_plots_and_its_summary(tmp_path
 def test_temperatures_of_systems_relax_as_the_closed_form_says(capacities):
     """d(θ₁ − θ₂)/dt = −h (1/C₁ + 1/C₂)(θ₁ − θ₂), and C₁ θ₁ + C₂ θ₂ stays."""
     first, second = capacities
-    pattern = Pattern(
-        junctions={"s1": junction(Q.entropy), "s2": junction(Q.entropy)},
-        boxes={"hot": {"s": "s1"}, "cold": {"s": "s2"}, "wall": {"s1": "s1", "s2": "s2"}},
-    )
+    pattern = Pattern.from_text("s1: entropy; s2: entropy; hot(s=s1); cold(s=s2); wall(s1, s2)")
     system = pattern(
         hot=lib.thermal_capacity(capacity=first, temperature=400.0),
         cold=lib.thermal_capacity(capacity=second, temperature=300.0),

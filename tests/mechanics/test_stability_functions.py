@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs import Pattern, junction, library
-from ephs import quantity as Q
+from ephs import Pattern, library
 from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.explicit import tableau
@@ -130,19 +129,12 @@ def test_every_method_of_scenes_with_constant_steps_has_its_test():
 # ---- systems without bodies -------------------------------------------------------------------------------------
 
 MASS, SPRING, DRAG = 2.0, 3.0, 0.4
-SYSTEM = Pattern(
-    junctions={"q": junction(Q.displacement), "p": junction(Q.momentum), "s": junction(Q.entropy)},
-    boxes={
-        "pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"},
-    },
-)(
+SYSTEM = Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); env(s)")(
     pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), pkc=library.pkc(), mf=library.friction(d=DRAG),
     env=library.environment(),
 )  # fmt: skip
-LINKED = Pattern(
-    junctions={name: junction(Q.momentum if name[0] == "p" else Q.displacement) for name in ("q", "p", "p2")},
-    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "ke2": {"p": "p2"}, "pkc": {"q": "q", "p": "p"},
-           "link": {"p": "p", "p2": "p2"}},
+LINKED = Pattern.from_text(
+    "q: displacement; p: momentum; p2: momentum; pe(q); ke(p); ke2(p=p2); pkc(q, p); link(p, p2)"
 )(
     pe=library.spring(k=SPRING), ke=library.point_mass(m=MASS), ke2=library.point_mass(m=MASS),
     pkc=library.pkc(), link=library.rigid_link(),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
@@ -54,11 +54,8 @@ def test_the_rate_of_a_spring_and_a_mass_is_the_root_of_their_ratio(k, m):
 
 @given(k=MANY, m=st.tuples(MANY, MANY).filter(lambda m: 1e-6 < m[0] / m[1] < 1e6))
 def test_two_masses_on_one_spring_swing_against_each_other(k, m):
-    pattern = Pattern(
-        junctions={"q": junction(Q.displacement), **{name: junction(Q.momentum) for name in ("p", "p1", "p2")}},
-        boxes={"pe": {"q": "q"}, "pkc": {"q": "q", "p": "p"}, "first": {"p": "p1"}, "second": {"p": "p2"},
-               "apart": {"a": "p", "b": "p1", "c": "p2"}},
-    )  # fmt: skip
+    pattern = Pattern.from_text("q: displacement; p: momentum; p1: momentum; p2: momentum; pe(q); pkc(q, p); "
+"first(p=p1); second(p=p2); apart(a=p, b=p1, c=p2)")  # fmt: skip
     apart = ephs.constraint({"a": Q.momentum, "b": Q.momentum, "c": Q.momentum}, [[1.0, 1.0, -1.0]])
     system = pattern(
         pe=lib.spring(k=k), pkc=lib.pkc(), first=lib.point_mass(m=m[0]), second=lib.point_mass(m=m[1]), apart=apart

@@ -5,11 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ephs.mechanics import rigid_body
-from ephs.operad import Path
 from ephs.semantics import Reference
-from ephs.semantics.descriptor.descriptor import Input
-from ephs.semantics.spaces import SE3, SO3xR3
+from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import rotation_log
 from ephs.solve.instant import instant
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
@@ -150,35 +147,6 @@ def _square(two, x):
 
 @few
 @given(seeds)
-def test_variations_of_velocities(seed):
-    """δu = η̇ + ad_u η on a surface of poses q(t, s), for both groups."""
-    rng = np.random.default_rng(seed)
-    h = 1e-3
-    for space in (SE3, SO3xR3):
-        a, b, c, q0 = (
-            rng.standard_normal(6),
-            rng.standard_normal(6),
-            rng.standard_normal(6),
-            space.random(rng),
-        )
-
-        def pose(t, s, space=space, a=a, b=b, c=c, q0=q0):
-            return space.compose(space.compose(q0, space.exp(t * a + s * b)), space.exp(t * s * c + t * t * b))
-
-        def twist(t, s, space=space, pose=pose):
-            return (space.increment(pose(t, s), pose(t + h, s)) - space.increment(pose(t, s), pose(t - h, s))) / (2 * h)
-
-        def variation(t, s, space=space, pose=pose):
-            return (space.increment(pose(t, s), pose(t, s + h)) - space.increment(pose(t, s), pose(t, s - h))) / (2 * h)
-
-        t, s = 0.2, -0.1
-        change = (twist(t, s + h) - twist(t, s - h)) / (2 * h)
-        expected = (variation(t + h, s) - variation(t - h, s)) / (2 * h) + space.ad(twist(t, s)) @ variation(t, s)
-        assert np.abs(change - expected).max() <= 2e-4 * max(1.0, np.abs(expected).max())
-
-
-@few
-@given(seeds)
 def test_the_thermodynamic_constraint(seed):
     """∂L/∂s = −θ₀, so that θ₀ ṡ = μ(u_r, u_r)."""
     two = TwoBodies.draw("cylindrical", seed)
@@ -187,41 +155,3 @@ def test_the_thermodynamic_constraint(seed):
     rounding = 1e-11 * np.linalg.norm(two.mu) * np.linalg.norm(two.u_r) * twists
     made = Reference().temperature * rates["joint.env.s"][0]
     assert made == pytest.approx(two.u_r @ two.mu @ two.u_r, rel=1e-11, abs=rounding)
-
-
-@pytest.mark.parametrize("kind", kinds())
-@few
-@given(seed=seeds)
-def test_joint_forces_act_and_react(kind, seed):
-    """The composite moves as its bodies would alone under the wrenches −Ad*Ad*λ and Ad*λ of the joint."""
-    two = TwoBodies.draw(kind, seed)
-    now = solved(two)
-    lam = now.multiplier(Path.parse("joint.hc"))
-    assert np.all(np.isfinite(lam))
-    for i, wrench in enumerate((-two.to_c1.T @ lam, two.to_c2.T @ lam)):
-        body = rigid_body(two.masses[i], two.inertias[i], GRAVITY)
-        descriptor = body.descriptor()
-        own = {
-            name.removeprefix(f"body{i + 1}."): value
-            for name, value in two.state.items()
-            if name.startswith(f"body{i + 1}")
-        }
-        alone = instant(descriptor, Reference(), descriptor.pack(body.state(own)), {Path.of("p"): Input(wrench, False)})
-        here, there = alone.rates[Path.parse("ke.p")], now.rates[Path.parse(f"body{i + 1}.ke.p")]
-        assert np.abs(here - there).max() <= 1e-10 * max(1.0, np.abs(there).max(), np.abs(lam).max())
-
-
-@few
-@given(seeds)
-def test_momentum_of_the_whole_changes_by_gravity_alone(seed):
-    """Σ Ad*_{q⁻¹} p: joint wrenches cancel where the joint is closed."""
-    two = TwoBodies.draw("spherical", seed)
-    rates = {str(path): rate for path, rate in solved(two).rates.items()}
-    total, expected, size = np.zeros(6), np.zeros(6), 0.0
-    for i, (q, u) in enumerate(((two.q1, two.u1), (two.q2, two.u2))):
-        back = SE3.adjoint(SE3.inverse(q)).T
-        term = rates[f"body{i + 1}.ke.p"] - SE3.ad(u).T @ (two.metric[i] @ u)
-        total += back @ term
-        expected -= back @ two.weight(i)
-        size += np.abs(back).sum() * np.abs(term).max()
-    assert np.abs(total - expected).max() <= 1e-12 * size

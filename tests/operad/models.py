@@ -1,43 +1,17 @@
 """Patterns that several tests use: the damped oscillator, and two bodies on a joint."""
 
-from ephs.operad import Pattern, junction, quantity
+from ephs.operad import Pattern, quantity
 
 MOMENTUM = quantity.body_momentum
 POSE = quantity.pose
 
-OSCILLATOR = Pattern(
-    junctions={"q": junction(quantity.displacement), "p": junction(quantity.momentum, exposed=True)},
-    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
+OSCILLATOR = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
+DAMPED = Pattern.from_text("p: momentum; s: entropy; osc(p); mf(p, s); env(s)")
+BODY = Pattern.from_text("q: pose; p: body_momentum, exposed; pe(q); pkc(q, p); ke(p); lp(p)")
+JOINT = Pattern.from_text(
+    "p1: body_momentum, exposed; p2: body_momentum, exposed; p_j1: body_momentum; "
+    "p_j2: body_momentum; p_r: joint_momentum(revolute); q_r: relative_pose(revolute); s: entropy; "
+    "o1(p1, p_j1); o2(p2, p_j2); hc(~q_r, p_j1, p_j2, p_r); pe(q_r); pkc(q_r, p_r); mf(p_r, s); "
+    "env(s)"
 )
-DAMPED = Pattern(
-    junctions={"p": junction(quantity.momentum), "s": junction(quantity.entropy)},
-    boxes={"osc": {"p": "p"}, "mf": {"p": "p", "s": "s"}, "env": {"s": "s"}},
-)
-BODY = Pattern(
-    junctions={"q": junction(POSE), "p": junction(MOMENTUM, exposed=True)},
-    boxes={"pe": {"q": "q"}, "pkc": {"q": "q", "p": "p"}, "ke": {"p": "p"}, "lp": {"p": "p"}},
-)
-JOINT = Pattern(
-    junctions={
-        "p1": junction(MOMENTUM, exposed=True),
-        "p2": junction(MOMENTUM, exposed=True),
-        "p_j1": junction(MOMENTUM),
-        "p_j2": junction(MOMENTUM),
-        "p_r": junction(quantity.joint_momentum("revolute")),
-        "q_r": junction(quantity.relative_pose("revolute")),
-        "s": junction(quantity.entropy),
-    },
-    boxes={
-        "o1": {"p1": "p1", "p_j1": "p_j1"},
-        "o2": {"p2": "p2", "p_j2": "p_j2"},
-        "hc": {"q_r": "~q_r", "p_j1": "p_j1", "p_j2": "p_j2", "p_r": "p_r"},
-        "pe": {"q_r": "q_r"},
-        "pkc": {"q_r": "q_r", "p_r": "p_r"},
-        "mf": {"p_r": "p_r", "s": "s"},
-        "env": {"s": "s"},
-    },
-)
-MBS = Pattern(
-    junctions={"p1": junction(MOMENTUM), "p2": junction(MOMENTUM)},
-    boxes={"b1": {"p": "p1"}, "b2": {"p": "p2"}, "j": {"p1": "p1", "p2": "p2"}},
-)
+MBS = Pattern.from_text("p1: body_momentum; p2: body_momentum; b1(p=p1); b2(p=p2); j(p1, p2)")

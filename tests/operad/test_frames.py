@@ -146,19 +146,19 @@ def test_systems_are_defined_by_all_routes_or_by_none(composite):
 
 
 def test_a_subsystem_that_shows_one_state_at_two_ports_unites_their_frames():
-    inside = Pattern({"x": junction(Q, True), "y": junction(Q, True)}, {"a": {"x": "x", "y": "y"}}, [("x", "y")])
+    inside = Pattern.from_text("x: displacement, exposed; y: displacement, exposed; a(x, y); x ~ y")
     (part,) = inside.boxes.values()
     of = find(reversibles(part.interface), lambda _: True, settings=FINDING)
     subsystem = System.of(inside, {"a": of})
     middle = System.of(
-        Pattern({"v": junction(Q, True), "w": junction(Q, True)}, {"s": {"x": "v", "y": "w"}}), {"s": subsystem}
+        Pattern.from_text("v: displacement, exposed; w: displacement, exposed; s(x=v, y=w)"), {"s": subsystem}
     )
     assert [names(group) for group in (*subsystem.shared_ports, *middle.shared_ports)] == [{"x", "y"}, {"v", "w"}]
     for frames, expected in ((("A", None), {"A"}), ((None, None), {None})):
         j, k = (junction(Q.in_frame(frame), True) for frame in frames)
         found = System.of(Pattern({"j": j, "k": k}, {"s": {"v": "j", "w": "k"}}), {"s": middle})
         assert {t.quantity.frame for t in found.interface.values()} == expected
-    outer = Pattern({"j": junction(Q.in_frame("A")), "k": junction(Q.in_frame("B"))}, {"s": {"v": "j", "w": "k"}})
+    outer = Pattern.from_text("j: displacement @ A; k: displacement @ B; s(v=j, w=k)")
     with pytest.raises(
         PatternError, match="one state in two frames: found frame A at junction j, frame B at junction k"
     ):
@@ -166,8 +166,8 @@ def test_a_subsystem_that_shows_one_state_at_two_ports_unites_their_frames():
 
 
 def test_the_conflict_names_both_places():
-    lower = Pattern({"q": junction(Q.in_frame("C"), True)}, {"a": {"q": "q"}})
-    upper = Pattern({"j": junction(Q.in_frame("B"))}, {"box": {"q": "j"}})
+    lower = Pattern.from_text("q: displacement @ C, exposed; a(q)")
+    upper = Pattern.from_text("j: displacement @ B; box(q=j)")
     with pytest.raises(PatternError, match=r"frame B at junction j, frame C at box box, port q") as caught:
         upper.substitute(box=lower)
     assert (str(caught.value.box), str(caught.value.junction)) == ("box", "j")

@@ -139,7 +139,7 @@ def ring(count):
         (Pattern({"q": junction(Q)}, {f"b{k}": {"x": "q"} for k in range(12)}), math.factorial(12)),
         (ring(3), 6),
         (ring(7), 14),
-        (Pattern({"q": junction(Q)}, {"a": {"x": "q", "y": "q"}, "b": {"x": "q", "y": "~q"}}), 2),
+        (Pattern.from_text("q: displacement; a(x=q, y=q); b(x=q, y=~q)"), 2),
         # Three pairs of boxes, each on a junction of its own: swap within pairs, and pairs.
         (
             Pattern(

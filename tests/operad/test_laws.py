@@ -7,7 +7,7 @@ import pytest
 from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
 
-from ephs.operad import LAWS, ROOT, Directory, Equation, Path, Pattern, Port, Quantity, junction, law, quantity
+from ephs.operad import LAWS, ROOT, Directory, Path, Pattern, Port, Quantity, junction, law
 from ephs.testing import check_operad_laws, law_inputs, nestings, patterns
 
 ALL = [
@@ -83,24 +83,6 @@ def test_nestings_flatten_alike_from_above_and_from_below(nesting):
     assert whole.interface == nesting.pattern.interface
 
 
-@given(patterns(), st.data())
-def test_sizes_add_up(f, data):
-    box = data.draw(st.sampled_from([*f.boxes])) if f.boxes else None
-    if box is None or f.is_identity:
-        return
-    g = data.draw(patterns(interface=f.boxes[box].interface, identities=False))
-    whole = f.substitute({box: g})
-    assert set(whole.boxes) == ({*f.boxes} - {box}) | {box / inner for inner in g.boxes}
-    assert len(whole.boxes) == len(f.boxes) - 1 + len(g.boxes)
-    inner_ports = sum(len(b.ports) for b in g.boxes.values())
-    assert sum(len(b.ports) for b in whole.boxes.values()) == inner_ports + sum(
-        len(b.ports) for name, b in f.boxes.items() if name != box
-    )
-    powered = set(whole.normal_form.junctions)
-    kept = {box / path for path in g.normal_form.junctions if path not in g.interface}
-    assert kept <= powered
-
-
 @given(patterns(), st.randoms(use_true_random=False))
 def test_patterns_are_equal_up_to_order(f, random):
     if f.is_identity:
@@ -159,18 +141,6 @@ def test_a_link_makes_another_pattern(f, data):
     assert linked != f and Pattern(f.junctions, f.boxes) == f
 
 
-def test_an_anonymous_class_may_be_named_differently_by_history():
-    """The name of a class which nobody names outside depends on the order; equality and laws do not."""
-    q = quantity.displacement
-    h = Pattern({"k": junction(q, exposed=True, power=False)}, {"x": {"q": "~k"}})
-    g = Pattern({"l.o.n.g": junction(q, exposed=True, power=False)}, {"b": {"k": "~l.o.n.g"}})
-    f = Pattern({"w.i.d.e.r": junction(q)}, {"a": {"l.o.n.g": "~w.i.d.e.r"}})
-    left = f.substitute(a=g).substitute({"a.b": h})
-    right = f.substitute(a=g.substitute(b=h))
-    assert set(left.junctions) != set(right.junctions)
-    assert left == right and hash(left) == hash(right)
-
-
 def test_names_that_stay_need_not_be_given(models):
     for name in ("equivariance in boxes", "equivariance in junctions", "equivariance in ports"):
         assert law(name)(models.DAMPED, Path.parse("osc"), models.OSCILLATOR, {}).holds
@@ -179,13 +149,6 @@ def test_names_that_stay_need_not_be_given(models):
 def test_what_cannot_be_a_path_is_no_key():
     with pytest.raises(KeyError, match="~x"):
         Directory({"x": 1})["~x"]
-
-
-def test_an_equation_shows_both_sides():
-    f = Pattern({"q": junction(quantity.displacement)}, {"a": {"q": "q"}})
-    good, bad = Equation(f, f), Equation(f, f.rename(boxes={"a": "b"}))
-    assert good.holds and not bad.holds
-    assert "a: q on q" in str(bad) and "b: q on q" in str(bad) and "≠" in str(bad) and "≠" not in str(good)
 
 
 def test_the_check_for_other_suites_finds_nothing():

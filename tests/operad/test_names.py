@@ -54,17 +54,6 @@ def test_a_malformed_name_is_refused(text):
     assert caught.value.kind == "name"
 
 
-@pytest.mark.parametrize("value", [3, None, [1], ("a", 2)])
-def test_what_is_no_path_is_refused(value):
-    with pytest.raises(PatternError):
-        Path.of(value)
-
-
-def test_text_is_no_sequence_of_names():
-    with pytest.raises(PatternError, match=r"Path\.parse"):
-        Path("ab")
-
-
 @given(directories())
 def test_directory_left_and_right_unit(d):
     assert Directory.unit(d).flatten() == d == d.map(Directory.unit).flatten()

@@ -25,7 +25,7 @@ from ephs.operad import (
     quantity,
 )
 from tests.operad import models
-from tests.operad.test_documents import BROKEN, BROKEN_TEXT, FINE
+from tests.operad.test_documents import BROKEN, BROKEN_TEXT, FINE, described, junction_of
 from tests.operad.test_pattern import ALLOWED, REFUSED
 from tests.operad.test_substitution import MISFITS, UPPER
 
@@ -62,35 +62,27 @@ def nested() -> Nesting:
     return Nesting(models.DAMPED, {"osc": models.OSCILLATOR})
 
 
-def space(**parts: object) -> dict[str, object]:
-    """A document whose one quantity is described, with some parts replaced."""
-    described = {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 1}
-    return FINE | {"junctions": {"q": {"quantity": described | parts}}}
-
-
 DOCUMENTS: dict[str, Any] = {
-    "document: dim is no whole number": space(space={"name": "r", "dim": 1.0, "size": 1}),
-    "document: size is text": space(space={"name": "r", "dim": 1, "size": "1"}),
-    "document: parity is true": space(parity=True),
-    "document: kind is a number": space(kind=5),
-    "document: space is a list": space(space=[]),
-    "document: space has a key too many": space(space={"name": "r", "dim": 1, "size": 1, "colour": 1}),
-    "document: space lacks its name": space(space={"dim": 1, "size": 1}),
-    "document: space's name is a number": space(space={"name": 1, "dim": 1, "size": 1}),
-    "document: size less than dim": space(space={"name": "r", "dim": 2, "size": 1}),
-    "document: negative dim": space(space={"name": "r", "dim": -1, "size": 1}),
-    "document: parameters are a list": space(space={"name": "r", "dim": 1, "size": 1, "parameters": []}),
-    "document: parameter is text": space(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": "x"}}),
-    "document: parameter is true": space(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": True}}),
-    "document: parameter is infinite": space(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": 1e999}}),
-    "document: pitch is text": FINE
-    | {"junctions": {"q": {"quantity": "relative_pose", "pair": "screw", "pitch": "x"}}},
-    "document: pair is a number": FINE | {"junctions": {"q": {"quantity": "relative_pose", "pair": 1}}},
-    "document: pitch of a hinge": FINE
-    | {"junctions": {"q": {"quantity": "relative_pose", "pair": "revolute", "pitch": 1}}},
-    "document: frame is null": FINE | {"junctions": {"q": {"quantity": "pose", "frame": None}}},
+    "document: dim is no whole number": described(space={"name": "r", "dim": 1.0, "size": 1}),
+    "document: size is text": described(space={"name": "r", "dim": 1, "size": "1"}),
+    "document: parity is true": described(parity=True),
+    "document: kind is a number": described(kind=5),
+    "document: space is a list": described(space=[]),
+    "document: space has a key too many": described(space={"name": "r", "dim": 1, "size": 1, "colour": 1}),
+    "document: space lacks its name": described(space={"dim": 1, "size": 1}),
+    "document: space's name is a number": described(space={"name": 1, "dim": 1, "size": 1}),
+    "document: size less than dim": described(space={"name": "r", "dim": 2, "size": 1}),
+    "document: negative dim": described(space={"name": "r", "dim": -1, "size": 1}),
+    "document: parameters are a list": described(space={"name": "r", "dim": 1, "size": 1, "parameters": []}),
+    "document: parameter is text": described(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": "x"}}),
+    "document: parameter is true": described(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": True}}),
+    "document: parameter is infinite": described(space={"name": "r", "dim": 1, "size": 1, "parameters": {"p": 1e999}}),
+    "document: pitch is text": junction_of(quantity="relative_pose", pair="screw", pitch="x"),
+    "document: pair is a number": junction_of(quantity="relative_pose", pair=1),
+    "document: pitch of a hinge": junction_of(quantity="relative_pose", pair="revolute", pitch=1),
+    "document: frame is null": junction_of(quantity="pose", frame=None),
     "document: junction is text": FINE | {"junctions": {"q": "displacement"}},
-    "document: junction has a key too many": FINE | {"junctions": {"q": {"quantity": "pose", "colour": 1}}},
+    "document: junction has a key too many": junction_of(quantity="pose", colour=1),
     "document: box is a list": FINE | {"boxes": {"a": []}},
     "document: key is a number": FINE | {"boxes": {1: {}}},
     "document: links are text": FINE | {"links": "q"},
@@ -145,9 +137,7 @@ SHOWN: dict[str, Callable[[], object]] = {
             *(str(edge) for edge in rich().to_networkx().edges(keys=True, data=True)),
         ]
     ),
-    "remarks": lambda: "\n".join(
-        f"{name}: {remark}" for name, (make, _) in ALLOWED.items() for remark in make().lint()
-    ),
+    "remarks": lambda: "\n".join(f"{name}: {remark}" for name, make in ALLOWED.items() for remark in make().lint()),
     "laws": lambda: "\n".join(f"{each.name} ({', '.join(each.inputs)}): {each.statement}" for each in LAWS),
     "equation that holds": lambda: str(law("left unit")(models.OSCILLATOR)),
     "equation that does not": lambda: str(
@@ -212,9 +202,7 @@ LONG: dict[str, Callable[[], object]] = {
     "no utf-8": lambda: Pattern.from_json(b"\xff\xfe\xfa"),
     "too many digits": lambda: Pattern.from_json('{"format": ' + "9" * 5000 + "}"),
     "key given twice, not the first": lambda: Pattern.from_json('{"c": 2, "b": 1, "b": 3}'),
-    "pitch beside a description": lambda: Pattern.from_dict(
-        FINE | {"junctions": {"q": {"quantity": {}, "pitch": 1.0}}}
-    ),
+    "pitch beside a description": lambda: Pattern.from_dict(junction_of(quantity={}, pitch=1.0)),
     "format as a list": lambda: Pattern.from_dict(FINE | {"format": [1]}),
     "box that is no text": lambda: Pattern({"q": junction(Q)}, {"a": [1, 2]}),
     "link to nothing that has a name": lambda: Pattern({}, {"a": {}}, [["p", "q"]]),
@@ -236,7 +224,7 @@ LONG: dict[str, Callable[[], object]] = {
         'a({); q: {"kind": "x", "space": {"name": "r", "dim": 1, "size": 1}, "parity": 1}'
     ),
     "misfit within an identity": lambda: Nesting(
-        Pattern({"q": junction(Q)}, {"a": {"q": "q"}}),
+        Pattern.from_text("q: displacement; a(q)"),
         {"a": Nesting(Pattern.identity({"q": PortType(Q)}), {".": Pattern.from_text("q: angle, exposed; b(q)")})},
     ).flatten(),
     "name with a dot": lambda: Path(("a.b",)),
@@ -262,8 +250,8 @@ LONG: dict[str, Callable[[], object]] = {
 
 def words() -> dict[str, Callable[[], str]]:
     """Everything that is said, by name; said when called."""
-    refused: dict[str, Callable[[], object]] = {name: make for name, (make, _) in REFUSED.items()}
-    refused |= {f"document: {name}": lambda d=d: Pattern.from_dict(d) for name, (d, _) in BROKEN.items()}
+    refused: dict[str, Callable[[], object]] = dict(REFUSED)
+    refused |= {f"document: {name}": lambda d=d: Pattern.from_dict(d) for name, d in BROKEN.items()}
     refused |= {name: lambda d=d: Pattern.from_dict(d) for name, d in DOCUMENTS.items()}
     refused |= {f"json: {text}": lambda text=text: Pattern.from_json(text) for text in TEXTS}
     refused |= {f"text: {text}": lambda text=text: Pattern.from_text(text) for text in BROKEN_TEXT}

@@ -48,14 +48,6 @@ def rate(relation, name):
     return relation.values[Path.of(name)]
 
 
-def test_a_part_that_stores_nothing_identifies_two_states_around_it():
-    top = Pattern.from_text("j: displacement; k: displacement; w(a=~j, b=~k); s(q=j); " + CIRCUIT)
-    system = top(w=WIRE(e=BLIND), s=SPRING, r=READER, **COIL)
-    assert system.check().ok
-    relation = both(system, {"s.q": 2.0, "L.b": 1.0})
-    assert rate(relation, "C.q") == pytest.approx(1.0 + 2.0**2)  # the reader on k reads the spring on j
-
-
 def test_identifications_travel_through_three_levels():
     """What the innermost part identifies reaches a reader three levels up, through links on the way."""
     middle = Pattern.from_text(

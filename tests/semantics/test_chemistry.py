@@ -150,26 +150,6 @@ def looked_at(sol, constant_of_temperature, mixture, volume=None):
     return (b[-1] / size) / (a[-1] / size) ** 2 / constant_of_temperature(temperature), temperature
 
 
-def test_a_dimer_comes_to_the_closed_form():
-    """Without heat of reaction the temperature stays, and a + 2 K a²/v = n is a quadratic equation."""
-    species = (Species("A", {"X": 1}, entropy=R, capacity=20.0), Species("B", {"X": 2}, entropy=40.0, capacity=40.0))
-    volume, temperature, n = 0.02, 350.0, 1.2
-    sol = simulate(
-        vessel(species, k=5e-3),
-        400.0,
-        initial=start(species, temperature, volume, A=1.0, B=0.1),
-        method="natural",
-        step=1.0,
-        audit="off",  # the start is faster than the step; the end is what counts
-    )
-    constant = chemistry.equilibrium_constant("2 A = B", species=species, temperature=temperature)
-    a = (math.sqrt(1.0 + 8.0 * constant / volume * n) - 1.0) / (4.0 * constant / volume)
-    assert sol["mixture.A"][-1] == pytest.approx(a, rel=1e-10)
-    assert sol["mixture.B"][-1] == pytest.approx(0.5 * (n - a), rel=1e-10)
-    quotient, end = looked_at(sol, lambda _: constant, lib.ideal_mixture(species=species), volume)
-    assert quotient == pytest.approx(1.0, rel=1e-10) and end == pytest.approx(temperature, rel=1e-12)
-
-
 @PHASES
 def test_a_dimer_with_heat_comes_to_mass_action_where_it_gets_to(phase):
     volume = 0.02

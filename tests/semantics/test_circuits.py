@@ -16,48 +16,6 @@ from tests.semantics.test_primitives import ARGUMENTS
 EPS = float(np.finfo(float).eps)
 
 
-def test_a_winding_on_a_core_is_an_inductance():
-    """Of n²/r, which swings with a capacitor."""
-    pattern = Pattern.from_text("q: charge; b: flux_linkage; m: magnetic_flux; c(q); emc(q, b); first(b, m); core(m)")
-    turns, r, c = 30.0, 50.0, 1e-3
-    system = pattern(c=lib.capacitor(c=c), emc=lib.emc(), first=lib.winding(turns=turns), core=lib.reluctance(r=r))
-    sol = simulate(system, 1.0, initial={"c.q": 1e-3}, method="natural", step=0.01)
-    # one rotation of the midpoint rule a step, of the frequency 1/√(L C)
-    omega = 1.0 / math.sqrt(turns**2 / r * c)
-    angle = 2.0 * math.atan(0.5 * 0.01 * omega)
-    steps = np.arange(len(sol))
-    assert np.allclose(sol["c.q"], 1e-3 * np.cos(angle * steps), atol=1e-3 * 10 * len(sol) * 8 * EPS)
-    assert np.abs(sol.energy - sol.energy[0]).max() <= 8 * len(sol) * EPS * sol.energy[0]
-
-
-def test_a_coil_turns_flux_into_voltage():
-    """The gyrator of a coil on a core: a capacitor and an inductance of n²/r swing as with the winding."""
-    pattern = Pattern.from_text("q: charge; m: magnetic_flux; c(q); coil(q, m); core(m)")
-    turns, r, c = 30.0, 50.0, 1e-3
-    system = pattern(c=lib.capacitor(c=c), coil=lib.coil(turns=turns), core=lib.reluctance(r=r))
-    sol = simulate(system, 1.0, initial={"c.q": 1e-3}, method="natural", step=0.01)
-    angle = 2.0 * math.atan(0.005 / math.sqrt(turns**2 / r * c))
-    assert np.allclose(sol["c.q"], 1e-3 * np.cos(angle * np.arange(len(sol))), atol=1e-3 * 10 * len(sol) * 8 * EPS)
-
-
-def test_paths_behind_one_another_add_their_reluctances():
-    pattern = Pattern.from_text(
-        "b: flux_linkage, exposed; m: magnetic_flux; m1: magnetic_flux; m2: magnetic_flux;"
-        "coil(b, m); series(m, m1, m2); iron(m=m1); gap(m=m2)"
-    )
-    system = pattern(
-        coil=lib.winding(turns=10.0),
-        series=lib.magnetic_series(),
-        iron=lib.reluctance(r=3.0),
-        gap=lib.reluctance(r=50.0),
-    )
-    sol = simulate(system, 1.0, inputs={"b": {"flow": 2.0}}, method="natural", step=0.1)  # a voltage of 2 V
-    flux = sol.t * 2.0 / 10.0
-    for path in ("iron.m", "gap.m"):
-        assert np.abs(sol[path] - flux).max() <= 1e-13
-    assert sol.energy[-1] == pytest.approx(0.5 * (3.0 + 50.0) * flux[-1] ** 2, rel=1e-12)
-
-
 @given(st.floats(-4.0, 4.0))
 def test_saturation_is_linear_at_first_and_steep_beyond_the_knee(share):
     core = lib.saturating_reluctance(r=5.0, knee=0.2)
@@ -76,23 +34,6 @@ TANKS = Pattern.from_text("a: liquid; b: liquid; s: entropy; tank1(v=a); tank2(v
 def tanks(valve):
     one, two = lib.tank(area=2.0, density=1e3), lib.tank(area=1.0, density=1e3)
     return TANKS(tank1=one, tank2=two, valve=valve, room=lib.environment())
-
-
-def test_tanks_with_a_leak_come_to_one_level_by_the_closed_form():
-    c = 2e-5
-    system = tanks(lib.laminar_leak(c=c))
-    sol = simulate(system, 20.0, initial={"tank1.v": 3.0, "tank2.v": 0.5}, method="natural", step=0.05)
-    stiffness = 1e3 * 9.81
-    rate = c * stiffness * (1.0 / 2.0 + 1.0)
-    factor = (1.0 - 0.025 * rate) / (1.0 + 0.025 * rate)  # of the midpoint rule, which is exact for its steps
-    level = 3.5 / 3.0
-    expected = 2.0 * level + (3.0 - 2.0 * level) * factor ** np.arange(len(sol))
-    assert np.allclose(sol["tank1.v"], expected, rtol=1e-11)
-    liquid = sol["tank1.v"] + sol["tank2.v"]
-    assert np.abs(liquid - 3.5).max() <= 8 * len(sol) * EPS * 3.5
-    heat = 293.15 * (sol["room.s"][-1] - sol["room.s"][0])
-    lost = 0.5 * stiffness * (3.0**2 / 2.0 + 0.5**2 - expected[-1] ** 2 / 2.0 - (3.5 - expected[-1]) ** 2)
-    assert heat == pytest.approx(lost, rel=1e-9) and np.diff(sol["room.s"]).min() > 0.0
 
 
 @given(st.floats(1e-3, 1e3), st.booleans())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ephs.operad import Pattern, PatternError
+from ephs.operad import Path, Pattern
 from ephs.semantics import AssemblyError, library
 from ephs.semantics.meaning import relation_of_pattern
 from ephs.semantics.meaning.fields import Rational
@@ -36,46 +36,6 @@ def test_what_is_allowed_means_a_dirac_structure(case):
     assert {str(v) for v, row in relation.solved().items() if not row} == set(still)
 
 
-REFUSED = {
-    "pass-through: two outer ports on one junction": (
-        lambda: Pattern.from_text("l: displacement, exposed; r: displacement, exposed; a(l)"),
-        ["junction r", "fork outside: expose it once"],
-    ),
-    "exposed without inner port": (
-        lambda: Pattern.from_text("q: displacement, exposed; a()"),
-        ["junction q", "no inner port"],
-    ),
-    "without any port": (lambda: Pattern.from_text("q: displacement; a()"), ["junction q", "no inner port"]),
-    "junctions but no box": (lambda: Pattern.from_text("q: displacement"), ["junction q", "no inner port"]),
-    "a name twice among junctions": (
-        lambda: Pattern.from_text("q: displacement; q: momentum; a(q)"),
-        ["junctions", "q is given twice"],
-    ),
-    "a box below a junction": (
-        lambda: Pattern.from_text("q: displacement; q.a(x=q)"),
-        ["box q.a and junction q clash", "substitution could name two junctions alike"],
-    ),
-    "a junction below a box": (
-        lambda: Pattern.from_text("a.q: displacement; a(x=a.q)"),
-        ["box a and junction a.q clash"],
-    ),
-    "a filling whose ports have other names": (
-        lambda: Pattern.from_text("q: displacement; a(q)").substitute(
-            a=Pattern.from_text("r: displacement, exposed; b(r)")
-        ),
-        ["box a", "missing q: displacement", "extra r: displacement", "rename ports with Pattern.rename"],
-    ),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_is_refused_is_named(case):
-    make, words = REFUSED[case]
-    with pytest.raises(PatternError) as caught:
-        make()
-    assert all(word in str(caught.value) for word in words), caught.value
-
-
 NOT_ASSEMBLED = {
     "two storages on one junction": (
         "q: displacement; a(q); b(q)",
@@ -107,5 +67,6 @@ def test_an_effort_that_nobody_provides_is_an_unknown():
     system = f(
         m=library.point_mass(m=2.0), link=library.rigid_link(), drag=library.friction(d=0.5), env=library.environment()
     )
-    both = [system.relation(route=route).at({"m.p": 1.0}) for route in ("flat", "nested")]
+    both = [system.relation(route=route).at({"m.p": 1.0}, efforts={"drag": [0.5, 0.0]}) for route in ("flat", "nested")]
     assert both[0].same(both[1]) and len(both[0].rates) == 2
+    assert both[0].values[Path.of("m.p")] == pytest.approx(-0.25)

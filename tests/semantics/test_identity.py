@@ -22,6 +22,10 @@ STRUCTURES = {
     "series_springs": (library.series_springs(), np.zeros((2, 2)), [[1, -1]]),
     "rigid_link": (library.rigid_link(), np.zeros((2, 2)), [[1, -1]]),
     "piston": (library.piston(a=A), [[0, 0, -A], [0, 0, A], [A, -A, 0]], np.zeros((0, 3))),
+    "coil": (library.coil(turns=4.0), [[0, 0.25], [-0.25, 0]], np.zeros((0, 2))),
+    "winding": (library.winding(turns=30.0), np.zeros((2, 2)), [[-30, 1]]),
+    "magnetic_series": (library.magnetic_series(), np.zeros((3, 3)), [[1, -1, -1]]),
+    "conduit": (library.conduit(), [[0, 0, -1], [0, 0, 1], [1, -1, 0]], np.zeros((0, 3))),
 }
 KINDS = [library.spring(k=2.0), library.pkc(), library.mkc(), library.friction(d=0.3), library.environment()]
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import AssemblyError, Pattern, System, junction, library
+from ephs import AssemblyError, Pattern, System, library
 from ephs import quantity as Q
 from ephs.semantics import Storage
 from ephs.semantics.verdicts.checks import random_point
@@ -64,10 +64,9 @@ def test_documents_keep_them(number):
 
 
 def oscillator(**parts):
-    return Pattern(
-        junctions={"q": junction(Q.displacement), "p": junction(Q.momentum)},
-        boxes={"spring": {"q": "q"}, "mass": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
-    )(**{"spring": library.spring(k=2.0), "mass": library.point_mass(m=1.0), "pkc": library.pkc()} | parts)
+    return Pattern.from_text("q: displacement; p: momentum; spring(q); mass(p); pkc(q, p)")(
+        **{"spring": library.spring(k=2.0), "mass": library.point_mass(m=1.0), "pkc": library.pkc()} | parts
+    )
 
 
 def quartic(**more):

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ephs import Pattern, junction, library, quantity
+from ephs import Pattern, library
 from ephs.semantics.systems.kept import MOST, Kept
 
-PATTERN, MASS = Pattern({"p": junction(quantity.momentum)}, {"mass": {"p": "p"}}), library.point_mass(m=2.0)
+PATTERN, MASS = Pattern.from_text("p: momentum; mass(p)"), library.point_mass(m=2.0)
 
 
 @given(st.lists(st.integers(0, 2 * MOST), max_size=60))

@@ -8,19 +8,9 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs import library as lib
-from ephs import quantity as Q
 from ephs.testing import systems
 
-HEATED = ephs.Pattern(
-    junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum), "s": ephs.junction(Q.entropy)},
-    boxes={
-        "pe": {"q": "q"},
-        "ke": {"p": "p"},
-        "pkc": {"q": "q", "p": "p"},
-        "mf": {"p": "p", "s": "s"},
-        "tc": {"s": "s"},
-    },
-)
+HEATED = ephs.Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); tc(s)")
 
 
 def test_the_books_at_a_state_are_those_of_a_solution_there():

@@ -110,23 +110,6 @@ def test_the_conditions_hold_of_drawn_storages(kind, data, seed):
     _conditions(data.draw(storages(interface)), np.random.default_rng(seed))
 
 
-@given(seeds, st.sampled_from([0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 0.3]))
-def test_a_discrete_gradient_is_exact_for_any_increment(seed, size):
-    """⟨∇̄E|v⟩ = E(x¹) − E(x⁰), down to increments where a naive quotient would be all rounding."""
-    rng = np.random.default_rng(seed)
-    storage = ephs.storage({"q": Q.displacement, "v": Q.volume}, lambda q, v: np.cosh(q) * (1.0 + v**4))
-    bundle = storage.bundle
-    x = {p: np.exp(0.3 * rng.standard_normal(1)) for p in bundle.ports}
-    v = size * rng.standard_normal(2)
-    gradient = storage.discrete_effort(x, v, Reference()) + bundle.intensive(Reference())
-    exact = storage.energy_gradient(storage.retract(x, 0.5 * v))
-    rise = storage.energy(storage.retract(x, v)) - storage.energy(x)
-    terms = (np.abs(gradient) + np.abs(bundle.intensive(Reference()))) @ np.abs(v)
-    # where the correction is left out, what is missing is of third order
-    assert abs(gradient @ v - rise) <= 7e-15 * (abs(storage.energy(x)) + terms)
-    assert np.abs(gradient - exact).max() <= 1e-8 + 10.0 * size**2 * np.abs(exact).max() * 10
-
-
 # ---- the relations that the contract prints --------------------------------------------------------------------
 
 
@@ -140,36 +123,23 @@ def flows(name, **efforts):
     return {str(port): float(f[where][0]) for port, where, _ in bundle.items()}
 
 
-def test_signs_of_the_gyrators():
-    assert flows("pkc", q=2.0, p=3.0) == {"q": -3.0, "p": 2.0}
-    assert flows("emc", q=2.0, b=3.0) == {"q": 3.0, "b": -2.0}
-    assert flows("mkc", b=2.0, p=3.0) == pytest.approx({"b": 0.7 * 3.0, "p": -0.7 * 2.0})
-    assert flows("piston", v1=5.0, v2=2.0, p=3.0) == pytest.approx({"v1": -0.06, "v2": 0.06, "p": 0.06})
-
-
 def test_signs_of_the_irreversible_processes():
     theta = 293.15 + 10.0
     assert flows("friction", p=3.0, s=10.0) == pytest.approx({"p": 0.6, "s": -1.8 / theta})
     assert flows("rotational_friction", p=3.0, s=10.0) == pytest.approx({"p": 0.9, "s": -2.7 / theta})
     assert flows("resistor", b=3.0, s=10.0) == pytest.approx({"b": 15.0, "s": -45.0 / theta})
+    assert flows("pipe_loss", g=3.0, s=10.0) == pytest.approx({"g": 33.0, "s": -99.0 / theta})
+    assert flows("laminar_leak", v1=5.0, v2=2.0, s=10.0) == pytest.approx({"v1": 3e-3, "v2": -3e-3, "s": -9e-3 / theta})
     hot, cold = 293.15 + 20.0, 293.15 - 5.0
     assert flows("heat_transfer", s1=20.0, s2=-5.0) == pytest.approx(
         {"s1": -3.0 * (cold - hot) / hot, "s2": -3.0 * (hot - cold) / cold}
     )
 
 
-@pytest.mark.parametrize(
-    ("name", "row"), [("lever", [-2.5, 1.0]), ("series_springs", [1.0, -1.0]), ("rigid_link", [1.0, -1.0])]
-)
-def test_signs_of_the_constraints(name, row):
-    skew, constraint = made(name).structure({})
-    assert not skew.any()
-    assert np.array_equal(constraint, [row])
-
-
 @pytest.mark.parametrize(("name", "state", "energy", "effort"), [
     ("spring", 2.0, 3.0, 3.0), ("point_mass", 2.0, 1.0, 1.0), ("rotor", 2.0, 20.0, 20.0),
-    ("capacitor", 0.3, 0.15, 1.0), ("inductor", 0.4, 0.2, 1.0), ("thermal_capacity", 0.0, 0.0, 300.0 - 293.15),
+    ("capacitor", 0.3, 0.15, 1.0), ("inductor", 0.4, 0.2, 1.0), ("reluctance", 2.0, 8.0, 8.0),
+    ("inertance", 2.0, 1e-5, 1e-5), ("thermal_capacity", 0.0, 0.0, 300.0 - 293.15),
 ])  # fmt: skip
 def test_energies_of_the_storages(name, state, energy, effort):
     storage = made(name)
@@ -195,15 +165,6 @@ def test_parameters_out_of_range_are_named(name, arguments, key):
 
 QP = {"q": Q.displacement, "p": Q.momentum}
 PS = {"p": Q.momentum, "s": Q.entropy}
-
-
-def test_errors_survive_being_sent_to_another_process():
-    import pickle
-
-    with pytest.raises(StructureError) as caught:
-        library.spring(k=-1.0)
-    again = pickle.loads(pickle.dumps(caught.value))
-    assert (str(again), again.kind, again.path) == (str(caught.value), caught.value.kind, caught.value.path)
 
 
 def test_what_one_makes_oneself_is_what_the_library_makes():

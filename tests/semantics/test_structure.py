@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import quantity as Q
 from ephs.semantics import StructureError, library
 from ephs.semantics.bundles.bundle import Bundle
@@ -61,7 +61,8 @@ def test_wrong_primitives_are_refused_with_a_witness_of_human_size(name):
         assert witness.entry and str(witness.entry) in str(error)
     if kind != "finite" and name != "temperature of zero":
         assert witness.size != 0.0 or kind in ("even", "cold")
-    assert pickle.loads(pickle.dumps(error)).witness == witness
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.kind, again.path, again.witness) == (str(error), error.kind, error.path, witness)
 
 
 @pytest.mark.parametrize("name", MALFORMED)
@@ -69,11 +70,6 @@ def test_what_has_no_structure_is_refused_without_a_witness(name):
     make, kind = MALFORMED[name]
     error = refused(make)
     assert error.kind == kind and error.witness is None
-
-
-def test_the_zoo_has_forty_animals():
-    assert len(ZOO) >= 40
-    assert len({kind for _, kind in ZOO.values()}) == 11
 
 
 @pytest.mark.parametrize(
@@ -164,13 +160,11 @@ def laminar(p, s):
 
 
 RIGHT = {
-    "radiation": conduct(lambda a, b: 5e-8 * (a**2 + b**2) * (a + b)),
     "conduction by a square": conduct(lambda a, b: (a - b) ** 2 + 1e-3),
     "conduction that waves": conduct(lambda a, b: 1.0 + 0.5 * np.cos(a - b)),
     "polynomial without roots": drag(lambda p, s: p**4 - 2.0 * p**2 + 1.5),
     "polynomial with double roots": drag(lambda p, s: p**4 - 2.0 * p**2 + 1.0),
     "Stribeck friction": drag(lambda p, s: 0.2 + 0.3 * np.exp(-((p / 0.1) ** 2))),
-    "hot oil": drag(lambda p, s: np.exp(-(s - 300.0) / 50.0)),
     "laminar and turbulent": drag(laminar),
     "three bodies": lambda: ephs.irreversible(
         {"a": Q.entropy, "b": Q.entropy, "c": Q.entropy},
@@ -180,14 +174,10 @@ RIGHT = {
         {"p": Q.momentum, "r": Q.momentum, "s": Q.entropy},
         lambda p, r, s: outer([s, 0 * s, -p]) / s + 3.0 * outer([s, -s, r - p]) / s,
     ),
-    "magnet": lambda: ephs.gyrator(
-        {**QP, "~x": Q.displacement}, lambda x: (1.0 + x * x) * np.array([[0.0, -1.0], [1.0, 0.0]])
-    ),
     "crank": lambda: ephs.transformer(
         {"p": Q.angular_momentum, "p2": Q.momentum, "~q": Q.angle}, lambda q: [[0.3 * math.sin(q)]]
     ),
     "hard spring": lambda: ephs.storage({"q": Q.displacement}, lambda q: q**4 - q**2, lambda q: [4.0 * q**3 - 2.0 * q]),
-    "relativistic mass": lambda: ephs.storage({"p": Q.momentum}, lambda p: np.sqrt(4.0 + p**2)),
     "heat with a floor": lambda: ephs.storage({"s": Q.entropy}, lambda s: 300.0 * s + 5.0 * np.exp(s / 5.0)),
     "soft gas": lambda: ephs.storage({"s": Q.entropy, "v": Q.volume}, lambda s, v: np.exp(s) / v + 1.0 / v**2),
 }  # fmt: skip
@@ -269,10 +259,7 @@ def forged():
 
 
 def test_entropy_production_fails_with_the_temperatures_and_the_path():
-    pattern = Pattern(
-        {"a": junction(Q.entropy), "b": junction(Q.entropy)},
-        {"hot": {"s": "a"}, "cold": {"s": "b"}, "wall": {"a": "a", "b": "b"}},
-    )
+    pattern = Pattern.from_text("a: entropy; b: entropy; hot(s=a); cold(s=b); wall(a, b)")
     body = library.thermal_capacity(c1=300.0, c2=1.0)
     system = pattern(hot=body, cold=body, wall=forged())
     with pytest.raises(AssertionError, match=r"entropy production: wall: .*negative.*witness: a = 1, b = 2"):
@@ -281,10 +268,7 @@ def test_entropy_production_fails_with_the_temperatures_and_the_path():
 
 
 def test_printed_components_and_checks_say_the_verdict():
-    pattern = Pattern(
-        {"a": junction(Q.entropy), "b": junction(Q.entropy)},
-        {"hot": {"s": "a"}, "cold": {"s": "b"}, "wall": {"a": "a", "b": "b"}},
-    )
+    pattern = Pattern.from_text("a: entropy; b: entropy; hot(s=a); cold(s=b); wall(a, b)")
     body = library.thermal_capacity(c1=300.0, c2=1.0)
     system = pattern(hot=body, cold=body, wall=HIDDEN["radiation"]())
     assert "[irreversible, searched]" in str(system) and "[storage, proved]" in str(system)

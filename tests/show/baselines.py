@@ -5,14 +5,11 @@
 
 from pathlib import Path
 
-from ephs.operad import Pattern
 from ephs.show import Drawing, draw
+from tests.operad.models import DAMPED, OSCILLATOR
 from tests.show.pictures_of_patterns import KINDS, body, flat, joint, kinds_of, mbs
 
 FOLDER = Path(__file__).with_name("baselines")
-
-OSCILLATOR = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
-DAMPED = Pattern.from_text("p: momentum; s: entropy; osc(p); mf(p, s); env(s)")
 
 BODY_AT = {"pe": (0, 0), "q": (1, 0), "pkc": (2, 0), "p": (3, 0), "ke": (3, 1), "lp": (3, -1)}
 JOINT_AT = {

@@ -17,61 +17,26 @@ KINDS = {
 MOMENTUM = quantity.body_momentum
 POSE = quantity.pose
 
-BODY_BOXES = {"pe": {"q": "q"}, "pkc": {"q": "q", "p": "p"}, "ke": {"p": "p"}, "lp": {"p": "p"}}
-JOINT_BOXES = {
-    "o_1": {"p_1": "p_1", "p_j1": "p_j1"},
-    "o_2": {"p_2": "p_2", "p_j2": "p_j2"},
-    "hc": {"q_r": "~q_r", "p_j1": "p_j1", "p_j2": "p_j2", "p_r": "p_r"},
-    "pe": {"q_r": "q_r"},
-    "pkc": {"q_r": "q_r", "p_r": "p_r"},
-    "mf": {"p_r": "p_r", "s": "s"},
-    "env": {"s": "s"},
-}
-JOINT_QUANTITIES = {
-    "p_j1": MOMENTUM,
-    "p_j2": MOMENTUM,
-    "p_r": quantity.joint_momentum("spherical"),
-    "q_r": quantity.relative_pose("spherical"),
-    "s": quantity.entropy,
-}
-
 
 def body() -> Pattern:
-    return Pattern({"q": junction(POSE), "p": junction(MOMENTUM, exposed=True)}, BODY_BOXES)
+    return Pattern.from_text("q: pose; p: body_momentum, exposed; pe(q); pkc(q, p); ke(p); lp(p)")
 
 
 def joint() -> Pattern:
-    outer = {"p_1": junction(MOMENTUM, exposed=True), "p_2": junction(MOMENTUM, exposed=True)}
-    return Pattern(outer | {name: junction(q) for name, q in JOINT_QUANTITIES.items()}, JOINT_BOXES)
+    return Pattern.from_text(
+        "p_1: body_momentum, exposed; p_2: body_momentum, exposed; p_j1: body_momentum; p_j2: body_momentum; "
+        "p_r: joint_momentum(spherical); q_r: relative_pose(spherical); s: entropy; "
+        "o_1(p_1, p_j1); o_2(p_2, p_j2); hc(~q_r, p_j1, p_j2, p_r); pe(q_r); pkc(q_r, p_r); mf(p_r, s); env(s)"
+    )
 
 
 def mbs() -> Pattern:
-    boxes = {"b1": {"p": "p_1"}, "b2": {"p": "p_2"}, "j": {"p_1": "p_1", "p_2": "p_2"}}
-    return Pattern({"p_1": junction(MOMENTUM), "p_2": junction(MOMENTUM)}, boxes)
+    return Pattern.from_text("p_1: body_momentum; p_2: body_momentum; b1(p=p_1); b2(p=p_2); j(p_1, p_2)")
 
 
 def flat() -> Pattern:
     """Two bodies on a joint, all on one level: 15 boxes and 9 junctions."""
-    junctions = {
-        "p_1": junction(MOMENTUM),
-        "p_2": junction(MOMENTUM),
-        "b1.q": junction(POSE),
-        "b2.q": junction(POSE),
-    }
-    junctions |= {f"j.{name}": junction(q) for name, q in JOINT_QUANTITIES.items()}
-    boxes: dict[str, dict[str, str]] = {}
-    for k in "12":
-        there = {"q": f"b{k}.q", "p": f"p_{k}"}
-        boxes |= {f"b{k}.{box}": {port: there[j] for port, j in ports.items()} for box, ports in BODY_BOXES.items()}
-    for box, ports in JOINT_BOXES.items():
-        boxes[f"j.{box}"] = {port: _inside(name) for port, name in ports.items()}
-    return Pattern(junctions, boxes)
-
-
-def _inside(name: str) -> str:
-    state, plain = name.startswith("~"), name.lstrip("~")
-    path = plain if plain in ("p_1", "p_2") else f"j.{plain}"
-    return f"~{path}" if state else path
+    return mbs().substitute(b1=body(), b2=body(), j=joint())
 
 
 def awkward() -> Pattern:

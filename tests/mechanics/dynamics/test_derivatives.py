@@ -3,10 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import assume, given, settings
 
-import ephs
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.equations.equations import Equations
@@ -114,36 +112,6 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
         expected = -np.linalg.solve(mass, inverse)
         size = np.abs(np.linalg.inv(mass)) @ np.abs(inverse)
         assert np.abs(forward - expected).max() <= tolerance * max(1.0, size.max())
-
-
-def test_a_pendulum_on_a_spring_has_the_derivatives_of_its_formula(tmp_path):
-    """a = (−m g l sin φ − k φ − μ r + τ)/I."""
-    text = """
-    format = 1
-    [bodies.bob]
-    mass = 2.0
-    inertia = [0.3, 0.2, 0.1]
-    [joints.pin]
-    type = "revolute"
-    bodies = ["ground", "bob"]
-    frame1 = { rotation = [0.5, 0.5, 0.5, 0.5] }
-    frame2 = { position = [0.0, 0.0, 0.7], rotation = [0.5, 0.5, 0.5, 0.5] }
-    coordinate = 0.8
-    rate = 1.3
-    stiffness = 4.0
-    friction = 0.6
-    """
-    file = tmp_path / "pendulum.toml"
-    file.write_text(text)
-    model = ephs.dynamics(ephs.load(file))
-    exact, state = model.derivatives(model.state0, {"pin": 0.4}), model.state0
-    inertia, weight = 0.3 + 2.0 * 0.49, 2.0 * 9.81 * 0.7
-    a = (-weight * np.sin(0.8) - 4.0 * 0.8 - 0.6 * 1.3 + 0.4) / inertia
-    assert model.acceleration(state, {"pin": 0.4})["pin"] == pytest.approx([a], rel=1e-14)
-    assert exact.acceleration_q[0, 0] == pytest.approx((-weight * np.cos(0.8) - 4.0) / inertia, rel=1e-14)
-    assert exact.acceleration_r[0, 0] == pytest.approx(-0.6 / inertia, rel=1e-14)
-    assert exact.acceleration_force[0, 0] == pytest.approx(1.0 / inertia, rel=1e-14)
-    assert exact.force_a[0, 0] == pytest.approx(inertia, rel=1e-14)
 
 
 @settings(max_examples=30)

@@ -139,15 +139,6 @@ def test_shipped_scenes(file):
     assert str(len(model.joints)) in repr(model)
 
 
-def test_other_states_come_from_coordinates_and_rates():
-    scene = ephs.load(SCENES[0].parent / "chain.toml")
-    model = ephs.dynamics(scene)
-    names = [name for name, j in scene.all_joints() if j.dim == 1]
-    state = model.state({names[0]: 0.3}, {names[0]: -0.2})
-    assert state.coordinates[names[0]] == pytest.approx([0.3], abs=1e-12)
-    assert state.rates[names[0]] == pytest.approx([-0.2], abs=1e-12)
-
-
 ROTORS = {
     "none": ("", 0.0, 0.0),
     "armature": ("armature = 0.3", 0.3, 0.0),
@@ -176,17 +167,6 @@ def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way, tmp_
         state = dynamics.step(state, step, method=way)
         lost = resisting / (0.1 + seen) * step
     assert abs(state.rates["pin"][0] - rate * np.exp(-lost)) <= rate * (lost**3 + 64 * EPS)  # order 2 at least
-
-
-def test_energy_stays_where_nothing_acts():
-    scene = ephs.load(SCENES[0].parent / "mbs.toml")
-    model = ephs.dynamics(scene)
-    state = model.state0
-    start = model.energies(state).total
-    for _ in range(20):
-        state = model.step(state, 1e-3, "rk87")
-    assert model.energies(state).total == pytest.approx(start, rel=1e-10)
-    assert model.energies(state).thermal > 0.0 or not any(j.friction.any() for _, j in scene.all_joints())
 
 
 @pytest.mark.parametrize(

@@ -164,13 +164,8 @@ def test_friction_that_may_resist_stays(friction):
 
 
 def test_friction_that_heats_nothing_leaves_the_node():
-    pattern = Pattern(
-        junctions={
-            "g": junction(quantity.body_momentum),
-            "p": junction(quantity.body_momentum),
-            "s": junction(quantity.entropy),
-        },
-        boxes={"ground": {"p": "g"}, "body": {"p": "p"}, "joint": {"p1": "g", "p2": "p", "s": "s"}, "node": {"s": "s"}},
+    pattern = Pattern.from_text(
+        "g: body_momentum; p: body_momentum; s: entropy; ground(p=g); body(p); joint(p1=g, p2=p, s); node(s)"
     )
     node = ephs.mechanics.elements.components.thermal_node(10.0, 300.0)
     system = pattern(ground=ground(), body=rigid_body(1.0, BRICK), joint=joint("revolute", heat=True), node=node)

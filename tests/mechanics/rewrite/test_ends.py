@@ -3,9 +3,8 @@
 import pytest
 
 import ephs
-from ephs import Path, Pattern, junction
+from ephs import Path, Pattern
 from ephs import library as lib
-from ephs import quantity as Q
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.offset import frame_change
@@ -51,15 +50,9 @@ def test_rules_that_end_may_make_a_system_larger():
 def test_offsets_in_a_circle_are_named():
     """A frame is 0.1 m before one that is 0.1 m behind it; a joint holds a third one beside them."""
     there, back, none = [1.0, 0, 0, 0, 0.1, 0, 0], [1.0, 0, 0, 0, -0.1, 0, 0], SE3.identity()
-    pattern = Pattern(
-        junctions={name: junction(Q.body_momentum) for name in ("earth", "arm", "a", "b", "c")},
-        boxes={
-            "body": {"p": "arm"}, "base": {"p": "earth"},
-            "there": {"inner": "a", "outer": "b"}, "back": {"inner": "b", "outer": "a"},
-            "beside": {"inner": "c", "outer": "a"},
-            "pin": {"p1": "arm", "p2": "c"}, "hold": {"p1": "earth", "p2": "a"},
-        },
-    )  # fmt: skip
+    pattern = Pattern.from_text("earth: body_momentum; arm: body_momentum; a: body_momentum; b: body_momentum; "
+"c: body_momentum; body(p=arm); base(p=earth); there(inner=a, outer=b); "
+"back(inner=b, outer=a); beside(inner=c, outer=a); pin(p1=arm, p2=c); hold(p1=earth, p2=a)")  # fmt: skip
     system = pattern(
         body=rigid_body(1.0, [0.1, 0.1, 0.1], (0.0, 0.0, -9.81)),
         base=components.ground(),

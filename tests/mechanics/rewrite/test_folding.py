@@ -1,6 +1,5 @@
 """Folding: the same relation in fewer unknowns, at an instant and over a step, whatever is folded first."""
 
-import ctypes
 from dataclasses import replace
 from pathlib import Path as File
 
@@ -10,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from benchmarks.cases import CASES
 from ephs import Path, Pattern, System, junction, library, quantity
 from ephs.mechanics import joint
 from ephs.mechanics.elements import components
@@ -20,20 +18,17 @@ from ephs.mechanics.scene.build import scene_system
 from ephs.operad import PortType
 from ephs.semantics import StructureError
 from ephs.semantics.bundles.bundle import Reference
-from ephs.semantics.descriptor.kernel_table import OK, address_of, prototype
-from ephs.semantics.primitives.behaviour import Natural
 from ephs.semantics.primitives.pullback import Map, pull_back
 from ephs.semantics.spaces import PAIRS, SE3, pair
 from ephs.semantics.systems.laws import random_probe
-from ephs.semantics.verdicts.checks import random_efforts, random_point
+from ephs.semantics.verdicts.checks import random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms
+from tests.mechanics.kernels import Draw, agreeing
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
-SMALL = [case for case in CASES if len(dict(case.scene().all_bodies())) <= 16]
 seeds = st.integers(0, 2**20)
 MOMENTUM = PortType(quantity.body_momentum, True)
-DOUBLE = ctypes.POINTER(ctypes.c_double)
 
 
 def joint_pair(kind):
@@ -69,46 +64,6 @@ def pulled(kind, seed, first, second):
     return inner, pull_back(inner, maps)
 
 
-def compiled(primitive, h, x, v, e, lam):
-    """(values, Jacobian) of the kernel."""
-    address, numbers, _ = address_of(primitive)
-    n, k, m = e.size, lam.size, v.size
-    state = np.concatenate([*(x[p] for p in primitive.reads), [0.0]])
-    dims = np.array([n, k, m, state.size - 1], dtype=np.int64)
-    arrays = [np.array([h, 293.15, 101325.0]), np.array([*numbers, 0.0]), state]
-    arrays += [np.append(a, 0.0) for a in (v, e, lam)]
-    arrays += [np.zeros(n * n + n + 1), np.zeros(k + 2), np.zeros((n + k) * (n + k + m) + 1), np.zeros(4096)]
-    status = prototype(address)(
-        dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *[a.ctypes.data_as(DOUBLE) for a in arrays]
-    )
-    assert status == OK
-    values = np.concatenate([arrays[6][:n], arrays[7][:k]])
-    return values, arrays[8][: (n + k) * (n + k + m)].reshape(n + k, -1)
-
-
-def agrees(primitive, seed, size):
-    """The kernel against the plain definition, its Jacobian against differences of that."""
-    rng = np.random.default_rng(seed)
-    h, n = 10.0 ** rng.uniform(-4.0, -1.0), primitive.bundle.size
-    k = primitive.multipliers if primitive.kind == "reversible" else 0
-    x = random_point(primitive.bundle, primitive.reads, rng)
-    dims = [primitive.interface[p].quantity.space.dim for p in primitive.reads]
-    z = np.concatenate(
-        [random_efforts(primitive.bundle, rng), rng.standard_normal(k), size * rng.standard_normal(sum(dims))]
-    )
-    local = Natural(Reference(), h).behaviour(primitive, x)
-
-    def plain(at):
-        rates = np.split(at[n + k :] / h, np.cumsum(dims)[:-1]) if dims else []
-        return np.concatenate(local.relate(at[:n], at[n : n + k], dict(zip(primitive.reads, rates, strict=True))))
-
-    values, jacobian = compiled(primitive, h, x, z[n + k :], z[:n], z[n : n + k])
-    expected = plain(z)
-    assert np.abs(values - expected).max() <= 2e-13 * max(1.0, np.abs(expected).max())
-    columns = [(plain(z + step) - plain(z - step)) / 2e-5 for step in 1e-5 * np.eye(z.size)]
-    assert np.abs(jacobian - np.array(columns).T).max() <= 3e-6 * max(1.0, np.abs(jacobian).max())
-
-
 @pytest.mark.parametrize("kind", PAIRS)
 @settings(max_examples=15)
 @given(seed=seeds, ends=st.sampled_from(["offset offset", "plain offset", "ground offset", "offset ground"]))
@@ -116,7 +71,7 @@ def test_a_joint_seen_from_its_bodies_has_a_kernel_that_is_its_definition(kind, 
     inner, outer = pulled(kind, seed, *ends.split())
     assert outer.verdict == "proved" and search(outer, 5)
     assert replace(outer.kernel.relation, maps=None) == inner.kernel.relation
-    agrees(outer, seed, 0.1)
+    agreeing(Draw(outer, seed, 0.1))
 
 
 @settings(max_examples=15)
@@ -128,12 +83,12 @@ def test_friction_and_traced_constraints_keep_their_kernels(seed):
     outer = pull_back(inner, {Path.of("p_r"): Map(rng.standard_normal((3, 3)), momentum)})
     assert outer.verdict == "proved" and search(outer, 5)
     assert replace(outer.kernel.relation, maps=None) == inner.kernel.relation
-    agrees(outer, seed, 0.1)
+    agreeing(Draw(outer, seed, 0.1))
     traced = ephs.constraint(
         {"p": quantity.body_momentum, "p2": quantity.momentum, "~q": quantity.pose},
         lambda q: [[q[1] * q[0], q[2] ** 2, 0.0, q[4], 0.0, 1.0, q[5]]],
     )
-    agrees(pull_back(traced, {Path.of("p"): Map(rng.standard_normal((6, 6)), MOMENTUM)}), seed, 0.1)
+    agreeing(Draw(pull_back(traced, {Path.of("p"): Map(rng.standard_normal((6, 6)), MOMENTUM)}), seed, 0.1))
 
 
 @given(seed=seeds)
@@ -378,11 +333,6 @@ def test_everything_that_is_read_from_a_motion_is_there(stem):
         assert np.allclose(paper.body(name).velocity, folded.body(name).velocity, atol=1e-9)
     assert set(folded.ledger().parts) == set(paper.ledger().parts)
     assert folded.system == paper.system
-
-
-@pytest.mark.parametrize("case", SMALL, ids=lambda case: case.name)
-def test_so_they_are_in_the_benchmarks(case):
-    agree(case.with_friction(), "natural", case.step / 4, 5)
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])

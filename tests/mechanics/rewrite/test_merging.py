@@ -60,17 +60,6 @@ def two(link):
     return mbs_pattern()(joint=link, **bodies)
 
 
-def test_the_inertia_is_that_of_both():
-    """Parallel axes: two bodies a distance apart."""
-    aside = np.array([1.0, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0])
-    done = rewrite(two(joint("fixed", aside)), RULES)
-    ke = dict(done.system.leaves())[Path.of("body1.ke")]
-    whole = np.linalg.inv(np.array(ke.kernel.parameters).reshape(6, 6))
-    shift = 2.0 * (0.6**2 * np.eye(3) - np.outer(aside[4:], aside[4:]))
-    assert np.abs(whole[:3, :3] - (np.diag([0.6, 0.8, 1.0]) + shift)).max() <= 1e-14
-    assert np.abs(whole[3:, 3:] - 3.0 * np.eye(3)).max() <= 1e-14
-
-
 def aside(seed):
     """Two bodies that are joined rigidly, at frames that are turned and moved; where the second one is, seen from 1."""
     rng = np.random.default_rng(seed)

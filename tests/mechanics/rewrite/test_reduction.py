@@ -326,10 +326,7 @@ def test_systems_are_reduced_as_far_as_systems_go():
 
 def _levers():
     ports = {"x": ephs.quantity.momentum, "y": ephs.quantity.momentum}
-    pattern = ephs.Pattern(
-        junctions={"a": ephs.junction(ephs.quantity.momentum), "b": ephs.junction(ephs.quantity.momentum)},
-        boxes={"mass": {"p": "a"}, "lever": {"x": "a", "y": "b"}, "rod": {"x": "b"}},
-    )
+    pattern = ephs.Pattern.from_text("a: momentum; b: momentum; mass(p=a); lever(x=a, y=b); rod(x=b)")
     hold = ephs.constraint({"x": ephs.quantity.momentum}, [[1.0]])
     return pattern(mass=library.point_mass(m=1.0), lever=ephs.transformer(ports, [[2.0]]), rod=hold)
 

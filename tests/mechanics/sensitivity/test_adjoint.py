@@ -9,7 +9,6 @@ from ephs.mechanics.sensitivity import explicit
 from ephs.mechanics.sensitivity.family import Family
 from ephs.mechanics.tree.engine.tangents import StepTangent
 from ephs.solve.errors import OptionError
-from tests.mechanics.sensitivity.test_exact import PENDULUM, pendulum
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
 from tests.solve.test_own_methods import Kutta
 from tests.written import scene_of_text
@@ -112,24 +111,6 @@ def test_systems_with_what_is_attached_as_tangents_say(machine, paths, joint):
     found = ephs.gradient(system, paths, [0.02], {f"{joint}.coordinate": [1.0], f"{joint}.rate": [-0.4]}, **run)
     mine = np.array([found.derivatives[path] for path in paths])
     assert np.abs(mine - expected).max() <= READ * np.abs(expected).max()
-
-
-def test_a_pendulum_as_a_complex_step_says(monkeypatch):
-    """Of the method's plain steps: f(x + i ε)/ε has no difference in which digits cancel."""
-    monkeypatch.setattr(explicit, "StepTangent", lambda *given, corrected: StepTangent(*given, corrected=False))
-    scene = scene_of_text(PENDULUM).with_state({"pin": 0.6}, {"pin": 1.1})
-    values = np.array([2.0, 0.3, 0.7, 0.2, 1.5, 9.81, 0.6, 1.1])
-    paths = ["bodies.rod.mass", "bodies.rod.inertia[2]", "joints.pin.frame2.position[1]", "joints.pin.friction",
-             "joints.pin.stiffness", "world.gravity[1]", "joints.pin.coordinate", "joints.pin.rate"]  # fmt: skip
-    weights = {"joints.pin.coordinate": [2.0], "joints.pin.rate": [-0.5]}
-    found = ephs.gradient(scene, paths, [0.4], weights, method="rk54", step=0.05)
-    steps = [pendulum(values + 1e-40j * unit, "rk54", 0.05, 8) for unit in np.eye(len(values))]
-    expected = np.array([2.0 * y[0] - 0.5 * y[1] for y in steps])
-    assert found.value == pytest.approx(expected[0].real, rel=1e-12)
-    slopes = expected.imag / 1e-40
-    slopes[5] = -slopes[5]  # gravity points downwards
-    mine = np.array([found.derivatives[path] for path in paths])
-    assert np.abs(mine - slopes).max() <= 1e-12 * np.abs(slopes).max()
 
 
 def test_through_a_contact_that_slips_as_tangents_say():

@@ -7,7 +7,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
-from tests.mechanics.sensitivity.test_sensitivity import oscillator
+from tests.oscillator import damped_oscillator
 
 FOUR_BAR = ("joints.pivot.friction", "bodies.rocker.inertia[2]", "joints.main.friction")
 DOUBLE = ("joints.j0.friction", "joints.j1.friction", "bodies.rod1.inertia[1]", "bodies.rod1.mass")
@@ -76,20 +76,25 @@ def test_a_noisy_motion_gives_them_within_three_deviations(case):
 
 
 def test_a_system_is_fitted_with_its_initial_value():
-    truth = ephs.simulate(oscillator(), 1.0, step=0.05, initial={"osc.pe.q": 1.0})
+    truth = ephs.simulate(damped_oscillator(), 1.0, step=0.05, initial={"osc.pe.q": 1.0})
     start = {"osc.pe.k": 1.0, "mf.d": 0.3, "osc.pe.q": 0.7}
     data = {"t": truth.t, "osc.pe.q": np.where(np.arange(truth.t.size) % 3, truth["osc.pe.q"], np.nan)}
-    found = ephs.fit(oscillator(), data, list(start), start=start, step=0.05)
+    found = ephs.fit(damped_oscillator(), data, list(start), start=start, step=0.05)
     assert list(found.values.values()) == pytest.approx([1.5, 0.1, 1.0], rel=1e-9)
     assert "osc.pe.k = 1.5" in str(found)
 
 
 def test_what_a_record_does_not_tell_has_no_error_bound():
     """Mass and stiffness of an oscillator whose displacement alone is seen."""
-    truth = ephs.simulate(oscillator(), 1.0, step=0.1, initial={"osc.pe.q": 1.0})
+    truth = ephs.simulate(damped_oscillator(), 1.0, step=0.1, initial={"osc.pe.q": 1.0})
     data = {"t": truth.t, "osc.pe.q": truth["osc.pe.q"]}
     found = ephs.fit(
-        oscillator(), data, ["osc.pe.k", "osc.ke.m", "mf.d"], initial={"osc.pe.q": 1.0}, step=0.1, max_evaluations=10
+        damped_oscillator(),
+        data,
+        ["osc.pe.k", "osc.ke.m", "mf.d"],
+        initial={"osc.pe.q": 1.0},
+        step=0.1,
+        max_evaluations=10,
     )
     assert all(np.isinf(error) for error in found.errors.values())
 
@@ -101,4 +106,4 @@ def test_what_a_record_does_not_tell_has_no_error_bound():
 )  # fmt: skip
 def test_records_that_do_not_fit_are_refused(data, what):
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.fit(oscillator(), data, ["osc.pe.k", "mf.d"], step=0.5)
+        ephs.fit(damped_oscillator(), data, ["osc.pe.k", "mf.d"], step=0.5)

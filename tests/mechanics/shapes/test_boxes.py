@@ -88,24 +88,6 @@ def test_the_least_gap_is_the_distance(shape1, shape2, turn, place):
     assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-12)
 
 
-@given(st.integers(0, 10_000))
-@settings(max_examples=30, deadline=None)
-def test_normals_are_slopes_of_gaps(seed):
-    """The wrench of a gap's normal at its contact point is the derivative of the gap, for each of a pair's gaps."""
-    rng = np.random.default_rng(seed)
-    turn = rng.normal(size=4)
-    pose = np.concatenate([turn / np.linalg.norm(turn), 3.0 * rng.normal(size=3)])
-    points, _ = touches({"box": [0.2, 0.3, 0.4]}, SE3.identity(), {"box": [0.5, 0.3, 0.2]}, SE3.identity())
-    step = 1e-6
-    for one, two, gap in (points[i] for i in rng.integers(0, len(points), 8)):
-        here = SE3.compose(SE3.inverse(one), SE3.compose(pose, two))
-        normal, at = map(np.array, gap.contact(here))
-        twist = rng.normal(size=6)
-        ends = [float(gap.distance(SE3.compose(here, SE3.exp(sign * step * twist)))) for sign in (1.0, -1.0)]
-        rate = normal @ (twist[3:] + np.cross(twist[:3], at))
-        assert rate == pytest.approx((ends[0] - ends[1]) / (2.0 * step), abs=1e-7)
-
-
 def scene_of(law, *boxes, pairs=()):
     parts = [HEAD, "shape = { plane = {} }\n", law]
     for name, at, sizes in boxes:

@@ -12,9 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
-from ephs import quantity as Q
 from ephs.cli import main
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
@@ -26,10 +25,9 @@ from tests.written import scene_of_text
 ROOT = Path(__file__).parents[3]
 SCENES = ROOT / "scenes"
 CHAIN = ROOT / "benchmarks" / "scenes" / "revolute-chain-4.toml"
-OSCILLATOR = Pattern(
-    junctions={"q": junction(Q.displacement), "p": junction(Q.momentum)},
-    boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}},
-)(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(
+    pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
+)
 WELDED = """
 format = 1
 name = "welded"

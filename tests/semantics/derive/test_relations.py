@@ -14,7 +14,7 @@ from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import compiled, program, sizes
 from ephs.semantics.derive.slopes import Slope, Slopes
-from ephs.semantics.derive.tape import OPERATIONS, evaluate
+from ephs.semantics.derive.tape import OPERATIONS
 from ephs.semantics.primitives.primitives import midpoint
 from ephs.semantics.primitives.special import root
 from ephs.semantics.spaces import codes, manifold
@@ -325,12 +325,3 @@ def test_what_cannot_be_recorded_names_its_line(function, why):
     with pytest.raises(Untraceable, match=why) as caught:
         record(function, {"q": None})
     assert "test_relations.py:" in str(caught.value)
-
-
-def test_a_function_leaves_one_tape_whatever_its_numbers():
-    def tape(k):
-        return record(lambda q: k * abs(q) ** 3 + np.cos(k * q), {"q": None})
-
-    assert tape(1.5).tape == tape(2.5).tape
-    assert tape(1.5).parameters == (1.5, 1.5)
-    assert evaluate(PLAIN, tape(2.0).tape, [0.5], [2.0, 3.0])[0] == 2.0 * 0.5**3 + np.cos(1.5)

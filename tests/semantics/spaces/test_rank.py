@@ -12,7 +12,10 @@ from ephs.semantics.spaces import rank
 from ephs.semantics.spaces.rank import rank_of
 
 PACKAGE = Path(ephs.__file__).parent
-LITERAL = re.compile(r"rcond=[\d.]|> [\d.]+e-\d+ \* (sigma|sizes|singular)|^(RANK|SINGULAR|NULL)\w* = ", re.MULTILINE)
+LITERAL = re.compile(
+    r"rcond=[\d.]|rank_of\(\w+, [\d.]|> [\d.]+e-\d+ \* (sigma|sizes|singular)|^(RANK|SINGULAR|NULL)\w* = ",
+    re.MULTILINE,
+)
 THRESHOLDS = [name for name in vars(rank) if name.isupper()]
 
 
@@ -32,7 +35,7 @@ def test_no_other_file_decides_a_rank_by_a_number_of_its_own(room: str) -> None:
 
 
 def test_the_pattern_of_such_numbers_finds_them() -> None:
-    for line in ("lstsq(a, b, rcond=1e-9)", "np.sum(sigma > 1e-12 * sigma[0])", "RANK = 1e-9"):
+    for line in ("lstsq(a, b, rcond=1e-9)", "rank_of(s, 1e-9)", "np.sum(sigma > 1e-12 * sigma[0])", "RANK = 1e-9"):
         assert LITERAL.search(line)
 
 

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs.semantics.spaces import (
-    SE2,
     SE3,
     SO3,
     SO3xR3,
@@ -109,35 +108,6 @@ def test_material_form(group, seed):
     size = 1e-9 * (1.0 + np.abs(u).sum()) ** 3
     assert np.abs(rate - velocity[0]).max() <= size
     assert np.abs((ahead[4:] - behind[4:]) / (2 * h) - velocity[1]).max() <= size
-
-
-@given(seed=seeds)
-def test_gravity_as_a_covector(seed):
-    """The potential m g·r has the left-trivialised gradient (0, m Rᵀ g)."""
-    from ephs.semantics.spaces.rotations import quaternion_to_matrix
-
-    pose = SE3.random(np.random.default_rng(seed))
-    weight = np.array([0.0, 0.0, 9.81])
-    found = covector_of_gradient(SE3, pose, (np.zeros((3, 3)), weight))
-    assert np.abs(found[:3]).max() == 0.0
-    assert np.abs(found[3:] - quaternion_to_matrix(pose[:4]).T @ weight).max() <= 64 * EPS * 9.81
-
-
-def test_the_plane_lies_in_space():
-    """SE(2) by its own formulas is the planar subgroup of SE(3)."""
-    rng = np.random.default_rng(2)
-    a, v = SE2.random(rng), rng.standard_normal(3)
-    rows = [2, 3, 4]
-    embedded = np.zeros(6)
-    embedded[rows] = v
-    pose = np.array([np.cos(a[0] / 2), 0, 0, np.sin(a[0] / 2), a[1], a[2], 0])
-    for small, large in (
-        (SE2.adjoint(a), SE3.adjoint(pose)),
-        (SE2.ad(v), SE3.ad(embedded)),
-        (SE2.dexp(v), SE3.dexp(embedded)),
-        (SE2.dexp_inv(v), SE3.dexp_inv(embedded)),
-    ):
-        assert np.abs(small - large[np.ix_(rows, rows)]).max() <= 64 * EPS
 
 
 def test_the_reference_needs_numpy_only():

@@ -17,32 +17,15 @@ from ephs.semantics.stage import (
     Matrix,
     Program,
     Real,
-    Record,
     StageError,
-    Table,
     Vector,
     group,
     indices,
     integer,
     matrix,
     real,
-    reals,
-    staged,
-    table,
     vector,
 )
-
-
-class Link(Record):
-    parent = integer()
-    rotation = reals(3, 3)
-    offset = reals(3)
-    mass = real()
-
-
-@staged
-def cross(on: Evaluator, a: list[Real], b: list[Real]) -> list[Real]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def solve(on: Evaluator, a: Matrix, x: Vector, pivots: Integers) -> Integer:
@@ -101,35 +84,6 @@ def solve(on: Evaluator, a: Matrix, x: Vector, pivots: Integers) -> Integer:
     return exchanges.value
 
 
-def swing(on: Evaluator, links: Table[Link], angles: Vector, out: Vector, scale: Real) -> Real:
-    """Points of a tree of links, by rotation about z; the total of the masses."""
-    total = on.variable(0.0)
-
-    def outward(i: Integer) -> None:
-        link = links[i]
-        c, s = on.cos(angles[i]), on.sin(angles[i])
-        turned = [c * link.offset[0] - s * link.offset[1], s * link.offset[0] + c * link.offset[1], link.offset[2]]
-        turned = [row[0] * turned[0] + row[1] * turned[1] + row[2] * turned[2] for row in link.rotation]
-        turned = cross(on, turned, cross(on, [0.0, 0.0, 1.0], turned))
-        place = out.part(3 * i, 3)
-
-        def above() -> None:
-            before = out.part(3 * link.parent, 3)
-            for k in range(3):
-                place[k] = before[k] + turned[k] * scale
-
-        def root() -> None:
-            for k in range(3):
-                place[k] = turned[k] * scale
-
-        on.when(link.parent >= 0, above, root)
-        link.mass = on.maximum(link.mass, on.select(angles[i] < 0.0, 1.5, 0.5))
-        total.value = total.value + link.mass
-
-    on.loop(links.size, outward)
-    return total.value
-
-
 def newton(on: Evaluator, x: Real) -> Real:
     """The square root by iteration."""
     root, steps = on.variable(x), on.counter(0)
@@ -150,7 +104,6 @@ def whole(on: Evaluator, i: Integer, j: Integer) -> Integer:
 PROGRAM = Program(
     "tried",
     solve=Entry(solve, a=matrix(), x=vector(), pivots=indices()),
-    swing=Entry(swing, links=table(Link), angles=vector(), out=vector(), scale=real()),
     newton=Entry(newton, x=real()),
     whole=Entry(whole, i=integer(), j=integer()),
 )
@@ -173,23 +126,6 @@ def test_equations_are_solved_with_the_same_bits(n):
         assert np.array_equal(one, other)
     scale = np.abs(matrix) @ np.abs(found[0][2])
     assert np.all(np.abs(matrix @ found[0][2] - right) <= 10 * np.linalg.cond(matrix) * np.finfo(float).eps * scale)
-
-
-def test_records_are_read_and_written_with_the_same_bits():
-    draw = np.random.default_rng(1)
-    found = []
-    numbers = draw.normal(size=5 * Link.real_width), draw.normal(size=5)
-    for calls in (PROGRAM.compiled(), PROGRAM.plain()):
-        links = Link.table(5)
-        links.reals.array[:] = numbers[0]
-        for i in range(5):
-            links[i].parent = (i - 1) // 2 if i else -1
-            links[i].rotation = np.eye(3).tolist()
-        out = np.zeros(15)
-        found.append((calls["swing"](links, numbers[1], out, 0.7), links.reals.array, out))
-    for one, other in zip(*found, strict=True):
-        assert np.array_equal(one, other)
-    assert found[0][0] == sum(links[i].mass for i in range(5))
 
 
 @pytest.mark.parametrize("x", [2.0, 1e-8, 3e9])
@@ -222,14 +158,6 @@ def test_wrong_arguments_are_named(run, arguments, text):
 def test_an_index_outside_is_seen_in_plain_evaluation():
     with pytest.raises(StageError, match="index 9 of a vector, expected 0 … 2"):
         Program("outside", read=Entry(lambda on, x: x[9], x=vector())).plain()["read"](np.ones(3))
-
-
-def test_a_python_condition_on_a_symbol_is_named():
-    def signed(on, x):
-        return 1.0 if x < 0.0 else 2.0
-
-    with pytest.raises(StageError, match=r"signed, test_programs.py:\d+: a condition"):
-        Program("wrong", signed=Entry(signed, x=real())).compiled()
 
 
 def test_threads_that_compile_a_program_at_once_get_the_same_code():

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics import joint, rigid_body
@@ -81,39 +81,6 @@ def test_the_oscillator_of_the_paper():
     same(named["dq/dt"], p / m)
     same(named["p.e"], p / m)
     same(named["dp/dt"], -k * q + w.number("p.f"))
-
-
-def test_the_damped_oscillator_of_the_paper():
-    """Equations osc_mf, osc_env and damped_osc."""
-    w = Paper()
-    k, m, d, q, p = w.number("k", True), w.number("m", True), w.number("d", True), w.number("osc.q"), w.number("p")
-    theta = sp.Symbol("theta_0", positive=True)
-    relation = {text_of(row.left): row.right for row in DAMPED.equations("relation")}
-    speed, heat = w.number("mf.p.e"), w.number("mf.s.e")
-    same(relation["mf.p.f"], d * speed)
-    same(relation["mf.s.f"], -d * speed**2 / (theta + heat))
-    same(relation["env.s.e"], 0)
-    named, conditions = sides(DAMPED.equations())
-    assert (set(named), conditions) == ({"dosc.q/dt", "dp/dt", "ds/dt"}, [])
-    same(named["dosc.q/dt"], p / m)
-    same(named["dp/dt"], -k * q - d * p / m)
-    same(named["ds/dt"], d * (p / m) ** 2 / theta)
-
-
-def test_the_body_of_the_paper():
-    """Equations body_ke, body_lp, body_pe, body_pkc and body."""
-    w = Paper()
-    q, p = w.vector("q"), w.vector("p")
-    u = operator("inertia", w.label("ke")) * p
-    named, conditions = sides(BODY.equations())
-    assert (set(named), conditions) == ({"dq/dt", "dp/dt", "p.e"}, [])
-    same(named["dq/dt"], operator("tangent", q) * u)
-    same(named["dp/dt"], w.momentum(p, q, "", w.vector("p.f")))
-    same(named["p.e"], u)
-    relation = {text_of(row.left): row.right for row in BODY.equations("relation")}
-    same(relation["lp.p.f"], -operator("ad*", w.vector("lp.p.e")) * p)
-    same(relation["pkc.q.f"], -w.vector("pkc.p.e"))
-    same(relation["pkc.p.f"], w.vector("pkc.q.e"))
 
 
 def test_the_joint_of_the_paper():
@@ -245,7 +212,7 @@ def test_an_equation_is_found_by_its_left_side():
 
 
 def test_what_has_no_square_form_has_its_relation():
-    two = Pattern(junctions={"q": junction(Q.displacement)}, boxes={"a": {"q": "q"}, "b": {"q": "q"}})
+    two = Pattern.from_text("q: displacement; a(q); b(q)")
     springs = two(a=lib.spring(k=1.0), b=lib.spring(k=2.0))
     assert "a.k*q" in str(springs.equations("relation"))
     with pytest.raises(AssemblyError, match="stored twice"):

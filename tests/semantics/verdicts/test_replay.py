@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern, System, junction
+from ephs import Pattern, System
 from ephs import quantity as Q
 from ephs.operad import PatternError, Space
 from ephs.semantics import Reference, StructureError, library
@@ -261,9 +261,7 @@ def test_documents_carry_proofs_and_tampered_ones_are_refused():
     brake = ephs.irreversible(
         {"p": Q.momentum, "s": Q.entropy}, lambda p, s: (0.3 + abs(p)) * np.array([[s, -p], [-p, p * p / s]])
     )
-    pattern = Pattern(
-        {"p": junction(Q.momentum), "s": junction(Q.entropy)}, {"a": {"p": "p", "s": "s"}, "b": {"p": "p", "s": "s"}}
-    )
+    pattern = Pattern.from_text("p: momentum; s: entropy; a(p, s); b(p, s)")
     system = pattern({"a": library.friction(d=2.0), "b": brake})
     text = system.to_json(proofs=True)
     assert text.count('"squares"') == 2 and '"proof"' not in system.to_json()

@@ -341,13 +341,28 @@ def no_value(source):
     return stored(energy)
 
 
-WRONG = (
-    energy_of_constants, entropy_of_constants, volume_of_constants, parity_of_constants, energy_inside_a_port,
-    entropy_of_a_transformer, volume_of_a_constraint, energy_of_a_function, entropy_of_a_function,
-    parity_of_a_function, energy_of_friction, symmetry_of_friction, energy_beside_friction, volume_of_a_process,
-    asks_scalar, asks_type, asks_type_in_a_window, asks_for_a_name, tries, asks_for_text, asks_the_size, changes,
-    remembers, draws, in_a_global, negative_in_a_window, negative_in_a_recorded_window, negative_at_speeds,
-    negative_in_a_computed_window, negative_between_two_temperatures, not_skew_in_a_window, negative_by_a_polynomial,
-    cold_beyond, gradient_off, gradient_off_hidden, gradient_off_along_a_direction, gradient_off_in_a_window,
-    odd_energy, friction_with_a_direction, no_value,
-)  # fmt: skip
+BREAKS = {
+    "isotropy": (energy_of_constants, energy_inside_a_port, energy_of_a_function, not_skew_in_a_window),
+    "conservation": (
+        entropy_of_constants, volume_of_constants, entropy_of_a_transformer, volume_of_a_constraint,
+        entropy_of_a_function, volume_of_a_process,
+    ),
+    "parity": (parity_of_constants, parity_of_a_function, friction_with_a_direction),
+    "energy": (energy_of_friction, energy_beside_friction),
+    "unlike": (asks_scalar, asks_type, asks_type_in_a_window, asks_for_a_name, tries, asks_for_text, asks_the_size),
+    "unlike or changing": (changes,),
+    "changing": (remembers, draws, in_a_global),
+    "definite": (
+        negative_in_a_window, negative_in_a_recorded_window, negative_at_speeds, negative_between_two_temperatures,
+        negative_by_a_polynomial,
+    ),
+    "cold": (cold_beyond,),
+    "gradient": (gradient_off, gradient_off_hidden, gradient_off_along_a_direction, gradient_off_in_a_window),
+    "even": (odd_energy,),
+    "no-value": (no_value,),
+    # at 1e-13 of a number, or in a window whose place is the root of a number, a search may find nothing
+    "symmetry or searched": (symmetry_of_friction,),
+    "definite or searched": (negative_in_a_computed_window,),
+}  # fmt: skip
+WRONG = {kind: conditions.split(" or ") for conditions, kinds in BREAKS.items() for kind in kinds}
+"""Kind -> the conditions of which one is named."""
