@@ -17,13 +17,16 @@ from ephs.semantics.stage import (
     Matrix,
     Program,
     Real,
+    Record,
     StageError,
+    Table,
     Vector,
     group,
     indices,
     integer,
     matrix,
     real,
+    table,
     vector,
 )
 
@@ -185,14 +188,20 @@ class Weighed:
     numbers: Annotated[Matrix, 2]
 
 
+class Heavy(Record):
+    """A row with a mass."""
+
+    mass = real()
+
+
 def test_annotations_say_the_kinds_of_arguments():
     """The text is that of the function whose kinds are written out; a size that is given counts."""
 
-    def plain(on: Evaluator, whole: Weighed, k: Integer, scale: Real, found: Table[Link], out: Vector) -> None:
+    def plain(on: Evaluator, whole: Weighed, k: Integer, scale: Real, found: Table[Heavy], out: Vector) -> None:
         out[k] = scale * whole.weights[k] * whole.numbers[k, 1] + found[k].mass
 
     kinds = {"whole": group(Weighed, weights=vector(), numbers=matrix(2)), "k": integer(), "scale": real()}
-    kinds |= {"found": table(Link), "out": vector()}
+    kinds |= {"found": table(Heavy), "out": vector()}
     texts = [Program("one", run=entry).text() for entry in (Entry(plain), Entry(plain, **kinds))]
     assert texts[0] == texts[1]
     kinds["whole"] = group(Weighed, weights=vector(), numbers=matrix())
