@@ -10,6 +10,7 @@ import numpy as np
 
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds, Tests, audit
+from ephs.solve.auditing.findings import Audit
 from ephs.solve.auditing.passing import TURNED
 from ephs.solve.auditing.resolution import Trials
 from ephs.solve.errors import Interrupted, Outcome, SimulationError, SolveError, serves_not, solve_error_of
@@ -116,13 +117,17 @@ def audited(
     ends
         The first and the last row, kept or not; nothing where there is none.
     """
-    solution = whole = solution_of(problem, record, stats)
     if bounds is None or not ends:
-        return solution
+        return solution_of(problem, record, stats)
     first, last = ends
-    if not (len(solution) and record.t[0] == first.t[0] and record.t[-1] == last.t[0]):
-        whole = solution_of(problem, joined([first, record, last]) or record, stats)
-    solution.audited = cache(lambda: audit(whole, bounds, trials(whole)))
+
+    @cache
+    def found() -> Audit:
+        kept = len(solution) and record.t[0] == first.t[0] and record.t[-1] == last.t[0]
+        whole = solution if kept else solution_of(problem, joined([first, record, last]) or record, stats)
+        return audit(whole, bounds, trials(whole))
+
+    solution = solution_of(problem, record, stats, found)
     return solution
 
 
@@ -131,10 +136,14 @@ def repeatable(trials: Trials | None, bounds: Bounds, *, ended: bool) -> Trials 
     return replace(trials, again=bounds.again) if trials is not None and ended else trials
 
 
-def solution_of(problem: Problem, record: Record, stats: Mapping[str, Any]) -> Solution:
-    """Kept part of a run, as a solution."""
+def solution_of(
+    problem: Problem, record: Record, stats: Mapping[str, Any], audited: Callable[[], Audit] | None = None
+) -> Solution:
+    """Kept part of a run, as a solution, with what makes its audit."""
     while problem.shown is not None:
         problem, record, stats = problem.shown(record, stats)
     states = RecordedStates(problem.descriptor, record.x)
     labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
-    return Solution(problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels)
+    return Solution(
+        problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels, audited=audited
+    )

@@ -105,9 +105,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         problem = replace(problem, initial=first)
     stats = _stats(json.loads(attributes["stats"]), problem)
     found = Audit.of_record(stats.pop("audit", Audit().record()))
-    solution = Solution(attributes["name"], t, known, books, stats, problem, labels, inputs)
-    solution.audited = lambda: found
-    return solution
+    return Solution(attributes["name"], t, known, books, stats, problem, labels, inputs, lambda: found)
 
 
 @final

@@ -52,9 +52,6 @@ class Solution:
         Names and units of the components of each state.
     inputs
         Prescribed values at outer ports, for solutions from files; None if the problem has them.
-
-    Attributes
-    ----------
     audited
         Makes or reads the audit of the run; None without one.
     """
@@ -69,10 +66,11 @@ class Solution:
         problem: Problem | None,
         labels: Mapping[Path, Labels],
         inputs: Mapping[Path, Variable] | None = None,
+        audited: Callable[[], Audit] | None = None,
     ) -> None:
         self.name, self.t, self.states, self.ledgers = name, t, states, ledgers
         self.stats, self.problem, self.labels, self._inputs = stats, problem, labels, inputs
-        self.audited: Callable[[], Audit] | None = None
+        self._audited = audited
 
     @overload
     def __getitem__(self, path: str | Path) -> Array: ...
@@ -105,9 +103,8 @@ class Solution:
         inputs = {path: replace(given, values=given.values[where]) for path, given in self.inputs.items()}
         states = {path: values[where] for path, values in self.states.items()}
         ledgers = replace(self.ledgers, **totals)
-        part = Solution(self.name, self.t[where], states, ledgers, self.stats, self.problem, self.labels, inputs)
-        part.audited = self.audited
-        return part
+        data = self.stats, self.problem, self.labels, inputs, self._audited
+        return Solution(self.name, self.t[where], states, ledgers, *data)
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -132,7 +129,7 @@ class Solution:
     @cached_property
     def audit(self) -> Audit:
         """Findings of the audit; empty for a solution without one."""
-        return Audit() if self.audited is None else self.audited()
+        return Audit() if self._audited is None else self._audited()
 
     @cached_property
     def inputs(self) -> Mapping[Path, Variable]:
