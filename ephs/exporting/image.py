@@ -22,8 +22,9 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
 from ephs.semantics.systems.system import System
-from ephs.solve.control import ATOL, RTOL, Proportional, first_step
+from ephs.solve.control import ATOL, RTOL, first_step
 from ephs.solve.march import Control as Steering
+from ephs.solve.march.control import Proportional
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Span
 

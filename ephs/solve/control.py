@@ -1,8 +1,8 @@
 """Step control: tolerances by quantity, limits, and the controllers."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias, final
+from typing import final
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from ephs.solve.snapshot import Snapshot
 
 SLIVER = 1e-9
 """Fraction of a step, or of a time, that is rounding of sums of steps."""
-UNFELT, EXACT = 1e-10, 1e-12
-"""Error in tolerances below which the next step is the longest allowed: proportional and symmetric control."""
+EXACT = 1e-12
+"""Error in tolerances below which the next symmetric step is the longest allowed."""
 FINEST = 1e-11
 """Least symmetric step as a fraction of the run."""
 CRAWL, STRETCH = 1e-12, 64
@@ -235,76 +235,6 @@ class Advance:
 
 
 @final
-class Proportional:
-    """Proportional-integral control: the next step by this error and the last one.
-
-    Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
-
-    Parameters
-    ----------
-    exponent
-        Says with which power of the step the estimate falls, which may change from step to step.
-    share
-        Says, as it may change too, how a step's part of the tolerance depends on its length: a step of h in a run of T
-        aims at (h/T)^share of it. With 0 errors add up over the steps, with 1 they make the tolerance together.
-    damping
-        How much the last error counts, 0 for none.
-    hold
-        A step that may grow by less than this factor stays as it is, since its matrices are factorised; else its own
-        error alone counts. With 1 both do.
-    """
-
-    STRICT, NEAR = 30.0, 0.93
-    finest = 0.0
-    """Least step as a fraction of the run."""
-
-    def __init__(
-        self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, damping: float = 0.4,
-        hold: float = 1.0,
-    ) -> None:  # fmt: skip
-        self._exponent, self._share, self._damping, self._before = exponent, share, damping, 1e-4
-        self._failed, self._hold = False, hold
-
-    def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
-        """Whether a step is accepted, and the length of the next one or of the next try.
-
-        Errors of at most 1 are accepted; a step after a failure does not grow; ``span`` is that of the whole run.
-
-        What is accepted knows the share up to a limit only: where rates jump, no step would be short enough.
-        """
-        share = self._share()
-        part, exponent = (span / h) ** share, self._exponent() - share
-        strict = error * min(part, self.STRICT)
-        error *= part
-        if not strict <= 1.0:
-            self._failed = True
-            return False, h * (max(0.2, 0.9 * strict ** (-1.0 / exponent)) if np.isfinite(strict) else 0.1)
-        main = (1.0 - 0.75 * self._damping) / exponent
-        factor = 0.9 * max(error, UNFELT) ** -main * self._before ** (self._damping / exponent)
-        self._before = max(error, 1e-4)
-        if self._hold > 1.0:
-            alone = 0.9 * max(error, UNFELT) ** (-1.0 / exponent)
-            factor = 1.0 if self.NEAR <= alone < self._hold else alone
-        most = 1.0 if self._failed else 6.0
-        self._failed = False
-        return True, h * min(most, max(0.3, factor))
-
-    def wanted(self, h: float, error: float, span: float) -> float:
-        """Length of the step whose error would equal the tolerance, without a lower limit."""
-        share = self._share()
-        part = min((span / h) ** share, self.STRICT)
-        return h * (error * part) ** (-1.0 / (self._exponent() - share))
-
-    def snapshot(self) -> Snapshot:
-        """Memory of earlier steps."""
-        return {"before": float(self._before), "failed": self._failed}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot."""
-        self._before, self._failed = snapshot["before"], snapshot["failed"]
-
-
-@final
 class Symmetric:
     """The next step follows from the error of the last step alone.
 
@@ -354,7 +284,3 @@ class Symmetric:
     def restore(self, snapshot: Snapshot) -> None:
         """Restore a snapshot."""
         self._tries = snapshot["tries"]
-
-
-Policy: TypeAlias = Proportional | Symmetric
-"""What chooses the steps of a run by their estimated errors relative to the tolerance."""

@@ -14,11 +14,12 @@ from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import SLIVER, Advance, Control, Grid, Policy, first_step
+from ephs.solve.control import SLIVER, Advance, Control, Grid, first_step
 from ephs.solve.ending import audited, failures_of, repeatable
 from ephs.solve.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
 from ephs.solve.events import Event, Watch
 from ephs.solve.journal import Written
+from ephs.solve.march.control import Policy
 from ephs.solve.problem import Problem, States
 from ephs.solve.result.record import Record, Rows, record_of
 from ephs.solve.result.solution import Solution
@@ -111,11 +112,10 @@ class _Run(Generic[S]):
         self.breakpoints = breakpoints
         self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
         self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
-        self.remarks, self.journal, self.bounds = remarks, journal, bounds
+        self.remarks, self.journal, self.bounds, self.save_at = remarks, journal, bounds, save_at
         self.t = self.t0 = t0
         self.grid = None if policy else Grid(0.0, abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
-        self.save_at = save_at
         self.setup, self.looked, self.ended = 0.0, begin, False
         self.steps = self.rejected = self.saved = 0
         self.way = Advance(t0, abs(until - t0) if policy else 0.0)

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, fi
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control, Policy
+from ephs.solve.control import Control
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
+    from ephs.solve.march.control import Policy
     from ephs.solve.result.record import Record
 
 S = TypeVar("S")
@@ -123,7 +124,7 @@ class Span(Generic[S]):
     until: float
     h: float
     control: Control
-    policy: Policy | None
+    policy: "Policy | None"
     save_at: Array | None
     saved: int
     counts: "Counts" = field(default_factory=lambda: Counts())

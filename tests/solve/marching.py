@@ -8,8 +8,8 @@ import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Vector, integer, kind_of, table, vector
-from ephs.solve.control import Proportional
 from ephs.solve.march import Account, Control, Ending, Memory, Motion, Tableau, march
+from ephs.solve.march.control import DAMPING, STRICT
 
 
 @final
@@ -151,7 +151,7 @@ def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, s
     c.end, c.span, c.step, c.origin, c.grid = float(until), abs(float(until)), step, origin, grid
     c.least_step, c.most_step, c.before, c.limit = least_step, np.inf, 1e-4, limit
     c.shortest, c.least = np.inf, np.inf
-    c.exponent, c.share, c.damping, c.strict = found.exponent, 0.5, 0.4, Proportional.STRICT
+    c.exponent, c.share, c.damping, c.strict = found.exponent, 0.5, DAMPING, STRICT
     c.saved = -1 if times is None else 0
     stages, elements = (len(found.arrays["a"]), size), np.array(q, dtype=float)
     kept = np.zeros(0) if times is None else np.abs(np.asarray(times, dtype=float))

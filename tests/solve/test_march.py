@@ -11,9 +11,8 @@ from scipy.integrate import solve_ivp
 import ephs
 from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
-from ephs.solve.control import Proportional
 from ephs.solve.march import STEPS, Control, Ending, Motion
-from ephs.solve.march.control import HELD, held_back, length
+from ephs.solve.march.control import DAMPING, HELD, STRICT, UNFELT, Proportional, held_back, length
 from tests.solve.marching import Field, field, program, start
 
 
@@ -229,18 +228,29 @@ def test_backward_in_time_leads_back():
     h=st.floats(1e-6, 1.0), error=st.floats(1e-12, 1e4), before=st.floats(1e-4, 1.0), failed=st.booleans(),
     share=st.sampled_from([0.0, 0.5]), exponent=st.sampled_from([5.0, 8.0]),
 )  # fmt: skip
-def test_steps_are_judged_as_by_the_proportional_control(h, error, before, failed, share, exponent):
-    oracle = Proportional(lambda: exponent, lambda: share)
-    oracle.restore({"before": before, "failed": failed})
-    accepted, following = oracle.judge(h, error, 1.0)
+def test_steps_are_judged_by_proportional_integral_control(h, error, before, failed, share, exponent):
+    """Hairer and Wanner, II, IV.2: h · 0.9 · error^(−0.7/p) · before^(0.4/p), by the error's part of the tolerance."""
+    part, power = (1.0 / h) ** share, exponent - share
+    strict, shared = error * min(part, STRICT), error * part
+    accepted = strict <= 1.0
+    factor = max(0.2, 0.9 * strict ** (-1.0 / power))
+    if accepted:
+        factor = 0.9 * max(shared, UNFELT) ** (-0.7 / power) * before ** (0.4 / power)
+        factor = min(1.0 if failed else 6.0, max(0.3, factor))
+    following = h * factor
     control = Control.table(1)
     c = control[0]
-    c.span, c.step, c.exponent, c.share, c.damping, c.strict = 1.0, h, exponent, share, 0.4, Proportional.STRICT
+    c.span, c.step, c.exponent, c.share, c.damping, c.strict = 1.0, h, exponent, share, DAMPING, STRICT
     c.before, c.failed, c.most_step = before, int(failed), np.inf
     assert bool(JUDGE(control, h, error)) == accepted
     # Powers by exponential and logarithm: each rounds by its argument, which is at most 40, times ε.
     assert c.step == pytest.approx(following, rel=100.0 * np.finfo(float).eps)
-    assert (c.before, bool(c.failed)) == pytest.approx((oracle.snapshot()["before"], oracle.snapshot()["failed"]))
+    assert c.before == pytest.approx(max(shared, 1e-4) if accepted else before)
+    assert bool(c.failed) == (not accepted)
+    policy = Proportional(lambda: exponent, lambda: share)
+    policy.restore({"before": before, "failed": failed})
+    assert policy.judge(h, error, 1.0) == (accepted, c.step)
+    assert policy.snapshot() == {"before": c.before, "failed": bool(c.failed)}
 
 
 JUDGE = STEPS.compiled()["judge"]
@@ -259,7 +269,7 @@ def test_a_step_is_not_wanted_longer_than_is_allowed_nor_shorter_than_the_least(
         ({}, 0.05, 1e-6, 0.1),  # a step that was cut short does not lengthen the next ones
     ):
         control = Control.table(1)
-        settings = {"span": 1.0, "strict": Proportional.STRICT, "before": 1e-4, "exponent": 5.0, "most_step": np.inf}
+        settings = {"span": 1.0, "strict": STRICT, "before": 1e-4, "exponent": 5.0, "most_step": np.inf}
         for name, value in (settings | {"step": 0.1} | bounds).items():
             setattr(control[0], name, value)
         assert JUDGE(control, h, error)

@@ -12,11 +12,10 @@ from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Proportional
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.march import STEPS, Account, Ending, Status
 from ephs.solve.march import Control as Steering
-from ephs.solve.march.control import PATIENCE
+from ephs.solve.march.control import DAMPING, PATIENCE, STRICT
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Counts, Span, Taken
 
@@ -111,7 +110,7 @@ class March:
         c.time, c.before, known = abs(span.state.t - span.t0), 1e-4, span.counts
         c.steps, c.rejected = known.steps, known.rejected
         c.shortest, c.longest, c.least = known.shortest, known.longest, known.least
-        c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, 0.4, Proportional.STRICT
+        c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, DAMPING, STRICT
         c.saved = -1 if times is None else span.saved
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
         self._weighed[:] = *self._spent(), c.time

@@ -10,8 +10,9 @@ from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.control import Control, Policy, Proportional, Symmetric
+from ephs.solve.control import Control, Symmetric
 from ephs.solve.errors import OptionError, nearest_of
+from ephs.solve.march.control import Policy, Proportional
 from ephs.solve.methods import own
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model

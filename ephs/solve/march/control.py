@@ -3,9 +3,19 @@
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
 """
 
-from ephs.semantics.stage import Evaluator, Integer, Real, Truth
-from ephs.solve.control import SLIVER, UNFELT
+from collections.abc import Callable
+from typing import Any, TypeAlias, final
+
+from ephs.semantics.stage import PLAIN, Evaluator, Integer, Real, Truth
+from ephs.solve.control import SLIVER, Symmetric
 from ephs.solve.march.records import Control
+from ephs.solve.snapshot import Snapshot
+
+DAMPING, STRICT, NEAR = 0.4, 30.0, 0.93
+"""How much the last error counts; the most by which a step's part of the tolerance makes its acceptance stricter; what
+a step that is kept may shrink to."""
+UNFELT, BEYOND = 1e-10, 1e300
+"""Error in tolerances below which the next step is the longest allowed; what is not below the second is no number."""
 
 PATIENCE = 15
 """Steps without solution, one after the other, before a stiff method is called for."""
@@ -28,8 +38,12 @@ def length(on: Evaluator, control: Control, rest: Real) -> Real:
     return on.select(grid > 0.0, fixed, free)
 
 
-def judge(on: Evaluator, control: Control, h: Real, error: Real) -> Integer:
-    """Return 1 where a step is accepted, else 0; write the length of the next one, or of the next try, to `step`."""
+def judge(on: Evaluator, control: Control, h: Real, error: Real, hold: float = 1.0) -> Integer:
+    """Return 1 where a step is accepted, else 0; write the length of the next one, or of the next try, to `step`.
+
+    With ``hold`` above 1 a step that may grow by less than this factor stays as it is, since its matrices are
+    factorised; else its own error alone counts.
+    """
     part = _power(on, control.span / h, control.share)
     exponent = control.exponent - control.share
     strict = error * on.minimum(part, control.strict)
@@ -38,13 +52,16 @@ def judge(on: Evaluator, control: Control, h: Real, error: Real) -> Integer:
     def reject() -> None:
         control.failed = 1
         shorter = on.maximum(0.2, 0.9 * _power(on, strict, -1.0 / exponent))
-        shorter = on.select(strict < 1e300, shorter, 0.1)
+        shorter = on.select(strict < BEYOND, shorter, 0.1)
         control.step = on.minimum(h * shorter, control.most_step)
 
     def accept() -> None:
         shared, damping = error * part, control.damping
         factor = 0.9 * _power(on, on.maximum(shared, UNFELT), -(1.0 - 0.75 * damping) / exponent)
         factor = factor * _power(on, control.before, damping / exponent)
+        if hold > 1.0:
+            alone = 0.9 * _power(on, on.maximum(shared, UNFELT), -1.0 / exponent)
+            factor = on.select(on.both(alone >= NEAR, alone < hold), 1.0, alone)
         control.before = on.maximum(shared, 1e-4)
         most = on.select(control.failed > 0, 1.0, 6.0)
         control.failed = 0
@@ -66,3 +83,56 @@ def held_back(on: Evaluator, control: Control) -> Truth:
     control.held = on.select(on.both(on.negate(over), free >= 6), 0, held)
     control.free = free
     return on.both(over, held >= HELD)
+
+
+@final
+class Proportional:
+    """Proportional-integral control: the next step by this error and the last one, see `judge`.
+
+    Parameters
+    ----------
+    exponent
+        Says with which power of the step the estimate falls, which may change from step to step.
+    share
+        Says, as it may change too, how a step's part of the tolerance depends on its length: a step of h in a run of T
+        aims at (h/T)^share of it. With 0 errors add up over the steps, with 1 they make the tolerance together. What
+        is accepted knows the share up to `STRICT` only: where rates jump, no step would be short enough.
+    hold
+        As of `judge`.
+    """
+
+    finest = 0.0
+    """Least step as a fraction of the run."""
+
+    def __init__(
+        self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, hold: float = 1.0
+    ) -> None:
+        self._exponent, self._share, self._hold = exponent, share, hold
+        self._control: Any = Control.table(1)[0]
+        self._control.before, self._control.most_step = 1e-4, BEYOND
+        self._control.damping, self._control.strict = DAMPING, STRICT
+
+    def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
+        """Whether a step is accepted, and the length of the next one or of the next try; span: of the whole run."""
+        c = self._control
+        c.span, c.step, c.exponent, c.share = span, h, self._exponent(), self._share()
+        accepted = judge(PLAIN, c, h, error if error < BEYOND else BEYOND, self._hold)
+        return bool(accepted), float(c.step)
+
+    def wanted(self, h: float, error: float, span: float) -> float:
+        """Length of the step whose error would equal the tolerance, without a lower limit."""
+        share = self._share()
+        part = min((span / h) ** share, STRICT)
+        return h * (error * part) ** (-1.0 / (self._exponent() - share))
+
+    def snapshot(self) -> Snapshot:
+        """Memory of earlier steps."""
+        return {"before": float(self._control.before), "failed": bool(self._control.failed)}
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Restore a snapshot."""
+        self._control.before, self._control.failed = snapshot["before"], int(snapshot["failed"])
+
+
+Policy: TypeAlias = Proportional | Symmetric
+"""What chooses the steps of a run by their estimated errors relative to the tolerance."""

@@ -185,7 +185,7 @@ class Control(Record):
     least_step, most_step
         Bounds of steps.
     exponent, share, damping, strict
-        As of `ephs.solve.control.Proportional`.
+        As of `ephs.solve.march.control.Proportional`.
     before
         Error of the step before.
     stiff, limit
