@@ -230,8 +230,7 @@ class March:
     def _refused(self, status: int) -> None:
         eq = self.method.equations
         if status == Status.OPEN:
-            residual = eq.dense.gaps(self.memory["q"], self.memory["y"][eq.nv : eq.nv + eq.n])[0]
-            raise eq.dense.opened(residual, float(np.abs(residual).max(initial=0.0)))
+            raise eq.opened(self.memory["q"], self.memory["y"][eq.nv : eq.nv + eq.n])
         eq.refuse(status, eq.engine.failed)
 
     def _step(self) -> None:

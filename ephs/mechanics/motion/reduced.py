@@ -25,7 +25,6 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.errors import OptionError, SolveError
-from ephs.solve.march import Status
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.solution import Solution
@@ -140,12 +139,7 @@ class ReducedMotion:
         eq, state, inputs = self._eq, self._states[k], self._solution.inputs
         eq.given.put(lambda port: inputs[port].values[k])
         eq.prescribed.place(state.t)
-        y = eq.vector(state)
-        status, _, rates = eq.engine.rates(state.q, y)
-        if status == Status.DEPENDENT:
-            status, _ = eq.dense.rates(state.q, y, eq.given, eq.heats, rates)
-        eq.refuse(status, eq.engine.failed)
-        return rates[eq.nv : eq.nv + eq.n]
+        return eq.unheld(state.q, eq.vector(state))[1][eq.nv : eq.nv + eq.n]
 
     def _on_loops(self) -> list[ReducedState]:
         """The states at the kept instants: rates by the momenta, loops closed."""

@@ -201,7 +201,7 @@ def test_columns_add_up_along_any_direction(drawn):
     slopes = equations.dense.residual.slopes()
     sizes = {"increment": equations.nv, "r": equations.n, "entropy": equations.ns, "a": equations.n}
     seeds = {name: rng.standard_normal((size, 3)) for name, size in sizes.items()}
-    along = slopes.of("residual", seeds, 3)
+    along = slopes.of("residual", seeds, 3)[0]
     columns, whole = slopes.along("residual", tuple(sizes)), np.concatenate(list(seeds.values()))
     size = 1.0 + np.abs(columns) @ np.abs(whole)
     assert np.all(np.abs(columns @ whole - along) <= 1e-13 * whole.shape[0] * size)

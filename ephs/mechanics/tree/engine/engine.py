@@ -220,11 +220,11 @@ class Engine:
         self._run("measured")
         return self.work["kept"].copy()
 
-    def close(self, q: Array, r: Array) -> tuple[int, float, Array, Array]:
-        """Return a status, how far constraints are open, elements with loops closed, and rates on them."""
+    def close(self, q: Array, r: Array) -> tuple[int, Array, Array]:
+        """Return a status, elements with loops closed, and rates on them."""
         self._q[:], self._r[:] = q, r
         status = self._run("close")
-        return status, float(self.work["answer"][0]), self._q.copy(), self._r.copy()
+        return status, self._q.copy(), self._r.copy()
 
     def along(self, q: Array, change: Array) -> Array:
         """Return a change of the rates without its part across the constraints, where loops were closed last, at q."""

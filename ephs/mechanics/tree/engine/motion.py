@@ -105,8 +105,7 @@ class Mechanism(Motion):
 
     def fold(self, on: Evaluator, force: Vector, pushed: Matrix) -> Integer:
         """The inward sweep under forces on the rates and wrenches on links; return a status."""
-        still = on.reach(self.tables.own[0].fold, *self.swept, *self._rows, force, pushed)
-        return self._still(on, still)
+        return self._still(on, on.reach(self.tables.own[0].fold, *self.swept, *self._rows, force, pushed))
 
     def unfold(self, on: Evaluator, rate: Vector) -> None:
         """The last outward sweep: write accelerations."""
@@ -116,8 +115,7 @@ class Mechanism(Motion):
         """Status where a sweep says 1 + the link whose joint moves no mass, which loops may determine; else 0."""
 
         def blame() -> None:
-            at = (still - 1) * Link.integer_width + Link.r_at.offset
-            self.work.fault[0] = self.tables.integers[at]
+            self.work.fault[0] = self.tables.integers[(still - 1) * Link.integer_width + Link.r_at.offset]
 
         on.when(still > 0, blame)
         return on.select(still > 0, int(Status.DEPENDENT if self.looped else Status.STILL), 0)
@@ -147,8 +145,7 @@ class Mechanism(Motion):
         w, own, status = self.work, self.tables.own[0], on.counter(0)
 
         def fall() -> None:
-            still = on.reach(own.accelerations, *self.swept, q, r, w.zero, rate)
-            status.value = self._still(on, still)
+            status.value = self._still(on, on.reach(own.accelerations, *self.swept, q, r, w.zero, rate))
 
         def general() -> None:
             self.outward(on, q, r, self.tables.lead)
@@ -290,8 +287,7 @@ class Mechanism(Motion):
         energies, at, ns = on.scratch(3), self.summed, self.tables.node.size
         status = held(on, self, q, y.part(self.increments, self.freedoms), y.part(at, ns), energies)
         account.anchor = energies[0] + energies[1] + (y[at + ns] - y[at + (ns + 1)])
-        moving = y.part(self.increments, self.freedoms)
-        on.when(self.tables.own[0].islands > 0, lambda: measure(on, self, q, moving))
+        on.when(self.tables.own[0].islands > 0, lambda: measure(on, self, q, y.part(self.increments, self.freedoms)))
         return status
 
     def sizes(self, on: Evaluator, y0: Vector, y1: Vector, out: Vector) -> None:

@@ -40,7 +40,7 @@ from ephs.semantics.stage import (
 
 ACTIVE: Final = (
     "work", "relative", "value", "covector", "force", "pushed", "attached", "pulled", "temperature", "entropy",
-    "located", "e", "f", "idle", "drive", "wrench", "increment", "local", "off", "changed", "q", "r",
+    "located", "e", "f", "idle", "increment", "local", "off", "changed", "q", "r",
 )  # fmt: skip
 """Arguments that have derivatives, beside those that only one of the functions has."""
 MOVING: Final[dict[str, Any]] = {**members(Tables), **members(Work)}
@@ -70,8 +70,8 @@ class Residuals:
     width
         Numbers of memory that a link takes; the ground takes as many.
     program
-        ``place``: motions. ``assemble``: the mass matrix, its Cholesky factor, rows of loops; 0, or
-        1 + a degree of freedom that moves no mass. ``constrain``: the rows alone, with a factor.
+        ``place``: motions. ``assemble``: the mass matrix, its Cholesky factor, rows of loops and the
+        sizes of what is summed in them; 0, or 1 + a degree of freedom that moves no mass.
         ``rigid``: the forces that inertia and gravity need at ṙ = 0.
         ``twists``: (n, 6) of a link by the rates. ``residual`` and ``action``: see above.
     """
@@ -105,42 +105,28 @@ class Residuals:
 
         def assemble(
             on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, unit: Vector, mass: Matrix,
-            factor: Matrix, jacobian: Matrix, terms: Vector, driven: Integer,
+            factor: Matrix, jacobian: Matrix, sizes: Matrix, driven: Integer,
         ) -> Integer:  # fmt: skip
             tree, closing = outwards(on, tables, work, q, r)
             closing.place(on)
             masses(on, tree, unit, mass)
-            found = cholesky(on, mass, factor)
-            constraints(on, tree, closing, q, factor, jacobian, terms, driven)
-            return found
 
-        def constrain(
-            on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, factor: Matrix, jacobian: Matrix,
-            terms: Vector, driven: Integer,
-        ) -> None:  # fmt: skip
-            tree, closing = outwards(on, tables, work, q, r)
-            closing.place(on)
-            constraints(on, tree, closing, q, factor, jacobian, terms, driven)
-
-        def constraints(
-            on: Evaluator, tree: Tree, closing: Closures, q: Vector, factor: Matrix, jacobian: Matrix, terms: Vector,
-            driven: Integer,
-        ) -> None:  # fmt: skip
             def empty(a: Integer) -> None:
                 clear(on, jacobian.row(driven + a))
-                terms[driven + a] = 0.0
+                clear(on, sizes.row(driven + a))
 
             def one(joint: Cut, a: Integer, end: Integer) -> None:
-                into, m = jacobian.row(driven + a), driven + a
+                m = driven + a
 
                 def count(at: Integer, size: Real) -> None:
-                    terms[m] = terms[m] + size / factor[at, at]
+                    sizes[m, at] = sizes[m, at] + size
 
                 for link, e in ((joint.first, end), (joint.second, end + 1)):
-                    row_of_covector(on, tree, link, self._seen, closing.at_end(e), into, count)
+                    row_of_covector(on, tree, link, self._seen, closing.at_end(e), jacobian.row(m), count)
 
-            on.loop(terms.size - driven, empty)
+            on.loop(jacobian.rows - driven, empty)
             closing.each_row(on, one)
+            return cholesky(on, mass, factor)
 
         def rigid(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, out: Vector) -> None:
             tree, _ = outwards(on, tables, work, q, r)
@@ -204,11 +190,8 @@ class Residuals:
         return {
             "place": entry(place, **at),
             "assemble": entry(
-                assemble, **at, unit=vector(), mass=matrix(), factor=matrix(), jacobian=matrix(), terms=vector(),
+                assemble, **at, unit=vector(), mass=matrix(), factor=matrix(), jacobian=matrix(), sizes=matrix(),
                 driven=integer(),
-            ),
-            "constrain": entry(
-                constrain, **at, factor=matrix(), jacobian=matrix(), terms=vector(), driven=integer()
             ),
             "rigid": entry(rigid, **at, out=vector()),
             "twists": entry(twists, **at, unit=vector(), link=integer(), rows=matrix(6)),

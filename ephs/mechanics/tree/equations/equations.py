@@ -129,15 +129,20 @@ class Equations:
         elif not self.constant:
             v, r, heats, totals = np.split(y, [nv, nv + n, nv + n + ns])
             self.given.place(t, self.states(ReducedState(t, self.advance(base, v), r, heats, totals)))
+        q, out = self.unheld(base, y)
+        if self.holding is not None:
+            out[nv : nv + n] += self.holding(t, q, y[nv : nv + n], out[nv : nv + n])
+        return out
+
+    def unheld(self, base: Array, y: Array) -> tuple[Array, Array]:
+        """The elements base·exp(v), and `rates` under the inputs at hand, where no contacts are held."""
         status, q, out = self.engine.rates(base, y)
         component = self.engine.failed
         if status == Status.DEPENDENT:
             status, component = self.dense.rates(q, y, self.given, self.heats, out)
             self.engine.velocities(y, y[self.nv : self.nv + self.n], out)
         self.refuse(status, component)
-        if self.holding is not None:
-            out[nv : nv + n] += self.holding(t, q, y[nv : nv + n], out[nv : nv + n])
-        return out
+        return q, out
 
     def stages(
         self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
@@ -201,14 +206,19 @@ class Equations:
         self.careful = False
         if not self.engine.looped:
             return state
-        status, gap, q, r = self.engine.close(state.q, state.r)
+        status, q, r = self.engine.close(state.q, state.r)
         if status == Status.OPEN:
-            raise self.dense.opened(self.dense.gaps(q, r)[0], gap)
+            raise self.opened(q, r)
         self.careful = status != 0
         if status != 0:
             return self._closed_carefully(state)
         self._closed_at, self._factored = (q, r), True
         return replace(state, q=q, r=r, memory=())
+
+    def opened(self, q: Array, r: Array) -> SolveError:
+        """The loop that stays open most."""
+        gaps = self.dense.gaps(q, r)[0]
+        return self.dense.opened(gaps, float(np.abs(gaps).max(initial=0.0)))
 
     def separation(self) -> Array:
         """Squared part of each loop constraint off those before it, relative to the largest constraint, (m,).

@@ -80,8 +80,11 @@ class Residual:
             "increment": np.zeros(self.nv), "base": q, "q": q.copy(), "r": np.zeros(n),
             "a": np.zeros(n), "multiplier": np.zeros(m), "unit": np.zeros(n),
             "mass": np.zeros((n, n)), "factor": np.zeros((n, n)), "jacobian": np.zeros((m + driven, n)),
-            "terms": np.zeros(m + driven), "rows": np.zeros((n, 6)), "made": self.made, "totals": self._totals,
+            "sizes": np.zeros((m + driven, n)), "terms": np.zeros(m + driven), "rows": np.zeros((n, 6)),
+            "made": self.made, "totals": self._totals,
         }  # fmt: skip
+        prescribed = np.arange(driven), np.flatnonzero(t.driven)
+        self.arrays["jacobian"][prescribed] = self.arrays["sizes"][prescribed] = 1.0
         own: Any = whole.tables["own"][0]
         own.width = self.program.width
         self._numbers = {"driven": driven, "link": 0}
@@ -98,7 +101,7 @@ class Residual:
         self._shared = call.first(*(self.arrays[name] for name in MOVING))
         others = list(program.entries["about"].kinds)[len(MOVING) :]
         self._point = call.bind(*(self.arrays[name] for name in others), first=self._shared)
-        self._driven, self._first = np.flatnonzero(t.driven), net.state_at
+        self._first = net.state_at
         self._slopes: Slopes | None = None
 
     def bound(self, calls: Any, name: str, **others: Any) -> Any:
@@ -147,11 +150,10 @@ class Residual:
         a["q"][:], a["r"][:] = q, r
         self.stiffness[:] = 0.0
         found = int(self._call("assemble")())
-        driven = np.arange(self._driven.size), self._driven
-        a["jacobian"][driven] = 1.0
         if found and self.stiffness.size:
             found = self._stiffened()
-        a["terms"][: self._driven.size] = 1.0 / a["factor"].diagonal()[self._driven]
+        if not found:
+            a["terms"][:] = a["sizes"] @ (1.0 / a["factor"].diagonal())
         return found
 
     def _stiffened(self) -> int:
@@ -168,7 +170,6 @@ class Residual:
         if not sizes[0] > REGULAR * sizes.size:
             return 1 + int(np.argmax(np.abs(ways[:, 0])))
         a["factor"][:] = np.linalg.cholesky(metric)
-        self._call("constrain")()
         return 0
 
     @property

@@ -36,18 +36,15 @@ class Slopes:
             self._calls[name] = found.bound(program.compiled(), name, **pairs, out=(out, self._outs[name]))
         return self._calls[name]
 
-    def of(self, name: str, seeds: Mapping[str, Array], count: int) -> Array:
-        """(size, count) derivatives of a function along the last axes of seeds, arguments by name.
+    def of(self, name: str, seeds: Mapping[str, Array], count: int, beside: str = "value") -> tuple[Array, Array]:
+        """(size, count) derivatives of a function along the last axes of seeds, arguments by name, and those of an
+        argument that the function writes, with ``count`` as its last axis.
 
         Parameters
         ----------
         name
             ``residual`` or ``action``.
         """
-        return self.both(name, seeds, count)[0]
-
-    def both(self, name: str, seeds: Mapping[str, Array], count: int, beside: str = "value") -> tuple[Array, Array]:
-        """The same, and the derivatives of an argument that the function writes, with ``count`` as its last axis."""
         call, written = self._call(name), self._slopes[beside]
         out = self._outs[name]
         found, other = np.empty((out.shape[0], count)), np.empty((*written.shape[:-1], count))
@@ -69,4 +66,4 @@ class Slopes:
         units = np.eye(sum(sizes))
         units = units if wanted is None else units[:, wanted]
         parts = np.split(units, np.cumsum(sizes)[:-1])
-        return self.of(name, dict(zip(arguments, parts, strict=True)), units.shape[1])
+        return self.of(name, dict(zip(arguments, parts, strict=True)), units.shape[1])[0]

@@ -120,7 +120,7 @@ class Linearised:
         found.arrays["base"][:] = q
         found.at(r, np.zeros(found.m))
         units = np.eye(nv + n)
-        slopes, places = self._slopes.both("residual", {"increment": units[:nv], "r": units[nv:]}, nv + n, "work")
+        slopes, places = self._slopes.of("residual", {"increment": units[:nv], "r": units[nv:]}, nv + n, "work")
         gravity[:] = pull
         following = slopes[found.cut_rates, nv:]
         slopes[:, :n] += slopes[:, n:nv] @ following
