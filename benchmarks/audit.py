@@ -9,7 +9,7 @@ from typing import Any
 import ephs
 from benchmarks.report import Report, table_of
 from ephs.solve import ending
-from ephs.solve.probe import Probe
+from ephs.solve.probe import SignalProbe
 
 SCENES = Path(__file__).parents[1] / "scenes"
 RUNS: dict[str, dict[str, Any]] = {
@@ -56,7 +56,7 @@ def _push(t: float) -> float:
 def _measured(scene: ephs.Scene, until: float, options: dict[str, Any]) -> dict[str, Any]:
     """One run: its processor time without the audit, those of the audit, and their ratio."""
     spent: list[float] = []
-    with _timed(ending, "audit", spent), _timed(Probe, "look", spent):
+    with _timed(ending, "audit", spent), _timed(SignalProbe, "look", spent):
         begin = time.process_time()
         sol = ephs.simulate(scene, until, audit="off", **options)
         rest = time.process_time() - begin - sum(spent)

@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks import families
 from benchmarks.report import Report, table_of
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 
 SIZES = (1, 4, 16)
 CALLS, ROUNDS = 2000, 7
@@ -28,14 +28,14 @@ def report() -> Report:
     """Evaluations and closings of rows of four-bars, at a closed position: one pass of Newton's method each."""
     rows: list[dict[str, Any]] = []
     for count in SIZES:
-        equations = Equations(problem_of_scene(families.scene("four-bar-windows", count)), 0.0)
+        equations = ReducedEquations(problem_of_scene(families.scene("four-bar-windows", count)), 0.0)
         state = equations.start(0.0)
         y = equations.vector(state)
 
-        def evaluate(equations: Equations = equations, state: Any = state, y: Any = y) -> None:
+        def evaluate(equations: ReducedEquations = equations, state: Any = state, y: Any = y) -> None:
             equations.engine.rates(state.q, y)
 
-        def close(equations: Equations = equations, state: Any = state) -> None:
+        def close(equations: ReducedEquations = equations, state: Any = state) -> None:
             equations.engine.close(state.q, state.r)
 
         evaluation, closing = _least(evaluate), _least(close)

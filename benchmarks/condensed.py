@@ -19,7 +19,7 @@ from ephs.semantics.spaces.decompositions import least_squares, singular_values
 from ephs.semantics.spaces.rank import IMPLICIT
 from ephs.semantics.systems.kept import once
 from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Evaluation, Model
 from ephs.solve.sparse import equilibrate
 
@@ -38,7 +38,7 @@ def solved_by_parts(model: Model, x: Array, h: float) -> Array:
     SolveError
         A component is outside its domain, or Newton's method does not converge.
     """
-    z, before = Stored(model).efforts(x), np.inf
+    z, before = StoredEnergies(model).efforts(x), np.inf
     kept = np.zeros(model.unknowns, dtype=np.int64)
     evaluation = Evaluation(model)
     memory = evaluation.memory

@@ -18,7 +18,7 @@ from benchmarks import families
 from benchmarks.peers.mujoco import mujoco_model
 from benchmarks.peers.scene import peer_scene
 from benchmarks.report import Report, table_of
-from ephs.exporting.environment import Environment, Environments, Task
+from ephs.exporting.environment import Environment, Environments, EnvironmentTask
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
 
@@ -31,17 +31,17 @@ Episode = Callable[[], Array]
 """Run all actions; the joint angles at the end."""
 
 
-def task(scene: Scene, **options: Any) -> Task:
+def task(scene: Scene, **options: Any) -> EnvironmentTask:
     """The scene as a task without reward."""
     inputs = [f"joints.{name}" for name in scene.joints]
-    return Task(scene, inputs=inputs, reward=_nothing, limits=5.0, period=PERIOD, horizon=ACTIONS, **options)
+    return EnvironmentTask(scene, inputs=inputs, reward=_nothing, limits=5.0, period=PERIOD, horizon=ACTIONS, **options)
 
 
 def _nothing(seen: Array, action: Array) -> float:
     return 0.0
 
 
-def angles(made: Task) -> list[int]:
+def angles(made: EnvironmentTask) -> list[int]:
     """Places of the joint angles in an observation."""
     return [k for k, name in enumerate(made.names) if name.endswith(".coordinate")]
 

@@ -23,7 +23,7 @@ from benchmarks.peers.scene import PeerError, peer_scene
 from benchmarks.report import Report, table_of
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 
 __all__ = ["ENGINES", "own", "report"]
 
@@ -46,7 +46,7 @@ STATES = 16
 
 def own(scene: Scene) -> tuple[Block, int]:
     """Our accelerations: a block of rounds, and how many evaluations a round has."""
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     state, rng = equations.start(0.0), np.random.default_rng(0)
     q = np.array([state.q] * STATES)
     r = np.array([state.r + 0.1 * rng.standard_normal(equations.n) for _ in range(STATES)])

@@ -15,7 +15,7 @@ import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import OptionError, Outcome, SolveError
@@ -40,7 +40,7 @@ class Ida(ReducedMethod):
     name = "ida"
     exponent = 5.0
 
-    def __init__(self, equations: Equations, control: Control) -> None:
+    def __init__(self, equations: ReducedEquations, control: Control) -> None:
         try:
             from sksundae.ida import IDA as Solver
         except ImportError as error:

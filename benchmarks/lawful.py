@@ -14,7 +14,7 @@ import ephs
 from benchmarks import families
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.stepping import Span
 
@@ -28,7 +28,7 @@ MILLION = 1_000_000
 
 def _leg(family: str, count: int, method: str) -> Any:
     """Constant steps of a millisecond, of which none are kept."""
-    equations = Equations(problem_of_scene(families.scene(family, count)), 0.0)
+    equations = ReducedEquations(problem_of_scene(families.scene(family, count)), 0.0)
     control = Control(Tolerance(1e-9, {}), Tolerance(1e-9, {}), 1e-3, 0.0, np.inf, None)
     span = Span(equations.start(0.0), 0.0, 10.0, 1e-3, control, None, np.zeros(0), 0)
     return Explicit(equations, control, tableau(method)).many(span)

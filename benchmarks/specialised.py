@@ -17,7 +17,7 @@ from benchmarks.report import Report, table_of
 from ephs.mechanics.road.programs import sweeps
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.llvm import compile_text
 
@@ -38,7 +38,7 @@ def _compiling(program: Program) -> float:
 def measure(family: str, size: int) -> dict[str, Any]:
     """Seconds of an evaluation, and to compile, of both programs."""
     scene = families.scene(family, size)
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     found = links_of(equations.reduced).packed(equations.gravity)
     looped = sweeps(found.kind)
     state, rng = equations.start(0.0), np.random.default_rng(0)

@@ -17,7 +17,7 @@ from benchmarks.report import Report, table_of
 from ephs import System
 from ephs.mechanics.elements.components import holonomic
 from ephs.mechanics.rewrite.frames import CONSTRAINED, joint_at
-from ephs.mechanics.rewrite.rewrite import Draft
+from ephs.mechanics.rewrite.rewrite import SystemDraft
 from ephs.mechanics.rewrite.stabilised import stabilised
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.semantics.bundles.bundle import Array
@@ -33,7 +33,7 @@ TIGHT = 1e-12
 
 def drifting(system: System) -> System:
     """The flattened system whose joints hold between velocities in the middle of a step, and no more."""
-    draft = Draft(system)
+    draft = SystemDraft(system)
     for box in [box for box, part in draft.fillings.items() if part.name == CONSTRAINED]:
         joint = joint_at(draft, box)
         if joint is not None:

@@ -16,7 +16,7 @@ from ephs.mechanics.elements.shell.edges import SIZE
 from ephs.mechanics.road.loops import ARGUMENTS as LOOPS
 from ephs.mechanics.road.programs import ARGUMENTS as SWEEPS
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces.differentials import DIMENSIONS
 from ephs.semantics.stage import llvm
 from ephs.semantics.stage.calling import Call
@@ -132,12 +132,12 @@ def linear(run: Heard, n: int, k: int, m: int, seed: int) -> None:
 
 
 @cache
-def mechanism(family: str, size: int) -> Equations:
+def mechanism(family: str, size: int) -> ReducedEquations:
     scene = ephs.load("scenes/slider-crank.toml") if family == "slider-crank" else families.scene(family, size)
-    return Equations(problem_of_scene(scene), 0.0)
+    return ReducedEquations(problem_of_scene(scene), 0.0)
 
 
-def drawn(eq: Equations, seed: int) -> dict[str, Any]:
+def drawn(eq: ReducedEquations, seed: int) -> dict[str, Any]:
     """A mechanism's tables, and drawn numbers in all memory, by the names that entry functions have for them."""
     rng, given = np.random.default_rng(seed), eq.engine.tables
     out = {name: array.copy() for name, array in given.items() if isinstance(array, np.ndarray)}

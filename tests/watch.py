@@ -11,7 +11,7 @@ import pytest
 
 from ephs.semantics.stage import PLAIN, evaluator
 from ephs.semantics.stage.calling import Bound
-from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Held
+from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, HeldCells
 from ephs.semantics.stage.programs import _made, located
 from ephs.semantics.stage.reaching import called
 
@@ -128,5 +128,5 @@ class _Memory:
 def _array(cells: Any, atom: str) -> "np.ndarray[Any, Any]":
     if isinstance(cells, ArrayReals | ArrayIntegers):
         return cells.array
-    assert isinstance(cells, Held)
+    assert isinstance(cells, HeldCells)
     return np.array(cells.entries, dtype=np.int64 if atom == "integers" else np.float64)

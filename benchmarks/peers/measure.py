@@ -11,7 +11,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
 from ephs.show.charts.measure import STEPS, TOLERANCES, Point, measured_point, repeats_after, settings_over
 from ephs.show.charts.measure import work_precision as own_work_precision
-from ephs.show.charts.reference import PosesInTime, Reference, tight_reference
+from ephs.show.charts.reference import PosesInTime, ReferenceMotion, tight_reference
 from ephs.show.charts.runs import RunEnding, RunSetting
 
 __all__ = ["work_precision"]
@@ -22,7 +22,7 @@ def work_precision(
     until: float,
     methods: Sequence[str] | None = None,
     *,
-    reference: Reference | None = None,
+    reference: ReferenceMotion | None = None,
     repeats: int = 3,
     limit: float = 20.0,
     tolerances: Sequence[float] = TOLERANCES,
@@ -59,7 +59,7 @@ def _refined(
     until: float,
     name: str,
     settings: list[RunSetting],
-    truth: Reference,
+    truth: ReferenceMotion,
     repeats: int,
     limit: float,
     *,

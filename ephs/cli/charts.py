@@ -12,7 +12,7 @@ from ephs.cli.input import BadInput, addressed, load_model, say
 
 if TYPE_CHECKING:
     from ephs import Scene
-    from ephs.show.charts import Cell, Family, Point, Reference
+    from ephs.show.charts import Cell, Family, Point, ReferenceMotion
 
 _TEXTS = {
     "method": "--method {found}: expected some of {expected}",
@@ -182,7 +182,7 @@ def _named(models: dict[str, Model]) -> dict[str, Model]:
     return models
 
 
-def _given(file: Path | None, scene: "Scene", until: float | None) -> "tuple[Reference | None, float]":
+def _given(file: Path | None, scene: "Scene", until: float | None) -> "tuple[ReferenceMotion | None, float]":
     if file is None:
         return None, UNTIL if until is None else until
     from ephs.show.charts import shipped_reference

@@ -22,7 +22,7 @@ CHUNK: Final = 8
 
 
 @final
-class Task:
+class EnvironmentTask:
     """A scene, its actions, observations, and task.
 
     Parameters
@@ -107,7 +107,7 @@ class Environment(gymnasium.Env[Array, Array]):
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - gymnasium's own
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: EnvironmentTask) -> None:
         self.task = task
         self.action_space, self.observation_space = task.action_space, task.observation_space
         self._run, self._count = Instances(task.made), 0
@@ -137,7 +137,7 @@ class Environments(VectorEnv[Array, Array, Any]):
 
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - gymnasium's own
 
-    def __init__(self, task: Task, count: int, threads: int = 1) -> None:
+    def __init__(self, task: EnvironmentTask, count: int, threads: int = 1) -> None:
         self.task, self.num_envs = task, count
         self.single_action_space, self.single_observation_space = task.action_space, task.observation_space
         self.action_space = batch_space(task.action_space, count)

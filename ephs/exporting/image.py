@@ -16,14 +16,14 @@ from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path, tension_port
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
 from ephs.semantics.systems.system import System
 from ephs.solve.control import ATOL, RTOL, first_step
-from ephs.solve.march import Control as Steering
+from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import Proportional
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Span
@@ -171,7 +171,7 @@ def _started(
     for path, signal in problem.signals.items():
         if not signal.constant:
             raise ExportError("function", where=path)
-    equations = Equations(problem, 0.0)
+    equations = ReducedEquations(problem, 0.0)
     control = control_of(problem, tableau(method).order, rtol, atol, step, None, None, None)
     state = equations.start(0.0)
     explicit = Explicit(equations, control, tableau(method))
@@ -183,7 +183,7 @@ def _started(
     return _image(problem, equations, leg, _inputs(equations, model, inputs))
 
 
-def _image(problem: Problem, eq: Equations, leg: Any, inputs: Sequence[ImageNumber]) -> Image:
+def _image(problem: Problem, eq: ReducedEquations, leg: Any, inputs: Sequence[ImageNumber]) -> Image:
     memory, control = leg.memory, leg.steering
     reduced = eq.reduced
     out = np.zeros(reduced.coordinates + eq.n + 7 * reduced.links + 1)
@@ -223,7 +223,7 @@ def _actuators(scene: Scene) -> dict[str, Actuator]:
     return {f"actuators.{name}": each for name, each in scene.every("actuators")}
 
 
-def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[ImageNumber]:
+def _inputs(eq: ReducedEquations, scene: Scene | System, names: Sequence[str]) -> list[ImageNumber]:
     t, out = eq.reduced.tables, list[ImageNumber]()
     actuators = _actuators(scene) if isinstance(scene, Scene) else {}
 
@@ -243,7 +243,7 @@ def _inputs(eq: Equations, scene: Scene | System, names: Sequence[str]) -> list[
     return out
 
 
-def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tuple[int, int]]) -> ImageNumber:
+def _control(eq: ReducedEquations, name: str, of: Actuator, driven: Callable[[str], tuple[int, int]]) -> ImageNumber:
     """The control of an actuator, with its forces on joints, or on the length of its tendon."""
     shares: list[Share] = []
     if of.tendon is None:
@@ -259,19 +259,19 @@ def _control(eq: Equations, name: str, of: Actuator, driven: Callable[[str], tup
     return ImageNumber(name, "", 0, 0.0, tuple(shares), limits)
 
 
-def _outputs(eq: Equations, values: Array) -> list[ImageNumber]:
+def _outputs(eq: ReducedEquations, values: Array) -> list[ImageNumber]:
     t, names = eq.reduced.tables, [""] * values.size
 
-    def put(first: int, size: int, name: str) -> None:
+    def add_outputs(first: int, size: int, name: str) -> None:
         for k in range(size):
             names[first + k] = name if size == 1 else f"{name}.{k}"
 
     for i, edge in enumerate(eq.reduced.edges):
         path = edge.path or edge.state or edge.name
         if t.kind[i] != SPRING:
-            put(int(t.q_at[i]), int(t.q_size[i]), f"{path}.coordinate")
+            add_outputs(int(t.q_at[i]), int(t.q_size[i]), f"{path}.coordinate")
         if i < eq.reduced.links:
-            put(eq.reduced.coordinates + int(t.r_at[i]), int(t.dim[i]), f"{path}.rate")
+            add_outputs(eq.reduced.coordinates + int(t.r_at[i]), int(t.dim[i]), f"{path}.rate")
     first = eq.reduced.coordinates + eq.n
     for i in range(eq.reduced.links):
         body = eq.reduced.places[i].path

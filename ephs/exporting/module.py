@@ -16,7 +16,7 @@ from ephs.exporting.image import Image, ImageNumber
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.programs import located
-from ephs.solve.march import Control, Ending
+from ephs.solve.march import Ending, MarchControl
 
 _DEFINED: Final = re.compile(r"^define (?:internal )?(?:fastcc )?\S+ @([\w.]+)\(", re.MULTILINE)
 _DECLARED: Final = re.compile(r"^declare .*$\n?", re.MULTILINE)
@@ -211,7 +211,7 @@ class _ModuleText:
 
     def _field(self, name: str, array: np.ndarray[Any, Any], lines: list[str]) -> str:
         kind, first = self.place(array)
-        return self.pointer(kind, first + getattr(Control, name).offset, lines)
+        return self.pointer(kind, first + getattr(MarchControl, name).offset, lines)
 
     def _advance(self, image: Image, numbers: Any, counts: Any) -> str:
         lines: list[str] = []

@@ -4,7 +4,7 @@ from functools import cache
 from typing import Annotated
 
 from ephs.mechanics.tree.engine.heats import entropies
-from ephs.mechanics.tree.engine.states import Ends, Source, Stored, Walked, energies, rows
+from ephs.mechanics.tree.engine.states import Ends, Source, StorageRow, Walked, energies, rows
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import (
@@ -25,7 +25,7 @@ def _row(x: Vector) -> Matrix:
 
 def _read(
     on: Evaluator, tables: Tables, work: Work, bodies: Table[Walked], springs: Table[Ends], plan: Table[Source],
-    poses: Annotated[Matrix, 7], twists: Annotated[Matrix, 6], storages: Table[Stored], reads: Integers,
+    poses: Annotated[Matrix, 7], twists: Annotated[Matrix, 6], storages: Table[StorageRow], reads: Integers,
     parameters: Vector, turning: Integers, momentum: Vector, s: Matrix, x: Matrix, stored: Matrix, q: Vector, y: Vector,
     out: Vector,
 ) -> Integer:  # fmt: skip

@@ -62,7 +62,7 @@ def dependence(
     moves = NEAR * np.where(first == 0.0, 1.0, np.abs(first))
     sizes = [each.size for each in arrays(start)]
 
-    def at(shares: Array) -> Array:
+    def numbers_at(shares: Array) -> Array:
         found = arrays(dict(zip(names, (first + shares * moves).tolist(), strict=True)))
         if [each.size for each in found] != sizes:
             raise ExportError("structure", found=", ".join(names))
@@ -70,10 +70,10 @@ def dependence(
 
     unit, rng = np.eye(len(names)), np.random.default_rng(1)
     pairs = list(combinations(range(len(names)), 2))
-    base = at(0.0 * first)
+    base = numbers_at(0.0 * first)
     fitted = [*unit, *-unit, *(unit[i] + unit[j] for i, j in pairs)]
     held = [*(0.6 * unit), *rng.uniform(-1.0, 1.0, (2, len(names)))]
-    seen, tried = np.array([at(shares) for shares in fitted]), np.array([at(shares) for shares in held])
+    seen, tried = np.array([numbers_at(shares) for shares in fitted]), np.array([numbers_at(shares) for shares in held])
     scale = np.repeat([np.abs(each).max(initial=0.0) for each in np.split(base, np.cumsum(sizes)[:-1])], sizes)
     moving = np.flatnonzero(np.abs(np.vstack([seen, tried]) - base).max(axis=0) > EXACT * scale)
     out: list[ParameterPolynomial] = []

@@ -82,13 +82,13 @@ class ExpressionReader:
             return self.value(node.expressions[-1], scope)
         if kind == "Expression":
             return self._applied(node, scope)
-        raise ModelicaError("expression", where=self.where, found=said(node))
+        raise ModelicaError("expression", where=self.where, found=node_text(node))
 
     def truth(self, condition: Any) -> bool:
         """Whether a condition on parameters holds."""
         found = sp.true if condition is True else self.value(condition)
         if found not in (sp.true, sp.false):
-            raise ModelicaError("branch", where=self.where, found=said(condition))
+            raise ModelicaError("branch", where=self.where, found=node_text(condition))
         return bool(found)
 
     def _applied(self, node: Any, scope: Any) -> Any:
@@ -104,11 +104,11 @@ class ExpressionReader:
         if name == "homotopy":
             return self.value(node.operands[0], scope)
         if name not in ARITHMETIC:
-            raise ModelicaError("expression", where=self.where, found=f"the function {said(node)}")
+            raise ModelicaError("expression", where=self.where, found=f"the function {node_text(node)}")
         try:
             return ARITHMETIC[name](*(self.value(each, scope) for each in node.operands))
         except TypeError as error:
-            raise ModelicaError("expression", where=self.where, found=f"{said(node)} ({error})") from None
+            raise ModelicaError("expression", where=self.where, found=f"{node_text(node)} ({error})") from None
 
     def _named(self, node: Any, scope: Any) -> Any:
         name = str(node)
@@ -142,20 +142,21 @@ def _number(where: str, value: Any) -> Any:
     raise ModelicaError("expression", where=where, found=f"the literal {value!r}")
 
 
-def said(node: Any) -> str:
+def node_text(node: Any) -> str:
     """A node of the syntax tree as text."""
     kind = type(node).__name__
     if kind == "Primary":
         return str(node.value)
     if kind == "Equation":
-        return f"{said(node.left)} = {said(node.right)}"
+        return f"{node_text(node.left)} = {node_text(node.right)}"
     if kind == "IfEquation":
-        return f"if {said(node.conditions[0])} then …"
+        return f"if {node_text(node.conditions[0])} then …"
     if kind == "IfExpression":
-        return f"if {said(node.conditions[0])} then {said(node.expressions[0])} else {said(node.expressions[-1])}"
+        condition, then, *_, otherwise = map(node_text, (node.conditions[0], *node.expressions))
+        return f"if {condition} then {then} else {otherwise}"
     if kind != "Expression":
         return str(node) if kind == "ComponentRef" else kind
-    name, inner = str(node.operator), [said(each) for each in node.operands]
+    name, inner = str(node.operator), [node_text(each) for each in node.operands]
     if name in ("+", "-", "*", "/", "^", "<", "<=", ">", ">=", "==", "<>", "and", "or") and len(inner) == 2:
         bare = name not in ("*", "/", "^")
         left, right = (text if bare or " " not in text else f"({text})" for text in inner)

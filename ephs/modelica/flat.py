@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, final
 
 from ephs.modelica.errors import ModelicaError
-from ephs.modelica.expressions import Expr, ExpressionReader, Symbol, said, sp
+from ephs.modelica.expressions import Expr, ExpressionReader, Symbol, node_text, sp
 from ephs.operad import Quantity, quantity
 from ephs.solve.errors import nearest_of
 
@@ -244,15 +244,15 @@ def _equations(reader: ExpressionReader, nodes: Any, own: set[str]) -> list[Zero
             )
             out += _equations(reader, taken, own)
         elif kind == "WhenEquation":
-            raise ModelicaError("branch", where=reader.where, found=f"when {said(node.conditions[0])}")
+            raise ModelicaError("branch", where=reader.where, found=f"when {node_text(node.conditions[0])}")
         elif kind == "ConnectClause":  # connectors of power are equations already
             raise ModelicaError("signal", where=reader.where, found=f"{node.left} as {node.right}")
         elif kind != "Equation":
-            raise ModelicaError("expression", where=reader.where, found=f"{kind} {said(node)}")
+            raise ModelicaError("expression", where=reader.where, found=f"{kind} {node_text(node)}")
         elif type(node.left).__name__ in ("Symbol", "InstanceSymbol"):  # of an open connector
             if node.left.name not in own:
                 out.append(ZeroResidual(reader.variables[node.left.name], f"{node.left.name} = 0"))
         else:
             left, right = reader.value(node.left), reader.value(node.right)
-            out.append(ZeroResidual(sp.expand(left - right), said(node)))
+            out.append(ZeroResidual(sp.expand(left - right), node_text(node)))
     return out

@@ -123,7 +123,7 @@ def _capacity(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dict
     rate = derivative(port.potential)
     capacity = sp.cancel(flows[port] / rate)
     if flows[port].is_number:
-        raise ModelicaError("source", where=flat.name, equation=_said(flows))
+        raise ModelicaError("source", where=flat.name, equation=_flow_equations(flows))
     if not capacity.is_number or not capacity > 0:
         raise _refused(flat, flows)
     starts = {s: flat.starts.get(s) for s, unit in flat.units.items() if unit == "K" and s != port.potential}
@@ -137,13 +137,13 @@ def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dic
     first, second = flat.ports
     if sp.expand(flows[first] + flows[second]) != 0:
         taken = sp.expand(flows[first] + flows[second])
-        raise ModelicaError("first", where=flat.name, found=taken, equation=_said(flows))
+        raise ModelicaError("first", where=flat.name, found=taken, equation=_flow_equations(flows))
     one, two = sp.symbols("one two", positive=True)
     there = {first.potential: one, second.potential: two}
     h = sp.cancel(flows[first].subs(there, simultaneous=True) / (one - two))
     names = {first.name: "s1", second.name: "s2"}
     if h.is_negative:
-        raise ModelicaError("second", where=flat.name, equation=_said(flows))
+        raise ModelicaError("second", where=flat.name, equation=_flow_equations(flows))
     if sp.simplify(h.subs(two, one)).has(sp.zoo, sp.nan, sp.oo):
         raise _refused(flat, flows)
     if h.is_number:
@@ -158,10 +158,10 @@ def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dic
     return irreversible(ports, matrix, name="heat_transfer"), names, {}
 
 
-def _said(flows: dict[Connector, Expr]) -> str:
+def _flow_equations(flows: dict[Connector, Expr]) -> str:
     return ", ".join(f"{port.flow} = {flow}" for port, flow in flows.items() if flow != port.flow)
 
 
 def _refused(flat: Flat, flows: dict[Connector, Expr], equations: tuple[ZeroResidual, ...] = ()) -> ModelicaError:
-    said = _said(flows) or ", ".join(each.text for each in equations)
+    said = _flow_equations(flows) or ", ".join(each.text for each in equations)
     return ModelicaError("thermal", where=flat.name, equation=said)

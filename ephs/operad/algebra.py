@@ -191,7 +191,7 @@ def call(pattern: Pattern, elements: Mapping[Path, object]) -> Any:
 
 @final
 @dataclass(slots=True)
-class _Level:
+class _TraversalLevel:
     """State of the traversal of a nesting: its path, the boxes not yet visited, and the results of the others."""
 
     path: Path
@@ -205,13 +205,13 @@ def fold(algebra: Algebra[T], nesting: Nesting, leaves: Mapping[Path, T]) -> T:
     """The value of a tree of patterns; see `Nesting.fold`."""
     left = dict(leaves)
     # A list, as recursion would bound the depth.
-    levels = [_Level(ROOT, ROOT, nesting, iter(nesting.pattern.boxes))]
+    levels = [_TraversalLevel(ROOT, ROOT, nesting, iter(nesting.pattern.boxes))]
     while True:
         level = levels[-1]
         for box in level.boxes:
             child, path = level.nesting.children.get(box), level.path / box
             if child is not None:
-                levels.append(_Level(path, box, child, iter(child.pattern.boxes)))
+                levels.append(_TraversalLevel(path, box, child, iter(child.pattern.boxes)))
                 break
             if path not in left:
                 raise PatternError("fillings", box=path, found=paths_text(leaves), expected=_open(nesting))

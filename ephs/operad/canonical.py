@@ -4,7 +4,7 @@ from itertools import count
 
 from ephs.operad.directory import Directory
 from ephs.operad.names import Path
-from ephs.operad.normal import NormalForm, StateClass
+from ephs.operad.normal import NormalForm, SharedState
 from ephs.operad.parts import Junction, Port
 from ephs.operad.pattern import Pattern
 
@@ -46,6 +46,6 @@ def from_normal(form: NormalForm) -> Pattern:
     return Pattern(sorted(junctions.items(), key=lambda item: item[0]), boxes, links)
 
 
-def rank(each: StateClass) -> tuple[list[Path], list[Path], list[tuple[Path, Path]]]:
+def rank(each: SharedState) -> tuple[list[Path], list[Path], list[tuple[Path, Path]]]:
     """The place of a class among those of its pattern."""
     return sorted(each.members), sorted(path for path, _ in each.outer), sorted(each.ports)

@@ -20,7 +20,7 @@ ENTROPY, VOLUME = "entropy", "volume"
 
 @final
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ChargeKind:
     """Defaults of scalars of a kind."""
 
     unit: str = ""
@@ -28,21 +28,21 @@ class Kind:
     charges: Charges = ()
 
 
-PLAIN = Kind()
-KINDS: Mapping[str, Kind] = MappingProxyType(
+PLAIN = ChargeKind()
+KINDS: Mapping[str, ChargeKind] = MappingProxyType(
     {
-        "displacement": Kind("m"),
-        "momentum": Kind("kg m/s"),
-        "angle": Kind("rad"),
-        "angular_momentum": Kind("kg m²/s"),
-        "charge": Kind("C"),
-        "flux_linkage": Kind("Wb"),
-        "magnetic_flux": Kind("Wb"),
-        "entropy": Kind("J/K", charges=((ENTROPY, (1.0,)),)),
-        "volume": Kind("m³", POSITIVE, ((VOLUME, (1.0,)),)),
-        "liquid": Kind("m³", POSITIVE, (("liquid", (1.0,)),)),
-        "pressure_impulse": Kind("Pa s"),
-        "amount": Kind("mol", POSITIVE),
+        "displacement": ChargeKind("m"),
+        "momentum": ChargeKind("kg m/s"),
+        "angle": ChargeKind("rad"),
+        "angular_momentum": ChargeKind("kg m²/s"),
+        "charge": ChargeKind("C"),
+        "flux_linkage": ChargeKind("Wb"),
+        "magnetic_flux": ChargeKind("Wb"),
+        "entropy": ChargeKind("J/K", charges=((ENTROPY, (1.0,)),)),
+        "volume": ChargeKind("m³", POSITIVE, ((VOLUME, (1.0,)),)),
+        "liquid": ChargeKind("m³", POSITIVE, (("liquid", (1.0,)),)),
+        "pressure_impulse": ChargeKind("Pa s"),
+        "amount": ChargeKind("mol", POSITIVE),
     }
 )
 """Predefined kinds of scalars."""

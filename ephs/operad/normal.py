@@ -34,7 +34,7 @@ class PowerJunction:
 
 @final
 @dataclass(frozen=True, slots=True)
-class StateClass:
+class SharedState:
     """Junctions of one state: power-bearing members, outer state ports, inner state ports (box, port).
 
     The quantity is that of all of them; outer ports are given with theirs, whose unit may be written otherwise.
@@ -57,7 +57,7 @@ class NormalForm:
 
     boxes: frozenset[Path]
     junctions: Directory[PowerJunction]
-    classes: frozenset[StateClass]
+    classes: frozenset[SharedState]
 
 
 def powered(junctions: Mapping[Path, Junction], boxes: Mapping[Path, Box]) -> frozenset[Path]:
@@ -82,10 +82,10 @@ def normal_form(pattern: "Pattern") -> NormalForm:
             junctions[path] = PowerJunction(junction.quantity, exposed, frozenset(power_ports.get(path, ())))
         if junction.exposed and not junction.power:
             stateful.add(path)
-    classes: set[StateClass] = set()
+    classes: set[SharedState] = set()
     for members in {pattern.state_class(path) for path in stateful} | pattern.links:
         first = next(iter(members))
-        found = StateClass(
+        found = SharedState(
             pattern.junctions[first].quantity,
             frozenset(path for path in members if path in junctions),
             frozenset((p, j.quantity) for p in members if (j := pattern.junctions[p]).exposed and not j.power),

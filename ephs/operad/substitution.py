@@ -33,7 +33,7 @@ def flatten(nesting: Nesting) -> Pattern:
     whole = _Whole(dict(nesting.pattern.junctions), {}, [tuple(group) for group in nesting.pattern.links], set())
     # Each level knows what its junctions are called in the whole. A list, as recursion would bound the depth;
     # of iterators, as boxes keep their order.
-    top = _Level(ROOT, nesting, {path: path for path in nesting.pattern.junctions})
+    top = _FlatteningLevel(ROOT, nesting, {path: path for path in nesting.pattern.junctions})
     changed = False
     pending = [(top, iter(nesting.pattern.boxes.items()))]
     while pending:
@@ -78,7 +78,7 @@ class _Whole:
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Level:
+class _FlatteningLevel:
     """State of the flattening of a nesting: its path, and the names of its junctions in the whole."""
 
     path: Path
@@ -86,7 +86,7 @@ class _Level:
     target: Mapping[Path, Path]
 
 
-def _opened(box: Path, content: Box, child: Nesting, outer: _Level, whole: _Whole) -> _Level:
+def _opened(box: Path, content: Box, child: Nesting, outer: _FlatteningLevel, whole: _Whole) -> _FlatteningLevel:
     """Add the child's own junctions and links to the whole."""
     filling = child.pattern
     target: dict[Path, Path] = {}
@@ -101,10 +101,10 @@ def _opened(box: Path, content: Box, child: Nesting, outer: _Level, whole: _Whol
             # Its power balance stays its own; only the state is shared.
             whole.links.append((kept, outer.target[content.ports[path].junction]))
     whole.links.extend(tuple(target[path] for path in group) for group in filling.links)
-    return _Level(box, child, target)
+    return _FlatteningLevel(box, child, target)
 
 
-def _moved(content: Box, level: _Level, new: Mapping[Path, Junction]) -> Box:
+def _moved(content: Box, level: _FlatteningLevel, new: Mapping[Path, Junction]) -> Box:
     """The box with its ports on the junctions of the whole."""
     target, old = level.target, level.nesting.pattern.junctions
     ports: dict[Path, Port] = {}

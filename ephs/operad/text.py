@@ -80,7 +80,7 @@ Statements: TypeAlias = tuple[list[tuple[PathLike, Junction]], list[tuple[PathLi
 
 def from_text(text: str) -> Pattern:
     """Read the compact form; see `Pattern.from_text`."""
-    reader = _Reader(text)
+    reader = _TokenReader(text)
     junctions, boxes, links = reader.statements()
     if any(box == ROOT for box, _ in boxes):
         return _identity(reader, junctions, boxes, links)
@@ -89,12 +89,12 @@ def from_text(text: str) -> Pattern:
 
 def statements(text: str) -> Statements:
     """Read the compact form of a pattern or a part of one."""
-    return _wired(*_Reader(text).statements())
+    return _wired(*_TokenReader(text).statements())
 
 
 def quantity_from_text(text: str) -> Quantity:
     """Read a quantity in the compact form; the inverse of `quantity_text`."""
-    reader = _Reader(text)
+    reader = _TokenReader(text)
     found = reader.quantity()
     return found if reader.peek() == "" else reader.refuse(reader.take(), "the end of the quantity")
 
@@ -107,7 +107,7 @@ def _wired(
 
 
 def _identity(
-    reader: "_Reader",
+    reader: "_TokenReader",
     junctions: Iterable[tuple[Path, Junction]],
     boxes: list[tuple[Path, list[tuple[Path, Port]]]],
     links: list[list[Path]],
@@ -123,7 +123,7 @@ def _identity(
 
 @final
 @dataclass(slots=True)
-class _Reader:
+class _TokenReader:
     """Takes one token after the other."""
 
     text: str

@@ -54,7 +54,7 @@ def lost_of(pattern: Pattern) -> list[str]:
 
 @final
 @dataclass(slots=True)
-class _Named:
+class _UniqueNames:
     """Names handed out, each once."""
 
     taken: set[Path] = field(default_factory=set[Path])
@@ -100,7 +100,7 @@ class Wiring:
                 reader.refuse(f"outer port {k + 1}", found, "one; fork outside, where the pattern is used")
             exposed[junction] = name
         used = {junction for _, ports in self.boxes for _, junction in ports}
-        names, called = _Named(), dict[int, Path]()
+        names, called = _UniqueNames(), dict[int, Path]()
         junctions: dict[Path, Junction] = {}
         # exposed junctions first: they keep the names of outer ports
         for k in sorted(range(len(self.junctions)), key=lambda k: k not in exposed):
@@ -127,7 +127,7 @@ class Wiring:
         except PatternError as error:
             reader.refuse("diagram", str(error), "a pattern")
 
-    def _name(self, reader: Reader, names: _Named, what: str, k: int, name: str | None, lost: list[str]) -> Path:
+    def _name(self, reader: Reader, names: _UniqueNames, what: str, k: int, name: str | None, lost: list[str]) -> Path:
         wanted = Path((f"{what}{k + 1}",)) if name is None else _path(reader, f"{what} {k + 1}", name)
         found = names.fresh(wanted)
         if found != wanted and name is not None:

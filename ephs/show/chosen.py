@@ -43,7 +43,7 @@ def plot_signals(sol: Any, *names: str) -> "Figure":
     known = signal_names(sol)
     lines: dict[str, list[tuple[str, Array]]] = {}
     for name in names or _usual(known):
-        output, component = _found(name, known)
+        output, component = _output_of(name, known)
         labels = known[output]
         values = Output(output, labels).read(sol).reshape(len(sol.t), -1)
         for k, column in enumerate(values.T):
@@ -68,7 +68,7 @@ def _usual(known: dict[str, Labels]) -> list[str]:
     return [name for name in known if name in TOTALS]
 
 
-def _found(name: str, known: dict[str, Labels]) -> tuple[str, str]:
+def _output_of(name: str, known: dict[str, Labels]) -> tuple[str, str]:
     """Output of a name, and its component, if any."""
     outer, _, last = name.rpartition(".")
     for output in (name, f"{name}.{_FIRST.get(name.partition('.')[0], '')}"):

@@ -49,21 +49,28 @@ def to_tikz(placement: Placement) -> str:
         rf"({left:.2f},{top:.2f}) rectangle ({right:.2f},{bottom:.2f});",
     ]
     for region in placement.regions:
-        circle = f"{_at(region.at)} circle[radius={region.radius:.2f}bp]; % {_comment(region.path)}"
+        circle = f"{_coordinates(region.at)} circle[radius={region.radius:.2f}bp]; % {_comment(region.path)}"
         body.append(rf"\filldraw[fill=ephscomposite!35,draw=ephscompositerim] {circle}")
         body.append(_node(region.label, "text=ephscompositerim,"))
     for wire in placement.wires:
         dash = "" if wire.power else "[dotted]" if wire.role == "link" else "[dashed]"
-        body.append(rf"\draw{dash} {' -- '.join(_at(point) for point in wire.points)}; % {_comment(wire.title)}")
+        body.append(
+            rf"\draw{dash} {' -- '.join(_coordinates(point) for point in wire.points)}; % {_comment(wire.title)}"
+        )
     for box in (*placement.boxes, *(box for box, _ in placement.legend)):
         style = f"fill=ephs{box.kind},draw=ephs{box.kind}rim"
         what = box.path or f"legend: {box.kind}"
-        body.append(rf"\filldraw[{style}] {_at(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(what)}")
-        body += [rf"\draw[ephs{box.kind}rim,line width=.4bp] {_at(a)} -- {_at(b)};" for a, b in box.hatching]
+        body.append(rf"\filldraw[{style}] {_coordinates(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(what)}")
+        body += [
+            rf"\draw[ephs{box.kind}rim,line width=.4bp] {_coordinates(a)} -- {_coordinates(b)};"
+            for a, b in box.hatching
+        ]
         back = f"fill=ephs{box.kind},inner sep=.5bp," if box.hatching else ""
         body += [_node(text, back) for text in box.lines]
     for junction in placement.junctions:
-        body.append(rf"\fill {_at(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}")
+        body.append(
+            rf"\fill {_coordinates(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}"
+        )
         body.append(_node(junction.label, ""))
     body += [_node(wire.label, "text=gray,") for wire in placement.wires if wire.label is not None]
     body += [_node(word, "text=gray,") for _, word in placement.legend]
@@ -72,14 +79,14 @@ def to_tikz(placement: Placement) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _at(point: Point) -> str:
+def _coordinates(point: Point) -> str:
     return f"({point[0]:.2f},{point[1]:.2f})"
 
 
 def _node(text: Lettering, style: str) -> str:
     words = _escape(text.base) + (rf"\textsubscript{{{_escape(text.sub)}}}" if text.sub else "")
     size = rf"\fontsize{{{text.size:.1f}}}{{{1.2 * text.size:.1f}}}\selectfont"
-    return rf"\node[{style}font=\sffamily{size}] at {_at(text.at)} {{{words}}};"
+    return rf"\node[{style}font=\sffamily{size}] at {_coordinates(text.at)} {{{words}}};"
 
 
 def _escape(words: str) -> str:

@@ -91,7 +91,7 @@ def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[
     places: list[Place] = []
     length = sum(math.dist(a, b) for a, b in itertools.pairwise(line))
     for along in (5.0, 7.0, 9.0, 11.5, 14.0, 17.0, 20.0, 24.0, *(part * length for part in (0.4, 0.5, 0.6, 0.7, 0.8))):
-        (x, y), (dx, dy) = _at(line, along)
+        (x, y), (dx, dy) = _point_along(line, along)
         for side in (1.0, -1.0):
             nx, ny = -dy * side, dx * side
             # The rectangle's corner nearest to the wire keeps a distance from it.
@@ -101,7 +101,7 @@ def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[
     return places
 
 
-def _at(line: tuple[Point, ...], along: float) -> tuple[Point, Point]:
+def _point_along(line: tuple[Point, ...], along: float) -> tuple[Point, Point]:
     """Point and unit direction at an arc length."""
     for a, b in itertools.pairwise(line):
         length = math.dist(a, b)

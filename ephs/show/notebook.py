@@ -79,17 +79,17 @@ def _plane(values: Any) -> str:
     room = np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN
     span = np.where(high > low, high - low, 1.0)
 
-    def at(point: Any) -> tuple[float, float]:
+    def point_of(point: Any) -> tuple[float, float]:
         x, y = MARGIN + room * (np.asarray(point) - low) / span
         return float(x), HEIGHT - float(y)
 
-    zero = at((0.0, 0.0))
+    zero = point_of((0.0, 0.0))
     lines = [
         f'<line x1="{MARGIN / 2}" x2="{WIDTH - MARGIN / 2}" y1="{zero[1]:.1f}" y2="{zero[1]:.1f}" stroke="{GREY}"/>',
         f'<line y1="{MARGIN / 2}" y2="{HEIGHT - MARGIN / 2}" x1="{zero[0]:.1f}" x2="{zero[0]:.1f}" stroke="{GREY}"/>',
     ]
     for value, point in zip(values, points, strict=True):
-        x, y = at(point)
+        x, y = point_of(point)
         colour = RED if value.real > 0.0 else BLUE
         said = escape(f"{complex(value):.5g} 1/s")
         lines.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{DOT}" fill="{colour}"><title>{said}</title></circle>')

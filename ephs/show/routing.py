@@ -49,7 +49,7 @@ def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
     while queue:
         _, here = heapq.heappop(queue)
         if here == 1:
-            return _smooth(_way(corners, before), obstacles)
+            return _smooth(_corner_path(corners, before), obstacles)
         if done[here]:
             continue
         done[here] = True
@@ -63,7 +63,7 @@ def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
     return (start, end)
 
 
-def _way(corners: Points, before: NDArray[np.int_]) -> tuple[Point, ...]:
+def _corner_path(corners: Points, before: NDArray[np.int_]) -> tuple[Point, ...]:
     way = [1]
     while way[-1] != 0:
         way.append(int(before[way[-1]]))

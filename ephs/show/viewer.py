@@ -24,7 +24,7 @@ from ephs.show.page import Page
 from ephs.show.player import player
 from ephs.show.stage import Stage, stage_of
 from ephs.solve.ending import solution_of
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 
 LARGEST: Final = 64 * 2**20
 """Largest size of a dropped model, in bytes."""
@@ -171,7 +171,7 @@ def _stage(scene: Scene) -> Stage:
     problem = problem_of_scene(scene)
     d = problem.descriptor
     x = d.pack(problem.initial)[None, :]
-    record = Record(np.zeros(1), x, np.zeros((1, len(d.components))), np.zeros((1, 5)))
+    record = RunRecord(np.zeros(1), x, np.zeros((1, len(d.components))), np.zeros((1, 5)))
     return stage_of(solution_of(problem, record, {}), wrenches=False, heat=False, fps=1.0, duration=None)
 
 

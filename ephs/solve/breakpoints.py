@@ -13,7 +13,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.motion_law import MotionLaw
-from ephs.solve.probe import Asked, Change, Probe
+from ephs.solve.probe import Change, ProbedInput, SignalProbe
 from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.sampled import Sampling
 from ephs.solve.snapshot import Snapshot
@@ -45,7 +45,7 @@ class Breakpoints:
         t0: float,
         until: float,
         declared: Array | None = None,
-        asked: Sequence[Asked] = (),
+        asked: Sequence[ProbedInput] = (),
         held: Sequence[Sampling] = (),
     ) -> None:
         self._held = held
@@ -55,7 +55,7 @@ class Breakpoints:
         self._declared = frozenset(self._times)
         self._found: list[Change] = []
         self._split = 0
-        self._probe = Probe(asked, t0, until, self.within) if asked else None
+        self._probe = SignalProbe(asked, t0, until, self.within) if asked else None
 
     @property
     def times(self) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ from ephs.solve.oscillations import fastest_of
 from ephs.solve.problem import Problem
 from ephs.solve.result.labels import labels_of
 from ephs.solve.result.ledger import ledgers
-from ephs.solve.result.record import Record, joined
+from ephs.solve.result.record import RunRecord, joined
 from ephs.solve.result.solution import Solution
 from ephs.solve.result.states import RecordedStates
 
@@ -102,10 +102,10 @@ def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:
 
 def audited(
     problem: Problem,
-    record: Record,
+    record: RunRecord,
     stats: Mapping[str, Any],
     bounds: Bounds | None,
-    ends: list[Record],
+    ends: list[RunRecord],
     trials: Callable[[Solution], Tests | None],
 ) -> Solution:
     """Kept part of a run, with the audit from its start to the present time, which is made when it is asked for.
@@ -137,7 +137,7 @@ def repeatable(trials: Trials | None, bounds: Bounds, *, ended: bool) -> Trials 
 
 
 def solution_of(
-    problem: Problem, record: Record, stats: Mapping[str, Any], audited: Callable[[], Audit] | None = None
+    problem: Problem, record: RunRecord, stats: Mapping[str, Any], audited: Callable[[], Audit] | None = None
 ) -> Solution:
     """Kept part of a run, as a solution, with what makes its audit."""
     while problem.shown is not None:

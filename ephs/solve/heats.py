@@ -94,7 +94,7 @@ class Heats:
         self._source, self._sink = ends.T
         self._loose = np.where(np.all(ends < 0, axis=1), 1.0, 0.0)
         counted = np.where(self.plain, 0.0, 1.0)
-        single = _at(counted, self._sink) - _at(counted, self._source)
+        single = _end_values(counted, self._sink) - _end_values(counted, self._source)
         single[frictions] = 0.0
         self.carried = single
         """(flows,) 1 where a flow without friction carries energy from other states into energy accounts."""
@@ -148,7 +148,9 @@ class Heats:
     def flows(self, heats: Array, entropies: Array) -> Array:
         """(makers,) flows by entropies a second: productions of components; of conduction the outflow of its source."""
         theta = self.temperatures(heats)
-        return entropies * np.where(self._source >= 0, _at(theta, self._source), _at(theta, self._sink) + self._loose)
+        return entropies * np.where(
+            self._source >= 0, _end_values(theta, self._source), _end_values(theta, self._sink) + self._loose
+        )
 
     def booked(self, flows: Array, missed: Array | None, lost: float | None) -> Array:
         """Flows of a step with friction's heat moved towards the energy that the motion lost.
@@ -180,7 +182,11 @@ class Heats:
         """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
         cold = 1.0 / self.temperatures(heats)
         made = np.zeros(flows.size)
-        np.add.at(made, self._owners, np.abs(flows) * (_at(cold, self._sink) + _at(cold, self._source) + self._loose))
+        np.add.at(
+            made,
+            self._owners,
+            np.abs(flows) * (_end_values(cold, self._sink) + _end_values(cold, self._source) + self._loose),
+        )
         return made
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
@@ -205,10 +211,12 @@ class Heats:
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
         made = np.zeros(flows.size)
-        np.add.at(made, self._owners, flows * (_at(cold, self._sink) - _at(cold, self._source) + self._loose))
+        np.add.at(
+            made, self._owners, flows * (_end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose)
+        )
         return change, made
 
 
-def _at(values: Array, ends: Index) -> Array:
+def _end_values(values: Array, ends: Index) -> Array:
     """Values of the entropies at ends of flows, zero where there is none."""
     return np.append(values, 0.0)[ends]

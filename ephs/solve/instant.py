@@ -31,7 +31,7 @@ class Mobility:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Instant:
+class InstantRates:
     """Rates, efforts and multipliers at an instant.
 
     Parameters
@@ -124,7 +124,7 @@ def instant(
     x: Array,
     inputs: Mapping[Path, Input] | None = None,
     rising: Mapping[Path, Array] | None = None,
-) -> Instant:
+) -> InstantRates:
     """Solve the equations at the states x.
 
     Parameters
@@ -175,7 +175,7 @@ def instant(
     for slot in driven:
         outer[slot.path] = solution[row : row + slot.quantity.space.dim]
         row += slot.quantity.space.dim
-    return Instant(
+    return InstantRates(
         d,
         {slot.path: solution[slot.rates] for slot in d.states},
         efforts,
@@ -291,10 +291,15 @@ def _turned_constraints(d: Descriptor, x: Array, rates: Array) -> Array:
             continue
         h = 1e-3 / fastest
 
-        def at(step: float, slot: ComponentSlot = slot, primitive: Reversible = primitive) -> Array:
+        def constraints_at(step: float, slot: ComponentSlot = slot, primitive: Reversible = primitive) -> Array:
             return primitive.structure(d.point(slot, d.advance(x, step * rates)))[1]
 
-        _place(out, slot, (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h))
+        _place(
+            out,
+            slot,
+            (8.0 * (constraints_at(h) - constraints_at(-h)) - (constraints_at(2.0 * h) - constraints_at(-2.0 * h)))
+            / (12.0 * h),
+        )
     return out
 
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, Outcome, SolveError
-from ephs.solve.result.durable import settle
-from ephs.solve.result.record import Record, joined
+from ephs.solve.result.durable import sync_folder
+from ephs.solve.result.record import RunRecord, joined
 from ephs.solve.snapshot import Snapshot, parts
 
 FORMAT = 1
@@ -52,9 +52,9 @@ class Contents:
     """
 
     heading: Mapping[str, Any]
-    rows: Record | None
+    rows: RunRecord | None
     snapshot: Snapshot | None
-    certain: Record | None
+    certain: RunRecord | None
     end: int
     stats: Mapping[str, Any]
 
@@ -97,7 +97,7 @@ class Journal:
                 file.truncate(0)
                 written = Written(self.path, file, None)
                 written.append(json.dumps(said).encode())
-                settle(self.path.parent)
+                sync_folder(self.path.parent)
                 return written
             found = read_journal(self.path)
             _same(self.path, found.heading, said)
@@ -130,7 +130,7 @@ class Written:
         """Whether it is time for an entry."""
         return time.monotonic() - self._latest > EVERY
 
-    def write(self, rows: Record | None, snapshot: Snapshot | None, stats: Mapping[str, Any]) -> None:
+    def write(self, rows: RunRecord | None, snapshot: Snapshot | None, stats: Mapping[str, Any]) -> None:
         """Write an entry to the disk: new rows, the state of the run, its counts so far.
 
         Raises
@@ -177,7 +177,7 @@ def read_journal(path: str | os.PathLike[str]) -> Contents:
         The file is no journal.
     """
     file = Path(path)
-    rows: list[Record] = []
+    rows: list[RunRecord] = []
     heading: Any = None
     snapshot: Snapshot | None = None
     stats: Mapping[str, Any] = {"method": "none", "form": "paper", "steps": 0, "rejected": 0, "unknowns": 0}
@@ -193,7 +193,7 @@ def read_journal(path: str | os.PathLike[str]) -> Contents:
             entry = _decoded(payload)
             stats = entry["stats"]
             if entry["rows"] is not None:
-                rows.append(Record(**entry["rows"]))
+                rows.append(RunRecord(**entry["rows"]))
             if entry["snapshot"] is not None:
                 snapshot, certain, end = entry["snapshot"], len(rows), after
     except (ValueError, KeyError, TypeError, RecursionError) as error:  # with a valid checksum

@@ -24,7 +24,7 @@ LINEAR = frozenset({"constant_structure", "quadratic"})
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Entry:
+class LayoutEntry:
     """Entry of a primitive in the tables.
 
     Parameters
@@ -40,7 +40,7 @@ class Entry:
     counts: tuple[int, int, int, int, int]
 
 
-def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = True) -> Entry:
+def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = True) -> LayoutEntry:
     """The entry of a primitive; its kernel is compiled if necessary; of reversible primitives on request."""
     if reversible or not isinstance(primitive, Reversible):
         address, numbers, callback = address_of(primitive, reference)
@@ -55,10 +55,10 @@ def entry_of(primitive: Primitive, reference: Reference, *, reversible: bool = T
         STORING if isinstance(primitive, Storage) else kind,
         len(numbers), bundle.size, multipliers, len(primitive.reads),
     )  # fmt: skip
-    return Entry(primitive, address, np.array(numbers, dtype=float), callback, counts)
+    return LayoutEntry(primitive, address, np.array(numbers, dtype=float), callback, counts)
 
 
-def laid_out(t: Tables, primitive: Index, entries: Sequence[Entry], reference: Reference) -> Tables:
+def laid_out(t: Tables, primitive: Index, entries: Sequence[LayoutEntry], reference: Reference) -> Tables:
     """The tables with the layout of the matrix.
 
     Parameters
@@ -133,7 +133,7 @@ def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, 
     return out, j_at
 
 
-def _local_pattern(entry: Entry, reference: Reference) -> Array:
+def _local_pattern(entry: LayoutEntry, reference: Reference) -> Array:
     """Mask of the entries of a component's Jacobian that are not identically zero.
 
     Compiled kernels are analytic in their arguments, so what vanishes at three random points vanishes. Callbacks may
@@ -158,7 +158,7 @@ def _local_pattern(entry: Entry, reference: Reference) -> Array:
 _patterns: dict[Any, Array] = {}  # a cache: the pattern is a function of the key
 
 
-def _sample_pattern(entry: Entry, reference: Reference, shape: tuple[int, int]) -> Array:
+def _sample_pattern(entry: LayoutEntry, reference: Reference, shape: tuple[int, int]) -> Array:
     rng = np.random.default_rng(5)
     primitive, (_, _, n, k, _) = entry.primitive, entry.counts
     call = prototype(entry.address)

@@ -21,7 +21,7 @@ from ephs.solve.events import Event, Watch
 from ephs.solve.journal import Written
 from ephs.solve.march.control import Policy
 from ephs.solve.problem import Problem, States
-from ephs.solve.result.record import Record, Rows, record_of
+from ephs.solve.result.record import RowBlocks, RunRecord, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, too_fast
@@ -75,7 +75,7 @@ def integrate(
     begin = time.perf_counter()
     if not (np.isfinite(until) and until != t0):
         raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
-    run = _Run(
+    run = _RunLoop(
         problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal, bounds,
         breakpoints or Breakpoints(t0, until),
     )  # fmt: skip
@@ -87,7 +87,7 @@ def integrate(
     return run.solution()
 
 
-class _Run(Generic[S]):
+class _RunLoop(Generic[S]):
     """One run in progress."""
 
     state: S
@@ -122,7 +122,7 @@ class _Run(Generic[S]):
         self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
         self.blocks: list[Instants[S]] = []
         self.pending: list[Instant[S]] = []
-        self.kept = Rows()
+        self.kept = RowBlocks()
         self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
         self.watch = Watch((), t0, {})
         order, serves = (bounds.order, bounds.serves) if bounds else (1, serves_not)
@@ -331,7 +331,7 @@ class _Run(Generic[S]):
         )  # fmt: skip
         return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
 
-    def _ends(self) -> list[Record]:
+    def _ends(self) -> list[RunRecord]:
         """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
         with suppress(SolveError):  # a failed run may end where evaluation is impossible
             rows = [(self.t, self.stepper.row(self.state))] if self.first else []

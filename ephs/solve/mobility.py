@@ -29,7 +29,7 @@ SOUND = 1e-3
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Condition:
+class _EffortCondition:
     """Rows on the efforts of some junctions, 0 = Σ block · effort; ``size`` (k,) are the rows' norms."""
 
     blocks: Mapping[int, Array]
@@ -37,7 +37,7 @@ class _Condition:
 
 
 @final
-class _Solved:
+class _SolvedEfforts:
     """Efforts of junctions as linear functions of free ones."""
 
     def __init__(self) -> None:
@@ -86,20 +86,20 @@ def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()
 
 def _conditions(
     d: Descriptor, x: Array, prescribed: Collection[Path], number: Mapping[int, int], dims: Index
-) -> list[_Condition]:
+) -> list[_EffortCondition]:
     """All constraints on velocities, without zero rows."""
-    out: list[_Condition] = []
+    out: list[_EffortCondition] = []
     junction_of = {at + i: (junction, i) for at, junction in number.items() for i in range(int(dims[junction]))}
     for slot in d.outer:
         if slot.path in prescribed and slot.at in number:
             dim = int(dims[number[slot.at]])
-            out.append(_Condition({number[slot.at]: np.eye(dim)}, np.ones(dim)))
+            out.append(_EffortCondition({number[slot.at]: np.eye(dim)}, np.ones(dim)))
     for balance in rate_balances(d, x):
         blocks: dict[int, Array] = {}
         for effort, by in balance.items():
             junction, i = junction_of[effort]
             blocks.setdefault(junction, np.zeros((1, int(dims[junction]))))[0, i] = by
-        out.append(_Condition(blocks, np.linalg.norm(np.hstack(list(blocks.values())), axis=1)))
+        out.append(_EffortCondition(blocks, np.linalg.norm(np.hstack(list(blocks.values())), axis=1)))
     for slot in d.components:
         if not (slot.multipliers and isinstance(slot.primitive, Reversible)):
             continue
@@ -114,11 +114,11 @@ def _conditions(
         kept = np.abs(whole).max(axis=1, initial=0.0) > 0.0
         if kept.any():
             size = np.linalg.norm(whole[kept], axis=1)
-            out.append(_Condition({junction: block[kept] for junction, block in blocks.items()}, size))
+            out.append(_EffortCondition({junction: block[kept] for junction, block in blocks.items()}, size))
     return out
 
 
-def _without_leaves(conditions: list[_Condition]) -> list[_Condition]:
+def _without_leaves(conditions: list[_EffortCondition]) -> list[_EffortCondition]:
     """The conditions without those that determine an effort which no other has: these restrict nothing else.
 
     Such are the motions of two bodies relative to each other, where they may touch.
@@ -143,20 +143,20 @@ def _without_leaves(conditions: list[_Condition]) -> list[_Condition]:
     return [condition for i, condition in enumerate(conditions) if i not in gone]
 
 
-def _sound(condition: _Condition, junction: int) -> bool:
+def _sound(condition: _EffortCondition, junction: int) -> bool:
     """Whether the rows determine the effort of a junction."""
     block = condition.blocks[junction]
     rows, columns = block.shape
     return rows == columns and bool(singular_values(block / condition.size[:, None])[-1] >= SOUND)
 
 
-def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Condition]]:
+def _solve(conditions: list[_EffortCondition], dims: Index) -> tuple[_SolvedEfforts, list[_EffortCondition]]:
     """Propagate known efforts along the constraints; when stuck, declare an effort free.
 
     A condition serves when all its ports but those of one square block are known, or can be let free for it: conditions
     on one port first, then those that touch what is known.
     """
-    solved, used = _Solved(), set[int]()
+    solved, used = _SolvedEfforts(), set[int]()
     touching: dict[int, list[int]] = {}
     for i, condition in enumerate(conditions):
         for junction in condition.blocks:
@@ -180,7 +180,7 @@ def _solve(conditions: list[_Condition], dims: Index) -> tuple[_Solved, list[_Co
     return solved, [condition for i, condition in enumerate(conditions) if i not in used]
 
 
-def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
+def _use(condition: _EffortCondition, solved: _SolvedEfforts, dims: Index) -> list[int]:
     """The junctions that a condition determines, one by its rows and the others free; empty if unusable."""
     unknown = [junction for junction in condition.blocks if junction not in solved.given]
     for junction in unknown:
@@ -197,7 +197,7 @@ def _use(condition: _Condition, solved: _Solved, dims: Index) -> list[int]:
     return []
 
 
-def _rank_of_loops(left: list[_Condition], solved: _Solved, dims: Index) -> int:
+def _rank_of_loops(left: list[_EffortCondition], solved: _SolvedEfforts, dims: Index) -> int:
     """Rank of the loop-closing constraints in the free efforts."""
     written: list[tuple[Mapping[int, Array], Array]] = []
     sets = DisjointSets[int]()

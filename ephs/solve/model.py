@@ -361,14 +361,14 @@ def cancelled(model: Model, x: Array) -> tuple[Index, Index]:
     """
     t, d = model.tables, model.descriptor
 
-    def found() -> tuple[int, ...]:
+    def shared_ports() -> tuple[int, ...]:
         owner = np.repeat(np.arange(t.kind.size), t.dims[:, 0])
         efforts = t.e_index[: owner.size] + t.counts[1] * owner
         shared = np.setdiff1d(np.arange(owner.size), np.unique(efforts, return_index=True)[1])
         return tuple(np.unique(owner[shared]).tolist())
 
     entries, rows = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    for number in once(d, "components with ports that share a junction", found):
+    for number in once(d, "components with ports that share a junction", shared_ports):
         slot = d.components[number]
         if slot.multipliers and isinstance(slot.primitive, Reversible):
             _, constraint = slot.primitive.structure(d.point(slot, x))

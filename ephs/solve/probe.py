@@ -30,7 +30,7 @@ RESOLVED = 0.25
 
 @final
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ProbedInput:
     """A user's function as an input.
 
     Parameters
@@ -64,10 +64,10 @@ class Change:
 
 
 @dataclass(slots=True)
-class _Course:
+class _SignalCourse:
     """Course of one function: its last values, their rates of change in the last two intervals, the largest so far."""
 
-    asked: Asked
+    asked: ProbedInput
     values: list[float] = field(default_factory=list[float])
     last: list[float] = field(default_factory=list[float])
     before: list[float] = field(default_factory=list[float])
@@ -100,7 +100,7 @@ class _Course:
 
 
 @final
-class Probe:
+class SignalProbe:
     """The search along one run.
 
     Parameters
@@ -113,8 +113,8 @@ class Probe:
         Keeps times on one side of what is known to jump.
     """
 
-    def __init__(self, asked: Sequence[Asked], t0: float, until: float, within: Callable[[float], float]) -> None:
-        self._courses = [_Course(one) for one in asked]
+    def __init__(self, asked: Sequence[ProbedInput], t0: float, until: float, within: Callable[[float], float]) -> None:
+        self._courses = [_SignalCourse(one) for one in asked]
         self._sign, self._width, self._within = float(np.sign(until - t0)), WIDTH * abs(until - t0), within
         self._nearest = 4.0 * float(np.spacing(max(abs(t0), abs(until))))
         self._at, self._spacing = t0, 0.0
@@ -167,7 +167,7 @@ class Probe:
         return found
 
     def _located(
-        self, asked: Asked, first: list[float], last: list[float], when: float, h: float, state: State | None
+        self, asked: ProbedInput, first: list[float], last: list[float], when: float, h: float, state: State | None
     ) -> Change | None:
         """The change between the last point and a time, by bisection; None if steps of h seconds resolve it."""
         before, after, a, b = self._within(self._at), when, first, last

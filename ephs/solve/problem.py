@@ -16,9 +16,9 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.motion_law import MotionLaw
 
 if TYPE_CHECKING:
-    from ephs.solve.result.dataset import Variable
+    from ephs.solve.result.dataset import DatasetVariable
     from ephs.solve.result.labels import Labels
-    from ephs.solve.result.record import Record
+    from ephs.solve.result.record import RunRecord
     from ephs.solve.result.solution import Solution
 
 State = Mapping[Path, Array]
@@ -142,7 +142,7 @@ class Outlined(Linked, Protocol):
         ...
 
 
-class Motion(Linked, Protocol):
+class MechanicalMotion(Linked, Protocol):
     """A motion in terms of mechanics: the solver itself has only states, efforts and flows."""
 
     def thermal(self, name: str) -> Any:
@@ -191,7 +191,7 @@ class Motion(Linked, Protocol):
         """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
 
-    def variables(self, *, wrenches: bool) -> "dict[str, Variable]":
+    def variables(self, *, wrenches: bool) -> "dict[str, DatasetVariable]":
         """Additions to labelled arrays."""
         ...
 
@@ -248,13 +248,13 @@ class Problem:
     initial: State
     signals: Mapping[Path, Signal]
     reference: Reference
-    motion: Callable[["Solution"], Motion] | None = None
+    motion: Callable[["Solution"], MechanicalMotion] | None = None
     scene: Any = None
     document: Callable[[], str] = str
     constraints: Callable[[], Any] | None = None
     dependences: Callable[[], str] | None = None
     shaky: Callable[[], bool] | None = None
-    shown: "Callable[[Record, Mapping[str, Any]], tuple[Problem, Record, Mapping[str, Any]]] | None" = None
+    shown: "Callable[[RunRecord, Mapping[str, Any]], tuple[Problem, RunRecord, Mapping[str, Any]]] | None" = None
     gaps: Callable[["Solution"], Array] | None = None
     linked: Callable[["Solution"], Outlined] | None = None
     given: Callable[[State], State] | None = None

@@ -129,7 +129,7 @@ class Held:
         """
         t, of = self.samples[self.count], self.sampled
         try:
-            seen = view if not of.noise else _Measured(view, "", self._noise(view))
+            seen = view if not of.noise else _NoisyView(view, "", self._noise(view))
             if of.memory is None:
                 given = of.function(t, seen)
             else:
@@ -175,7 +175,7 @@ class Held:
 
 
 @final
-class _Measured:
+class _NoisyView:
     """A view with noise on some of its readings, by name: ``joints.waist.rate``."""
 
     def __init__(self, of: Any, at: str, noise: Mapping[str, Array]) -> None:
@@ -191,7 +191,7 @@ class _Measured:
         here = f"{self._at}.{name}" if self._at else name
         if here in self._noise:
             return value + self._noise[here]
-        return _Measured(value, here, self._noise) if any(k.startswith(here + ".") for k in self._noise) else value
+        return _NoisyView(value, here, self._noise) if any(k.startswith(here + ".") for k in self._noise) else value
 
 
 @final
@@ -236,7 +236,7 @@ def holding(inputs: Mapping[Any, Any], t0: float, until: float) -> tuple[dict[An
     """
     held: list[Held] = []
 
-    def of(name: str, value: Any) -> Any:
+    def sampled_at(name: str, value: Any) -> Any:
         if not isinstance(value, Sampled):
             return value
         held.append(Held(name, value, t0, until))
@@ -246,5 +246,7 @@ def holding(inputs: Mapping[Any, Any], t0: float, until: float) -> tuple[dict[An
     for key, value in inputs.items():
         name = ", ".join(key) if isinstance(key, tuple) else str(key)
         parts = isinstance(value, Mapping)
-        out[key] = {side: of(name, given) for side, given in value.items()} if parts else of(name, value)
+        out[key] = (
+            {side: sampled_at(name, given) for side, given in value.items()} if parts else sampled_at(name, value)
+        )
     return out, held

@@ -13,7 +13,7 @@ from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.solve.march.control import Policy
-    from ephs.solve.result.record import Record
+    from ephs.solve.result.record import RunRecord
 
 S = TypeVar("S")
 S_co = TypeVar("S_co", covariant=True)
@@ -239,7 +239,7 @@ class Stepper(Protocol[S]):
         """Record of a state."""
         ...
 
-    def record(self, taken: Instants[S]) -> "Record":
+    def record(self, taken: Instants[S]) -> "RunRecord":
         """Records of many instants."""
         ...
 

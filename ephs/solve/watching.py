@@ -9,7 +9,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.problem import Problem
 from ephs.solve.result.ledger import ledgers
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 
 Progress = Callable[[float, float, Mapping[str, Any]], None]
 """Called with the time, the end, and statistics so far."""
@@ -17,7 +17,7 @@ Progress = Callable[[float, float, Mapping[str, Any]], None]
 
 @final
 class Balance:
-    """The energy balance since a first row (states, energies, and the first four sums of a `Record`)."""
+    """The energy balance since a first row (states, energies, and the first four sums of a `RunRecord`)."""
 
     def __init__(self, problem: Problem, x: Array, energies: Array, sums: Array) -> None:
         self._problem = problem
@@ -27,7 +27,7 @@ class Balance:
     def error(self, x: Array, energies: Array, sums: Array) -> float:
         """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| so far."""
         rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
-        totals = ledgers(self._problem, Record(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
+        totals = ledgers(self._problem, RunRecord(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
         self._scale = max(self._scale, totals.scale)
         return float(totals.defect(mechanical=self._problem.mechanical)[-1]) * totals.scale / self._scale
 

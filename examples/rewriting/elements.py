@@ -10,7 +10,7 @@ from typing import final
 from ephs.operad.canonical import from_normal
 from ephs.operad.directory import Directory
 from ephs.operad.names import Path
-from ephs.operad.normal import NormalForm, PowerJunction, StateClass, powered
+from ephs.operad.normal import NormalForm, PowerJunction, SharedState, powered
 from ephs.operad.pattern import Pattern
 from ephs.operad.quantities import Quantity
 
@@ -87,7 +87,7 @@ class Elements:
             on[path].add(place)
         junctions = {path: PowerJunction(q, out, frozenset(on[path])) for path, (q, out) in self.junctions.items()}
         classes = frozenset(
-            StateClass(s.quantity, frozenset(s.members), frozenset(s.outer), frozenset(s.ports))
+            SharedState(s.quantity, frozenset(s.members), frozenset(s.outer), frozenset(s.ports))
             for s in self.states
             if s.outer or s.ports or len(s.members) > 1
         )

@@ -8,15 +8,15 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import ephs
-from ephs.exporting.environment import Environment, Environments, Task
+from ephs.exporting.environment import Environment, Environments, EnvironmentTask
 from tests.written import scene_of_text
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
-def task() -> Task:
-    return Task(
+def task() -> EnvironmentTask:
+    return EnvironmentTask(
         ephs.load(ROOT / "scenes/slider-crank.toml"),
         inputs=["joints.bearing"],
         outputs=["joints.bearing", "joints.cylinder"],
@@ -34,7 +34,7 @@ def test_gymnasium_finds_nothing_wrong(task, recwarn):
 
 def test_an_episode_is_a_run_of_the_package():
     scene = ephs.load(ROOT / "scenes/slider-crank.toml")
-    made = Task(scene, inputs=["joints.bearing"], reward=lambda *_: 0.0, rtol=1e-9, horizon=10)
+    made = EnvironmentTask(scene, inputs=["joints.bearing"], reward=lambda *_: 0.0, rtol=1e-9, horizon=10)
     env = Environment(made)
     env.reset(seed=1)
     for _ in range(10):
@@ -80,7 +80,7 @@ def test_parameters_are_drawn_anew_for_each_episode(task):
 def test_what_is_not_there_is_refused_by_name():
     scene = ephs.load(ROOT / "scenes/slider-crank.toml")
     with pytest.raises(ephs.ExportError, match=r"joints\.no"):
-        Task(scene, inputs=["joints.bearing"], outputs=["joints.no"], reward=lambda *_: 0.0)
+        EnvironmentTask(scene, inputs=["joints.bearing"], outputs=["joints.no"], reward=lambda *_: 0.0)
 
 
 def test_it_is_an_environment_of_gymnasium(task):
@@ -90,7 +90,7 @@ def test_it_is_an_environment_of_gymnasium(task):
 
 def test_actions_of_actuators_have_their_ranges():
     names = ["actuators.push", "actuators.free", "joints.h"]
-    found = Task(
+    found = EnvironmentTask(
         scene_of_text(
             'format = 1\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.h]\ntype = "revolute"\n'
             'bodies = ["ground", "arm"]\nat = [0.5, 0.0, 0.0]\naxis = [0.0, 1.0, 0.0]\n'

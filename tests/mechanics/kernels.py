@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.semantics import Reference, Storage
 from ephs.semantics.descriptor.kernel_table import OK, address_of, prototype
-from ephs.semantics.primitives.behaviour import Natural
+from ephs.semantics.primitives.behaviour import NaturalBehaviour
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 
 REFERENCE = Reference()
@@ -38,7 +38,7 @@ class Draw:
         """The oracle at z = (e, λ, v), or at v for a storage."""
         if isinstance(self.primitive, Storage):
             return self.primitive.discrete_effort(self.x, z, REFERENCE)
-        local = Natural(REFERENCE, self.h).behaviour(self.primitive, self.x)
+        local = NaturalBehaviour(REFERENCE, self.h).behaviour(self.primitive, self.x)
         rates = {p: v / self.h for p, v in self.steps(z[self.n + self.k :]).items()}
         return np.concatenate(local.relate(z[: self.n], z[self.n : self.n + self.k], rates))
 

@@ -17,7 +17,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.sensitivity.family import relation_of
 from ephs.mechanics.tree.engine.residuals import ACTIVE, point_program
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
 
 pytestmark = pytest.mark.optimised
@@ -35,7 +35,7 @@ ALIASES = {
 
 @cache
 def equations(name):
-    eq = Equations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
     return eq, eq.start(0.0)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.scene.own_units import NEAR, SI, Units, mobility_of
+from ephs.mechanics.scene.own_units import NEAR, SI, OwnUnits, mobility_of
 from ephs.mechanics.scene.rescaled import rescaled
 
 FOUR_BAR = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
@@ -72,8 +72,8 @@ def test_mobility_knows_no_unit(exponents):
 
 
 def test_near_metres_kilograms_and_seconds_runs_are_in_these():
-    assert Units.of(FOUR_BAR) == SI
-    assert Units.of(rescaled(FOUR_BAR, 2.0**-28)) == Units(2.0**-32, 1.0, 1.0)
+    assert OwnUnits.of(FOUR_BAR) == SI
+    assert OwnUnits.of(rescaled(FOUR_BAR, 2.0**-28)) == OwnUnits(2.0**-32, 1.0, 1.0)
 
 
 def test_what_users_give_and_see_is_in_their_units(tmp_path):

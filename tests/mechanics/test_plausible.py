@@ -8,7 +8,7 @@ import pytest
 import ephs
 from benchmarks.hard.case import WEIGHTLESS, read
 from benchmarks.hard.loops import stretched
-from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.plausible import doubts
 from ephs.mechanics.constraints.redundancy import dependences, explain
 from ephs.mechanics.runs.simulate import problem_of_system
@@ -55,13 +55,13 @@ def test_a_gear_that_repeats_others_is_named():
     twice = wheels(gear("g1", "ba", -1.0), gear("g2", "ba", -1.0))
     assert explain(twice) == "1 constraint equation depends on others: g2 repeats g1"
     assert doubts(twice) == () and explain(wheels(gear("g1", "ba", -1.0))) == ""
-    assert [(each.joint, each.on) for each in dependences(Mechanism.of(planets()))] == [
+    assert [(each.joint, each.on) for each in dependences(ConfiguredMechanism.of(planets()))] == [
         (f"outer{k}", ("inner0", "outer0", f"inner{k}")) for k in (1, 2)
     ]
     assert doubts(planets()) == ()
     found = dependences(problem_of_system(planets().system()).constraints())  # the same gears without a scene
     assert [str(each).replace("gears.", "") for each in found] == [
-        str(each) for each in dependences(Mechanism.of(planets()))
+        str(each) for each in dependences(ConfiguredMechanism.of(planets()))
     ]
 
 

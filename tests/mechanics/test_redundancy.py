@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 import ephs
-from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.redundancy import dependences, explain, indeterminate, wrenches_in_words
 from ephs.mechanics.runs.check import check_model
 from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
@@ -113,7 +113,7 @@ def outside(row, rows):
 
 def agrees(scene):
     """All that is said of a scene without prescribed motions, held against rows by hand."""
-    found = dependences(Mechanism.of(scene))
+    found = dependences(ConfiguredMechanism.of(scene))
     names = [name for name, _ in scene.all_joints()]
     rows = {name: rows_by_hand(scene, name) for name in names}
     total = np.vstack([np.zeros((0, 6 * len(dict(scene.all_bodies())))), *(rows[name][0] for name in names)])
@@ -139,7 +139,7 @@ def agrees_on_wrenches(scene):
     problem = problem_of_scene(scene)
     d = problem.descriptor
     now = instant(d, problem.reference, d.pack(problem.initial), problem.inputs(0.0, problem.initial))
-    for name, free in indeterminate(Mechanism.of(scene)).items():
+    for name, free in indeterminate(ConfiguredMechanism.of(scene)).items():
         at = component_path("joints", name)
         box = at / "second" / "hc" if scene.joint(name).middle is not None else at / "hc"
         assert np.array_equal(np.isnan(now.multiplier(box)), free), name
@@ -253,8 +253,8 @@ KNOWN = {
 def test_known_mechanisms_are_described(case, scene):
     text, expected = KNOWN[case]
     found = scene(text) if "\n" in text else ephs.load(ROOT / "scenes" / f"{text}.toml")
-    assert [str(each) for each in dependences(Mechanism.of(found))] == expected
-    assert sum(len(each.directions) for each in dependences(Mechanism.of(found))) == counted(found)
+    assert [str(each) for each in dependences(ConfiguredMechanism.of(found))] == expected
+    assert sum(len(each.directions) for each in dependences(ConfiguredMechanism.of(found))) == counted(found)
     if "motion" not in case:
         agrees(found)
     agrees_on_wrenches(found)
@@ -275,7 +275,7 @@ def test_a_row_of_windows_repeats_window_by_window(scene):
             text += body(f"rod{i}", i - 0.5, 1, 0)
             text += joint(f"left{i}", "revolute", f"crank{i - 1}", f"rod{i}", (i - 1, 1, 0))
             text += joint(f"right{i}", "revolute", f"rod{i}", f"crank{i}", (i, 1, 0))
-    found = dependences(Mechanism.of(scene(text)))
+    found = dependences(ConfiguredMechanism.of(scene(text)))
     assert [(each.joint, each.on) for each in found] == [
         (f"right{i}", (f"foot{i - 1}", f"foot{i}", f"left{i}")) for i in (1, 2, 3)
     ]
@@ -300,16 +300,16 @@ def test_texts_are_grouped_and_shortened(scene):
 
 def test_wrenches_are_told_apart(scene):
     found = scene(door(*hinges(2)) + body("bell", 0.4, 0, 0) + joint("hook", "spherical", "door", "bell", (0.4, 0, 1)))
-    assert wrenches_in_words(indeterminate(Mechanism.of(found))) == (
+    assert wrenches_in_words(indeterminate(ConfiguredMechanism.of(found))) == (
         "hinge_1 and hinge_2: force along x, y and z, moment about x and y indeterminate (joint axes); "
         "unique in the other joint"
     )
     sol = ephs.simulate(found, 0.01, step=0.01)
-    for name, free in indeterminate(Mechanism.of(found)).items():
+    for name, free in indeterminate(ConfiguredMechanism.of(found)).items():
         assert np.array_equal(np.isnan(sol.joint(name).wrench[0]), free)
     chain = ephs.load(ROOT / "scenes" / "chain.toml")
-    assert wrenches_in_words(indeterminate(Mechanism.of(chain))) == "unique in every joint"
-    assert wrenches_in_words(indeterminate(Mechanism.of(replace(chain, joints={})))) == "no joints"
+    assert wrenches_in_words(indeterminate(ConfiguredMechanism.of(chain))) == "unique in every joint"
+    assert wrenches_in_words(indeterminate(ConfiguredMechanism.of(replace(chain, joints={})))) == "no joints"
 
 
 def test_a_check_says_what_repeats_what(scene):
@@ -347,7 +347,7 @@ def test_a_joint_doubled_repeats_itself(scene):
     """A copy of any joint at the same place says nothing new, in all that it holds, however it lies in space."""
     name, of = list(scene.joints.items())[-1]
     twice = replace(scene, joints=scene.joints | {"copy": replace(of, name="copy")})
-    found = dependences(Mechanism.of(twice))
+    found = dependences(ConfiguredMechanism.of(twice))
     holds = 6 - of.dim
     assert [each.joint for each in found] == (["copy"] if holds else [])
     if found:
@@ -365,7 +365,7 @@ def test_a_system_repeats_what_its_scene_does(name):
     inputs = {
         str(port): {"effort" if signal.effort else "flow": signal.value} for port, signal in scene_inputs(scene).items()
     }
-    of, own = problem_of_system(scene.system(), None, inputs).constraints(), Mechanism.of(scene)
+    of, own = problem_of_system(scene.system(), None, inputs).constraints(), ConfiguredMechanism.of(scene)
     assert [str(each).replace("joints.", "") for each in dependences(of)] == [str(each) for each in dependences(own)]
     here, there = indeterminate(of), indeterminate(own)
     assert [joint.removeprefix("joints.") for joint in here] == list(there)

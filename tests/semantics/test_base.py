@@ -11,7 +11,7 @@ from ephs.mechanics.elements.components import gravity
 from ephs.operad import ROOT, Path, PatternError
 from ephs.semantics import AssemblyError, Reference, Relation, SemanticsError, System
 from ephs.semantics.meaning.step import solved as solve
-from ephs.semantics.primitives.behaviour import Natural
+from ephs.semantics.primitives.behaviour import NaturalBehaviour
 from ephs.semantics.spaces import SE3
 from ephs.semantics.systems.laws import random_probe, system_law
 
@@ -141,7 +141,7 @@ def test_a_state_that_an_outer_port_shows_has_its_value_from_there():
         == "one state has several values: state r.x = [1.]; port k = [2.]"
     )
     held = {"L.b": np.ones(1)}
-    solved = solve(system, held, Natural(Reference(), 1e-9), {}, {"k": 3.0})
+    solved = solve(system, held, NaturalBehaviour(Reference(), 1e-9), {}, {"k": 3.0})
     assert solved.rates[Path.of("C.q")] == pytest.approx(10.0)
 
 
@@ -178,12 +178,12 @@ def test_storages_of_one_state_move_together_over_a_step():
     parts = {"m": lib.point_mass(m=1.0), "x": lib.pkc(), "y": lib.pkc(), "s": SPRING, "t": SPRING}
     even, uneven = (coupled(parts | {"n": lib.point_mass(m=m)}) for m in (1.0, 2.0))
     state = {"s.q": 1.0, "m.p": 0.5, "n.p": 0.5}
-    solved = solve(even, state, Natural(Reference(), 0.01), {})
+    solved = solve(even, state, NaturalBehaviour(Reference(), 0.01), {})
     assert solved.residual <= 1e-12
     assert solved.rates[Path.of("s.q")] == pytest.approx(solved.rates[Path.of("t.q")], abs=1e-12)
     # the springs would part, and no force holds them together
-    assert solve(uneven, state, Natural(Reference(), 0.01), {}).residual > 1e-3
-    assert solve(even, state | {"t.q": 1.1}, Natural(Reference(), 0.01), {}).residual == np.inf
+    assert solve(uneven, state, NaturalBehaviour(Reference(), 0.01), {}).residual > 1e-3
+    assert solve(even, state | {"t.q": 1.1}, NaturalBehaviour(Reference(), 0.01), {}).residual == np.inf
 
 
 def test_a_relation_fills_a_box_beside_systems_and_primitives_in_any_order():

@@ -21,9 +21,9 @@ from ephs.operad.reading import Reader
 from ephs.semantics import Storage
 from ephs.semantics.derive.recording import record as recording
 from ephs.semantics.documents.catalogue import find_part, part_of
-from ephs.semantics.documents.primitives import AGREEMENT, _said
+from ephs.semantics.documents.primitives import AGREEMENT, _evaluations
 from ephs.semantics.documents.systems import SCHEMA_FILE
-from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, Written, record, recorded, term_from
+from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, WrittenFunction, record, recorded, term_from
 from ephs.testing import systems
 from tests.semantics.test_primitives import ARGUMENTS
 
@@ -95,7 +95,7 @@ def assert_same(one, two, tolerance=AGREEMENT):
     assert one == two and one.states == two.states
     parts = dict(two.leaves())
     for path, primitive in one.leaves():
-        for a, b in zip(_said(primitive, 7), _said(parts[path], 7), strict=True):
+        for a, b in zip(_evaluations(primitive, 7), _evaluations(parts[path], 7), strict=True):
             assert np.allclose(a, b, rtol=tolerance, atol=tolerance * np.abs(a).max(initial=0.0)), path
 
 
@@ -244,7 +244,7 @@ def test_domains_are_written_and_read_back(make):
     (found,) = System.from_json(text).fillings.values()
     assert found.domain == primitive.domain != ()
     assert System.from_json(text) == system
-    assert all(np.all(np.isfinite(part)) for seed in range(3) for part in _said(found, seed))
+    assert all(np.all(np.isfinite(part)) for seed in range(3) for part in _evaluations(found, seed))
     broken = text.replace("null", "1.0") if "null" in text else text.replace(str(found.domain[0][2]), '"x"')
     with pytest.raises((PatternError, SemanticsError), match="domain"):
         System.from_json(broken)
@@ -295,9 +295,9 @@ def test_every_operation_is_written_and_read(word):
     names = {"q": 1, "r": 2}
     term = term_from(Reader("system"), "here", [word, *inner], names)
     inputs = "q", ("entry", "r", 0), ("entry", "r", 1)
-    (again,) = recorded(recording(Written(term), {"q": None, "r": 2}), list(inputs))
+    (again,) = recorded(recording(WrittenFunction(term), {"q": None, "r": 2}), list(inputs))
     x = {"q": 0.3, "r": np.array([0.1, 0.7])}
-    assert Written(again)(**x) == pytest.approx(Written(term)(**x), rel=1e-14)
+    assert WrittenFunction(again)(**x) == pytest.approx(WrittenFunction(term)(**x), rel=1e-14)
     assert term_from(Reader("system"), "here", json.loads(json.dumps(record(again))), names) == again
 
 

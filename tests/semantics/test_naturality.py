@@ -12,7 +12,7 @@ from ephs import quantity as Q
 from ephs.operad import Path
 from ephs.semantics import Reference
 from ephs.semantics.meaning.step import solved as solve
-from ephs.semantics.primitives.behaviour import GRADIENTS, Natural
+from ephs.semantics.primitives.behaviour import GRADIENTS, NaturalBehaviour
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
 
@@ -35,7 +35,7 @@ START = np.array([1.0, 0.5])
 @given(system=systems(max_depth=2, max_junctions=2), seed=st.integers(0, 2**16))
 def test_flatten_then_discretise_is_discretise_then_compose(gradient, system, seed):
     probe = random_probe(system, seed)
-    behaviour = Natural(probe.reference, probe.h, GRADIENTS[gradient])
+    behaviour = NaturalBehaviour(probe.reference, probe.h, GRADIENTS[gradient])
     flat, nested = (solve(each, probe.state, behaviour, probe.inputs) for each in (system.flatten(), system))
     if max(flat.residual, nested.residual) > 1e-6:
         return  # a random state may contradict a constraint: then there is no step
@@ -62,7 +62,7 @@ def midpoint(f, x0, h):
 def composed(h, gradient):
     """One step of the parts, each discretised on its own."""
     state = {Path.of("pe.q"): START[:1], Path.of("ke.p"): START[1:], Path.of("env.s"): np.zeros(1)}
-    solved = solve(DUFFING, state, Natural(REFERENCE, h, GRADIENTS[gradient]), {})
+    solved = solve(DUFFING, state, NaturalBehaviour(REFERENCE, h, GRADIENTS[gradient]), {})
     return START + h * np.concatenate([solved.rates[Path.of("pe.q")], solved.rates[Path.of("ke.p")]])
 
 

@@ -9,7 +9,7 @@ from ephs.operad import Path, Pattern, PatternError, junction, quantity
 from ephs.semantics import Reference, SemanticsError, System, library
 from ephs.semantics.meaning import relation_of_pattern
 from ephs.semantics.meaning.fields import Rational
-from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.meaning.variables import RelationVariable
 
 Q = quantity
 
@@ -25,7 +25,7 @@ def test_naive_absorption_of_a_state_port_is_not_functorial():
     assert not ours.same(naive)
 
     def at(kind, box):
-        return Variable("inner", kind, Path.parse(box), Path.parse("p"), 0)
+        return RelationVariable("inner", kind, Path.parse(box), Path.parse("p"), 0)
 
     # nested: the lower balance and the upper balance, glued by the state alone
     sums = [{at("flow", one): 1, at("flow", other): 1} for one, other in (("low.a", "low.b"), ("c", "d"))]

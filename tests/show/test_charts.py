@@ -13,7 +13,7 @@ from ephs.cli import main
 from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import (
     FAMILIES,
-    Outcome,
+    ChartOutcome,
     Point,
     draw_work_precision,
     shipped_reference,
@@ -49,19 +49,19 @@ def spoilt(motion, value):
 @pytest.mark.parametrize(
     ("found", "outcome"),
     [
-        (swing(), Outcome.RIGHT),
-        (swing(phase=0.5 * RIGHT), Outcome.RIGHT),
-        (replace(swing(), totals=np.full((len(T), 2), 0.5 * RIGHT)), Outcome.RIGHT),
-        (replace(swing(), totals=np.full((len(T), 2), 2.0 * RIGHT)), Outcome.WRONG_BUT_BOUNDED),
-        (swing(phase=1.0), Outcome.WRONG_BUT_BOUNDED),
-        (swing(phase=1.0, drift=0.5 * ENERGY), Outcome.WRONG_BUT_BOUNDED),
-        (swing(phase=1.0, drift=2.0 * ENERGY), Outcome.ENERGY_DRIFT),
-        (swing(phase=1.0, drift=-2.0 * ENERGY), Outcome.DAMPED),
-        (swing(decay=0.3), Outcome.DAMPED),
-        (swing(amplitude=2.0 * BOUND), Outcome.DIVERGED),
-        (spoilt(swing(), np.nan), Outcome.DIVERGED),
-        (spoilt(swing(), np.inf), Outcome.DIVERGED),
-        (replace(swing(), turnover=1e6), Outcome.DIVERGED),
+        (swing(), ChartOutcome.RIGHT),
+        (swing(phase=0.5 * RIGHT), ChartOutcome.RIGHT),
+        (replace(swing(), totals=np.full((len(T), 2), 0.5 * RIGHT)), ChartOutcome.RIGHT),
+        (replace(swing(), totals=np.full((len(T), 2), 2.0 * RIGHT)), ChartOutcome.WRONG_BUT_BOUNDED),
+        (swing(phase=1.0), ChartOutcome.WRONG_BUT_BOUNDED),
+        (swing(phase=1.0, drift=0.5 * ENERGY), ChartOutcome.WRONG_BUT_BOUNDED),
+        (swing(phase=1.0, drift=2.0 * ENERGY), ChartOutcome.ENERGY_DRIFT),
+        (swing(phase=1.0, drift=-2.0 * ENERGY), ChartOutcome.DAMPED),
+        (swing(decay=0.3), ChartOutcome.DAMPED),
+        (swing(amplitude=2.0 * BOUND), ChartOutcome.DIVERGED),
+        (spoilt(swing(), np.nan), ChartOutcome.DIVERGED),
+        (spoilt(swing(), np.inf), ChartOutcome.DIVERGED),
+        (replace(swing(), turnover=1e6), ChartOutcome.DIVERGED),
     ],
 )
 def test_outcomes_are_told_apart(found, outcome):
@@ -72,8 +72,8 @@ def test_an_unmoved_body_is_judged_by_its_balance():
     rest = PosesInTime(
         T, np.zeros((101, 1, 3)), np.tile(np.eye(3), (101, 1, 1, 1)), np.zeros(101), np.zeros((101, 2)), 0.0
     )
-    assert judge(rest, rest) == (Outcome.RIGHT, 0.0)
-    assert judge(replace(rest, turnover=1.0), rest)[0] is Outcome.DIVERGED
+    assert judge(rest, rest) == (ChartOutcome.RIGHT, 0.0)
+    assert judge(replace(rest, turnover=1.0), rest)[0] is ChartOutcome.DIVERGED
 
 
 def test_the_horizon_is_the_last_good_time():
@@ -162,9 +162,9 @@ def test_failures_of_methods_are_cells():
     cells = stability(FAMILIES["half-turn"], ["natural", "rk87"], quick=True)
     assert {cell.value for cell in cells} == {0.5, 1.1}
     natural = {cell.value: cell for cell in cells if cell.method == "natural" and cell.setting.kind == "step"}
-    assert natural[1.1].outcome is not Outcome.RIGHT
+    assert natural[1.1].outcome is not ChartOutcome.RIGHT
     spun = stability(FAMILIES["spin"], ["natural"], quick=True)
-    refused = [cell for cell in spun if cell.outcome is Outcome.REFUSED]
+    refused = [cell for cell in spun if cell.outcome is ChartOutcome.REFUSED]
     assert refused
     assert all(cell.message for cell in refused)
     assert any("π" in cell.message for cell in refused)
@@ -175,7 +175,7 @@ def test_a_scene_of_ones_own_is_a_family_by_step():
     cells = stability(family, ["rk87"], quick=True)
     steps = [cell for cell in cells if cell.setting.kind == "step"]
     assert [cell.setting.value for cell in steps] == [cell.value for cell in steps] == [0.1 / 1000, 0.1 / 10]
-    assert steps[0].outcome is Outcome.RIGHT
+    assert steps[0].outcome is ChartOutcome.RIGHT
     assert steps[0].error < steps[1].error
 
 
@@ -235,7 +235,7 @@ def test_the_commands_write_their_folders(tmp_path, capsys):
             assert str(tmp_path / f"{name}.{ending}") in said
             assert (tmp_path / f"{name}.{ending}").is_file()
     cells = json.loads((tmp_path / "stability.json").read_text())
-    assert {cell["outcome"] for cell in cells} <= {outcome.value for outcome in Outcome}
+    assert {cell["outcome"] for cell in cells} <= {outcome.value for outcome in ChartOutcome}
     assert {cell["method"] for cell in cells} == {n for n, m in METHODS.items() if m.scenes}
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from ephs.mechanics.methods.registry import METHODS
-from ephs.show.charts import FAMILIES, SILENT, Outcome, stability
+from ephs.show.charts import FAMILIES, SILENT, ChartOutcome, stability
 from ephs.solve import ending
 from ephs.solve.auditing.findings import Audit
 
@@ -23,8 +23,8 @@ def test_every_run_is_right_or_refused_or_found_wrong(family):
     cells = judged(family)
     assert {cell.value for cell in cells} == {FAMILIES[family].values[0], FAMILIES[family].values[-1]}
     assert [(cell.value, cell.method, str(cell.setting), cell.error) for cell in cells if cell.outcome in SILENT] == []
-    assert all(cell.message for cell in cells if cell.outcome in {Outcome.REFUSED, Outcome.FLAGGED})
-    assert sum(cell.outcome is Outcome.RIGHT for cell in cells) > len(cells) // 3
+    assert all(cell.message for cell in cells if cell.outcome in {ChartOutcome.REFUSED, ChartOutcome.FLAGGED})
+    assert sum(cell.outcome is ChartOutcome.RIGHT for cell in cells) > len(cells) // 3
 
 
 def test_without_the_audit_some_are_wrong_in_silence(monkeypatch):

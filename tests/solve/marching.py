@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Vector, integer, kind_of, table, vector
-from ephs.solve.march import Account, Control, Ending, Memory, Motion, Tableau, march
+from ephs.solve.march import Ending, MarchControl, Memory, Motion, RunAccount, TableauRecord, march
 from ephs.solve.march.control import DAMPING, STRICT
 
 
@@ -72,11 +72,11 @@ class Field(Motion):
     def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
         """There are no sums."""
 
-    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+    def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:
         return 0
 
     def correct(
-        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
+        self, on: Evaluator, account: RunAccount, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
     ) -> Integer:
         account.moved, account.rest, account.size = 0.0, 0.0, 0.0
         return 0
@@ -100,9 +100,9 @@ def program(motion):
     def run(on, parameters, control, tableau, memory, account, steps):
         return march(on, motion(parameters, memory.y.size), tableau, memory, control[0], account[0], steps)
 
-    kinds = {"tableau": kind_of(Tableau), "memory": kind_of(Memory)}
-    kinds |= {"account": table(Account), "steps": integer()}
-    return Program("march", run=Entry(run, parameters=vector(), control=table(Control), **kinds))
+    kinds = {"tableau": kind_of(TableauRecord), "memory": kind_of(Memory)}
+    kinds |= {"account": table(RunAccount), "steps": integer()}
+    return Program("march", run=Entry(run, parameters=vector(), control=table(MarchControl), **kinds))
 
 
 def field(function):
@@ -146,7 +146,7 @@ def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, s
     """A march from y over ``until`` seconds, backward where it is negative."""
     found = tableau(method)
     size = len(y)
-    control = Control.table(1)
+    control = MarchControl.table(1)
     c = control[0]
     c.end, c.span, c.step, c.origin, c.grid = float(until), abs(float(until)), step, origin, grid
     c.least_step, c.most_step, c.before, c.limit = least_step, np.inf, 1e-4, limit
@@ -166,5 +166,5 @@ def start(call, method, y, until, *, parameters=(0.0,), rtol=1e-9, atol=1e-12, s
         "rows_y": np.zeros((rows, size - increments)),
         **{name: np.zeros(0) for name in ("carry", "carry1", "carry2", "change", "size", "whole", "low")},
     }  # fmt: skip
-    passed = np.array(parameters, dtype=float), control, found.arrays, arrays, Account.table(1)
+    passed = np.array(parameters, dtype=float), control, found.arrays, arrays, RunAccount.table(1)
     return March(control, arrays, lambda steps: call(*passed, steps))

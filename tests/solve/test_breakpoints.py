@@ -11,7 +11,7 @@ from benchmarks.hard.pushes import MASS, OMEGA, SPRING, TIMES, error, motion, pu
 from ephs.mechanics.methods.registry import METHODS
 from ephs.solve import probe
 from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.probe import WIDTH, Asked
+from ephs.solve.probe import WIDTH, ProbedInput
 from tests.mechanics.plain import uncorrected
 
 SCENE = sprung()
@@ -86,7 +86,7 @@ def test_a_steep_ramp_is_found_by_both_its_ends():
 @settings(max_examples=60, deadline=None)
 @given(st.floats(0.1, 300.0), st.floats(0.0, 6.3), st.floats(-5.0, 5.0), st.sampled_from([-1.0, 1.0]))
 def test_nothing_is_found_in_smooth_functions(rate, phase, mean, sign):
-    asked = Asked("wave", lambda t, _state: mean + np.sin(rate * t + phase), stateful=False)
+    asked = ProbedInput("wave", lambda t, _state: mean + np.sin(rate * t + phase), stateful=False)
     found = Breakpoints(0.0, sign, None, [asked])
     t, h = 0.0, min(0.1, 1.0 / rate)
     while abs(t) < 1.0:
@@ -98,7 +98,7 @@ def test_nothing_is_found_in_smooth_functions(rate, phase, mean, sign):
 @settings(max_examples=60, deadline=None)
 @given(st.floats(0.01, 0.99), st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 1e-3), st.sampled_from([-1.0, 1.0]))
 def test_any_jump_is_found_to_rounding(at, size, sign):
-    asked = Asked("edge", lambda t, _state: np.cos(t) + (size if abs(t) >= at else 0.0), stateful=False)
+    asked = ProbedInput("edge", lambda t, _state: np.cos(t) + (size if abs(t) >= at else 0.0), stateful=False)
     found = Breakpoints(0.0, sign, None, [asked])
     t = 0.0
     while abs(t) < at:

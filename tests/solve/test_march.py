@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import ephs
 from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
-from ephs.solve.march import STEPS, Control, Ending, Motion
+from ephs.solve.march import STEPS, Ending, MarchControl, Motion
 from ephs.solve.march.control import DAMPING, HELD, STRICT, UNFELT, Proportional, held_back, length
 from tests.solve.marching import Field, field, program, start
 
@@ -238,7 +238,7 @@ def test_steps_are_judged_by_proportional_integral_control(h, error, before, fai
         factor = 0.9 * max(shared, UNFELT) ** (-0.7 / power) * before ** (0.4 / power)
         factor = min(1.0 if failed else 6.0, max(0.3, factor))
     following = h * factor
-    control = Control.table(1)
+    control = MarchControl.table(1)
     c = control[0]
     c.span, c.step, c.exponent, c.share, c.damping, c.strict = 1.0, h, exponent, share, DAMPING, STRICT
     c.before, c.failed, c.most_step = before, int(failed), np.inf
@@ -256,8 +256,8 @@ def test_steps_are_judged_by_proportional_integral_control(h, error, before, fai
 JUDGE = STEPS.compiled()["judge"]
 CONTROL = Program(
     "control",
-    length=Entry(lambda on, control, rest: length(on, control[0], rest), control=table(Control), rest=real()),
-    held=Entry(lambda on, control: held_back(on, control[0]), control=table(Control)),
+    length=Entry(lambda on, control, rest: length(on, control[0], rest), control=table(MarchControl), rest=real()),
+    held=Entry(lambda on, control: held_back(on, control[0]), control=table(MarchControl)),
 ).compiled()
 
 
@@ -268,7 +268,7 @@ def test_a_step_is_not_wanted_longer_than_is_allowed_nor_shorter_than_the_least(
         ({"least_step": 0.5}, 0.1, 1.0, 0.1),  # what is accepted was long enough
         ({}, 0.05, 1e-6, 0.1),  # a step that was cut short does not lengthen the next ones
     ):
-        control = Control.table(1)
+        control = MarchControl.table(1)
         settings = {"span": 1.0, "strict": STRICT, "before": 1e-4, "exponent": 5.0, "most_step": np.inf}
         for name, value in (settings | {"step": 0.1} | bounds).items():
             setattr(control[0], name, value)
@@ -298,7 +298,7 @@ def test_stiffness_of_a_linear_equation_is_its_eigenvalue(h):
 
 
 def test_stability_has_to_hold_steps_back_many_times_and_is_forgiven_after_six():
-    control = Control.table(1)
+    control = MarchControl.table(1)
     c = control[0]
     c.limit, c.stiff = 3.0, 3.5
     assert [bool(CONTROL["held"](control)) for _ in range(HELD)] == [False] * (HELD - 1) + [True]
@@ -316,7 +316,7 @@ def test_stability_has_to_hold_steps_back_many_times_and_is_forgiven_after_six()
     ("step", "rest", "taken"), [(1.0, 3.0, 1.0), (1.0, 1.005, 0.5025), (1.0, 1.0 + 1e-8, 1.0 + 1e-8), (1.0, 0.4, 0.4)]
 )
 def test_the_last_steps_are_not_tiny(step, rest, taken):
-    control = Control.table(1)
+    control = MarchControl.table(1)
     control[0].step = step
     assert CONTROL["length"](control, rest) == taken
 

@@ -21,7 +21,7 @@ ALIGNED = 1e-6
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Axes:
+class NamedAxes:
     """Axes for texts: columns of a rotation (3, 3) to the world, and their name, "" for the world's."""
 
     rotation: Array
@@ -30,7 +30,7 @@ class Axes:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class NamedPoint:
     """A point (3,) in the world in m, and its name, "" for the joint's own origin."""
 
     point: Array
@@ -50,8 +50,8 @@ class Direction:
 
     moment: Array
     force: Array
-    axes: Axes
-    place: Place
+    axes: NamedAxes
+    place: NamedPoint
 
     @property
     def wrench(self) -> Array:
@@ -71,7 +71,7 @@ class Direction:
 
 
 def name_directions(
-    space: Array, axes: Sequence[Axes], places: Sequence[Place], length: float
+    space: Array, axes: Sequence[NamedAxes], places: Sequence[NamedPoint], length: float
 ) -> tuple[Direction, ...]:
     """A basis of a space of wrenches along axes, for messages.
 
@@ -107,12 +107,12 @@ def describe(directions: Iterable[Direction]) -> str:
     for (kind, at), members in groupby(found, key=lambda d: (d.kind, d.place.name if np.any(d.force) else "")):
         if kind == "coupled":
             phrases += [
-                f"translation along {_vector(d.force)} in step with rotation about {_vector(d.moment)}{_at(at)}"
+                f"translation along {_vector(d.force)} in step with rotation about {_vector(d.moment)}{_place_text(at)}"
                 for d in members
             ]
             continue
         vectors = [d.force if np.any(d.force) else d.moment for d in members]
-        phrases.append(f"{kind} {enumerated(map(_vector, vectors))}{_at(at)}")
+        phrases.append(f"{kind} {enumerated(map(_vector, vectors))}{_place_text(at)}")
     whose = next((d.axes.name for d in found if d.axes.name), "")
     return ", ".join(phrases) + (f" ({whose})" if whose else "")
 
@@ -123,7 +123,7 @@ def enumerated(words: Iterable[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def _at(place: str) -> str:
+def _place_text(place: str) -> str:
     return f" at {place}" if place else ""
 
 
@@ -161,7 +161,7 @@ def _null(matrix: Array) -> Array:
     return vt[int(np.sum(sigma > ALIGNED)) :].T
 
 
-def _sparse(space: Array, axes: Axes, place: Place, length: float) -> Iterable[Direction]:
+def _sparse(space: Array, axes: NamedAxes, place: NamedPoint, length: float) -> Iterable[Direction]:
     """Pure forces, then pure moments, then coupled directions."""
     forces, moments = _null(space[:3]), _null(space[3:])
     zero = np.zeros(3)
@@ -182,7 +182,7 @@ def _line(found: Direction, length: float) -> Direction:
         return found
     point = found.place.point + found.axes.rotation @ np.cross(found.force, found.moment)
     shown = ", ".join(f"{round(float(entry), 4) + 0.0:g}" for entry in point)
-    return replace(found, moment=np.zeros(3), place=Place(point, f"the point ({shown})"))
+    return replace(found, moment=np.zeros(3), place=NamedPoint(point, f"the point ({shown})"))
 
 
 def _echelon(vectors: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.scene.kinematics import Link, elements
+from ephs.mechanics.scene.kinematics import AssemblyJoint, elements
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.bundles.bundle import Array
@@ -75,7 +75,7 @@ class GearHold:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Mechanism:
+class ConfiguredMechanism:
     """A mechanism in one configuration.
 
     Parameters
@@ -93,7 +93,7 @@ class Mechanism:
     """
 
     joints: tuple[str, ...]
-    links: tuple[Link, ...]
+    links: tuple[AssemblyJoint, ...]
     poses: Array
     roots: Array
     joined: tuple[tuple[str, Mapping[str, float]], ...]
@@ -101,7 +101,7 @@ class Mechanism:
     length: float
 
     @staticmethod
-    def of(scene: Scene) -> "Mechanism":
+    def of(scene: Scene) -> "ConfiguredMechanism":
         """The mechanism of a scene."""
         now = Snapshot.of(scene)
         ratios = {
@@ -109,22 +109,26 @@ class Mechanism:
             for name, gear in scene.every("gears")
             if not gear.stiffness
         }
-        return Mechanism.between([name for name, _ in scene.all_joints()], now.links, now.poses, now.roots(), ratios)
+        return ConfiguredMechanism.between(
+            [name for name, _ in scene.all_joints()], now.links, now.poses, now.roots(), ratios
+        )
 
     @staticmethod
     def between(
         joints: Sequence[str],
-        links: Sequence[Link],
+        links: Sequence[AssemblyJoint],
         poses: Array,
         roots: Array,
         gears: Mapping[str, Mapping[str, float]],
-    ) -> "Mechanism":
+    ) -> "ConfiguredMechanism":
         """The mechanism of links between bodies in these poses."""
         ends = [link.second(poses)[4:] for link in links]
         points = np.array([*ends, *poses[:, 4:]]).reshape(-1, 3)
         centre = points.mean(axis=0) if len(points) else np.zeros(3)
         length = float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
-        return Mechanism(tuple(joints), tuple(links), poses, roots, tuple(gears.items()), centre, length or 1.0)
+        return ConfiguredMechanism(
+            tuple(joints), tuple(links), poses, roots, tuple(gears.items()), centre, length or 1.0
+        )
 
     def holds(self, poses: Array, *, motions: bool = True) -> list[Hold]:
         """Constraints of all joints in a configuration, then of the prescribed motions."""
@@ -148,7 +152,7 @@ class Mechanism:
             out.append(GearHold(name, chosen[0][0].body2, chosen[1][0].body2, row[None], rates))
         return out
 
-    def _unit(self, link: Link, x: Array) -> float:
+    def _unit(self, link: AssemblyJoint, x: Array) -> float:
         """Length of the twist of a single degree of freedom at the rate one."""
         basis = link.coupling.basis(x).copy()
         basis[3:] /= self.length
@@ -163,7 +167,7 @@ class Mechanism:
             pose[4:] += self.centre
         return out
 
-    def _hold(self, link: Link, poses: Array, x: Array, *, moved: bool = False) -> Hold:
+    def _hold(self, link: AssemblyJoint, poses: Array, x: Array, *, moved: bool = False) -> Hold:
         basis = link.coupling.basis(x).copy()
         basis[3:] /= self.length
         # a single degree of freedom moves: the wrench that does work on it alone is the degree of freedom itself

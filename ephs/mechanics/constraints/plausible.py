@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ephs.mechanics.constraints.directions import enumerated
-from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, SPANNED, rank_of
@@ -24,7 +24,7 @@ LARGEST = 60
 
 def doubts(scene: Scene) -> tuple[str, ...]:
     """Likely mistakes of a scene, a sentence each."""
-    return (*_files(scene), *_units(scene), *_held(scene))
+    return (*_files(scene), *_units(scene), *_motionless(scene))
 
 
 def _files(scene: Scene) -> Iterator[str]:
@@ -60,9 +60,9 @@ def _beyond(sizes: Mapping[str, float], least: float, most: float) -> Iterator[t
             yield order[-1], size, rest
 
 
-def _held(scene: Scene) -> Iterator[str]:
+def _motionless(scene: Scene) -> Iterator[str]:
     """Gears that hold joints still, and a mechanism that cannot move."""
-    of = Mechanism.of(scene)
+    of = ConfiguredMechanism.of(scene)
     links, gears = of.links, of.gears(of.poses)
     if len(of.poses) > LARGEST or not (gears or len(links) > len(of.poses)):
         return  # trees without gears can move
@@ -84,7 +84,7 @@ def _held(scene: Scene) -> Iterator[str]:
 
 def undetermined_bodies(scene: Scene) -> Iterator[str]:
     """Massless bodies that can move while all others rest, so that their motion is undetermined; a sentence each."""
-    of, bodies = Mechanism.of(scene), list(scene.all_bodies())
+    of, bodies = ConfiguredMechanism.of(scene), list(scene.all_bodies())
     if all(body.mass > 0.0 for _, body in bodies):
         return
     size = 6 * len(bodies)

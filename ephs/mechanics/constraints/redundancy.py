@@ -14,8 +14,15 @@ from typing import TypeVar, final
 
 import numpy as np
 
-from ephs.mechanics.constraints.directions import Axes, Direction, Place, describe, enumerated, name_directions
-from ephs.mechanics.constraints.holding import GearHold, Hold, Mechanism, redundant
+from ephs.mechanics.constraints.directions import (
+    Direction,
+    NamedAxes,
+    NamedPoint,
+    describe,
+    enumerated,
+    name_directions,
+)
+from ephs.mechanics.constraints.holding import ConfiguredMechanism, GearHold, Hold, redundant
 from ephs.mechanics.constraints.plausible import undetermined_bodies
 from ephs.mechanics.scene.adjust import close_loops
 from ephs.mechanics.scene.kinematics import Scale
@@ -78,7 +85,7 @@ class Dependence:
         return text + (f", {self.here} of these only in this configuration" if self.here else "")
 
 
-def dependences(of: Mechanism) -> tuple[Dependence, ...]:
+def dependences(of: ConfiguredMechanism) -> tuple[Dependence, ...]:
     """Redundancies in a configuration, joint by joint in their order, then gear by gear.
 
     The numbers of directions add up to the number of constraint equations that depend on others.
@@ -106,7 +113,7 @@ def dependences(of: Mechanism) -> tuple[Dependence, ...]:
 
 def explain(scene: Scene) -> str:
     """The scene's dependences and undetermined bodies, as advice for a run that failed; "" where there are none."""
-    return "; ".join(filter(None, [in_words(dependences(Mechanism.of(scene))), *undetermined_bodies(scene)]))
+    return "; ".join(filter(None, [in_words(dependences(ConfiguredMechanism.of(scene))), *undetermined_bodies(scene)]))
 
 
 def in_words(found: Sequence[Dependence]) -> str:
@@ -124,7 +131,7 @@ def in_words(found: Sequence[Dependence]) -> str:
     return f"{several} on others{axes}: {_listed(clauses)}"
 
 
-def indeterminate(of: Mechanism) -> dict[str, Array]:
+def indeterminate(of: ConfiguredMechanism) -> dict[str, Array]:
     """By joint, (6,) whether each component of its wrench (moment, force in the joint frame C2) is indeterminate.
 
     These are the components that `JointMotion.wrench` gives as NaN.
@@ -201,12 +208,12 @@ def _loop_lengths(before: Sequence[Hold | GearHold], hold: Hold | GearHold) -> l
     from_1, from_2 = (_distances(before, start) for start in (hold.body1, hold.body2))
     far = np.inf
 
-    def way(h: Hold | GearHold) -> float:
+    def loop_length(h: Hold | GearHold) -> float:
         return min(
             from_1.get(h.body1, far) + from_2.get(h.body2, far), from_1.get(h.body2, far) + from_2.get(h.body1, far)
         )
 
-    return [way(h) for h in before]
+    return [loop_length(h) for h in before]
 
 
 def _distances(holds: Sequence[Hold | GearHold], start: int) -> dict[int, float]:
@@ -224,7 +231,7 @@ def _distances(holds: Sequence[Hold | GearHold], start: int) -> dict[int, float]
     return out
 
 
-def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> list[Array] | None:
+def _nearby(of: ConfiguredMechanism, holds: Sequence[Hold], found: Sequence[Array]) -> list[Array] | None:
     """Of each hold, the redundant wrenches (6, r) in a configuration near by that has fewer in all; None without one.
 
     Of several neighbours, one with the fewest is generic. None is found where the mechanism cannot move, or where its
@@ -252,7 +259,7 @@ def _nearby(of: Mechanism, holds: Sequence[Hold], found: Sequence[Array]) -> lis
     return out
 
 
-def _apart(of: Mechanism, direction: Direction, space: Array) -> float:
+def _apart(of: ConfiguredMechanism, direction: Direction, space: Array) -> float:
     """The sine of the angle between a direction and a space of wrenches about the centre."""
     w = direction.wrench
     w = np.concatenate([(w[:3] - np.cross(of.centre, w[3:])) / of.length, w[3:]])
@@ -261,10 +268,10 @@ def _apart(of: Mechanism, direction: Direction, space: Array) -> float:
     return float(np.linalg.norm(w - basis @ (basis.T @ w)))
 
 
-def _named(of: Mechanism, hold: Hold, wrenches: Array, on: Sequence[Hold]) -> tuple[Direction, ...]:
-    places = [Place(of.centre + of.length * h.point, "" if h is hold else h.joint) for h in (hold, *on)]
+def _named(of: ConfiguredMechanism, hold: Hold, wrenches: Array, on: Sequence[Hold]) -> tuple[Direction, ...]:
+    places = [NamedPoint(of.centre + of.length * h.point, "" if h is hold else h.joint) for h in (hold, *on)]
     there = np.vstack([of.length * (wrenches[:3] - np.cross(hold.point, wrenches[3:].T).T), wrenches[3:]])
-    return name_directions(there, (Axes(np.eye(3)), Axes(hold.rotation, "joint axes")), places, of.length)
+    return name_directions(there, (NamedAxes(np.eye(3)), NamedAxes(hold.rotation, "joint axes")), places, of.length)
 
 
 def _components(free: Sequence[bool]) -> str:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.links import PlacedLinks
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, VelocityDerivatives
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import CUT, TREE
@@ -49,7 +49,7 @@ def constraints_of(linear: Linearised, q: Array, r: Array, s: Array) -> Constrai
     return Constraints(rows, target, gaps, (*driven, *cut, *map(str, eq.reduced.gears)), rank)
 
 
-def velocity_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array) -> VelocityDerivatives:
+def velocity_derivatives_of(linear: Linearised, links: PlacedLinks, q: Array, r: Array) -> VelocityDerivatives:
     """Those of rows, cut joints and bodies; see `VelocityDerivatives`."""
     rows, cut, twists = linear.turning(q, r)
     layout, n = linear.equations.layout, linear.equations.n
@@ -57,7 +57,7 @@ def velocity_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array
     return VelocityDerivatives(rows, joints, links.inside(twists))
 
 
-def state_derivatives_of(linear: Linearised, links: Links, q: Array, r: Array) -> dict[Path, tuple[Array, Array]]:
+def state_derivatives_of(linear: Linearised, links: PlacedLinks, q: Array, r: Array) -> dict[Path, tuple[Array, Array]]:
     """State of the system -> ((d, n), (d, n)) its change by the tree's elements at fixed rates, and by these.
 
     Of poses, momenta, relative poses of joints and springs; entropies and states of attachments are states themselves.

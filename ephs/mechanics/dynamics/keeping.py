@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.solve.sparse import Index
@@ -15,7 +15,7 @@ NEAR = 1e-9
 """Residual in m or rad, from which one more step ends at rounding."""
 
 
-def following(equations: Equations, state: ReducedState, placed: Index, turning: Index) -> ReducedState:
+def following(equations: ReducedEquations, state: ReducedState, placed: Index, turning: Index) -> ReducedState:
     """The state with other freedoms changed least so that loops and gears hold, positions by Newton's method.
 
     The given state is returned unchanged where loops and gears do not hold with these freedoms.
@@ -41,7 +41,7 @@ def following(equations: Equations, state: ReducedState, placed: Index, turning:
     return replace(state, q=q, r=_with_rates(equations, rows, state, turning) if turning.size else state.r)
 
 
-def _with_rates(equations: Equations, rows: Array, state: ReducedState, turning: Index) -> Array:
+def _with_rates(equations: ReducedEquations, rows: Array, state: ReducedState, turning: Index) -> Array:
     """(n,) rates on the rows, by the least change of those that are not given."""
     target = -rows @ state.r
     target[: equations.driven.size] += equations.prescribed.rates(state.t)

@@ -5,7 +5,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.motion.views import BodyState
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -14,10 +14,10 @@ from ephs.solve.problem import State as States
 
 
 @final
-class Links:
+class PlacedLinks:
     """The links of one mechanism at the poses set by `place`. It shares the equations' scratch memory."""
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: ReducedEquations) -> None:
         self.equations = equations
         self._residual = equations.dense.residual
         self._q, self._r = np.zeros(equations.reduced.coordinates), np.zeros(equations.n)

@@ -5,10 +5,10 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.links import PlacedLinks
 from ephs.mechanics.dynamics.results import Derivatives
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
 
@@ -23,7 +23,7 @@ class Loading:
         Part of the loads that acts: 1 after their ramps.
     """
 
-    def __init__(self, equations: Equations, links: Links) -> None:
+    def __init__(self, equations: ReducedEquations, links: PlacedLinks) -> None:
         self.share = 1.0
         self._equations, self._links = equations, links
         numbers = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.dynamics import differentiating
 from ephs.mechanics.dynamics.control import Task, computed_torque, task_of
 from ephs.mechanics.dynamics.keeping import following
-from ephs.mechanics.dynamics.links import Links
+from ephs.mechanics.dynamics.links import PlacedLinks
 from ephs.mechanics.dynamics.loading import Loading
 from ephs.mechanics.dynamics.placing import ByJoint, Placing
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies, VelocityDerivatives
@@ -20,7 +20,7 @@ from ephs.mechanics.dynamics.stepping import Steps
 from ephs.mechanics.motion.views import BodyState
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.following import has_stretches
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.operad import Path
@@ -57,12 +57,12 @@ class Dynamics:
     def __init__(self, problem: Problem) -> None:
         self.scene: Any = problem.scene
         self.problem, self.name = problem, problem.name
-        self._equations = Equations(problem, 0.0, pushed=True)
+        self._equations = ReducedEquations(problem, 0.0, pushed=True)
         if self._equations.prescribed.changing:
             raise OptionError("motion", "one that changes with time", "constant rates: dynamics have no time")
         self._linear = Linearised(self._equations)
         self.layout = self._equations.layout
-        self._links = Links(self._equations)
+        self._links = PlacedLinks(self._equations)
         self.weights = self._links.weights()
         self.loading = Loading(self._equations, self._links)
         self.placing, self._steps = Placing(self._equations), Steps(self.problem, self._equations)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics.state import State
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
@@ -30,7 +30,7 @@ class Placing:
         What ties rates of joints to each other.
     """
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: ReducedEquations) -> None:
         self.layout: Layout = equations.layout
         self.gears = tuple(map(str, equations.reduced.gears))
         self.free = self.layout.total == self.layout.n and not equations.driven.size and not self.gears

@@ -14,7 +14,7 @@ from ephs.mechanics.methods.registry import Setting, chosen
 from ephs.mechanics.runs.pushes import sum_of
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control, Tolerance
@@ -34,7 +34,7 @@ EXPLICIT = ("rk54", "rk87")
 class Steps:
     """Single steps of one mechanism under the present inputs."""
 
-    def __init__(self, problem: Problem, equations: Equations) -> None:
+    def __init__(self, problem: Problem, equations: ReducedEquations) -> None:
         self._problem, self._equations = problem, equations
 
     def step(

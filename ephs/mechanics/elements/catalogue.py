@@ -14,7 +14,7 @@ from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics import library
-from ephs.semantics.documents.catalogue import Part
+from ephs.semantics.documents.catalogue import LibraryPart
 from ephs.semantics.primitives.primitives import Primitive
 from ephs.semantics.spaces import Pair, pair
 
@@ -90,35 +90,35 @@ def _reservoir(ports: Interface, _numbers: Numbers) -> Primitive:
     return library.environment(**{str(port): kind.quantity for port, kind in ports.items()})
 
 
-PARTS: tuple[Part, ...] = (
-    Part("armature", "armature", lambda ports, n: armature(_port(ports, parity=-1)[1], n["inertia"])),
-    Part("beam_damper", "beam_damper", _beam_damper),
-    Part("beam_spring", "beam_spring", _beam_spring),
-    Part("beam_stretch", "beam_stretch", lambda _, n: beam.beam_stretch(n["length"], tuple(n["rest"]))),
-    Part("belt_spring", "spring", lambda ports, n: belt_spring(_port(ports, parity=1)[1], n["k"])),
-    Part("closing", "closing", _closing),
-    Part("frame_change", "frame_change", _frame_change),
-    Part("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
-    Part("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),
-    Part("holonomic", "holonomic", lambda ports, _: components.holonomic(_pair(ports, "q_r"))),
-    Part("joint_friction", "joint_friction", _friction),
-    Part("kinematic_coupling", "pkc", _coupling),
-    Part("kinetic", "kinetic", _kinetic),
-    Part("lie_poisson", "lie_poisson", lambda ports, _: components.lie_poisson(_group(ports))),
-    Part("no_potential", "no_potential", _no_potential),
-    Part("oil", "oil", lambda ports, n: oil(ports[Path.of("q")].quantity, n)),
-    Part("pair_spring", "pair_spring", _pair_spring),
-    Part("point_damper", "point_damper", lambda _, numbers: springs.point_damper(numbers["damping"])),
-    Part("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
-    Part("point_stretch", "point_stretch", lambda _ports, _numbers: springs.point_stretch()),
-    Part("reservoir", "environment", _reservoir),
-    Part("slack_spring", "slack_spring", lambda _, n: tension_spring(n["stiffness"], n["length"], slack=True)),
-    Part(
+PARTS: tuple[LibraryPart, ...] = (
+    LibraryPart("armature", "armature", lambda ports, n: armature(_port(ports, parity=-1)[1], n["inertia"])),
+    LibraryPart("beam_damper", "beam_damper", _beam_damper),
+    LibraryPart("beam_spring", "beam_spring", _beam_spring),
+    LibraryPart("beam_stretch", "beam_stretch", lambda _, n: beam.beam_stretch(n["length"], tuple(n["rest"]))),
+    LibraryPart("belt_spring", "spring", lambda ports, n: belt_spring(_port(ports, parity=1)[1], n["k"])),
+    LibraryPart("closing", "closing", _closing),
+    LibraryPart("frame_change", "frame_change", _frame_change),
+    LibraryPart("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
+    LibraryPart("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),
+    LibraryPart("holonomic", "holonomic", lambda ports, _: components.holonomic(_pair(ports, "q_r"))),
+    LibraryPart("joint_friction", "joint_friction", _friction),
+    LibraryPart("kinematic_coupling", "pkc", _coupling),
+    LibraryPart("kinetic", "kinetic", _kinetic),
+    LibraryPart("lie_poisson", "lie_poisson", lambda ports, _: components.lie_poisson(_group(ports))),
+    LibraryPart("no_potential", "no_potential", _no_potential),
+    LibraryPart("oil", "oil", lambda ports, n: oil(ports[Path.of("q")].quantity, n)),
+    LibraryPart("pair_spring", "pair_spring", _pair_spring),
+    LibraryPart("point_damper", "point_damper", lambda _, numbers: springs.point_damper(numbers["damping"])),
+    LibraryPart("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
+    LibraryPart("point_stretch", "point_stretch", lambda _ports, _numbers: springs.point_stretch()),
+    LibraryPart("reservoir", "environment", _reservoir),
+    LibraryPart("slack_spring", "slack_spring", lambda _, n: tension_spring(n["stiffness"], n["length"], slack=True)),
+    LibraryPart(
         "velocity_relation",
         "velocity_relation",
         lambda ports, _: components.holonomic(_pair(ports, "q_r"), on_group=False),
     ),
-    Part("tension_spring", "tension_spring", lambda _, n: tension_spring(n["stiffness"], n["length"])),
-    Part("thermal_node", "thermal_node", lambda _, n: components.thermal_node(n["capacity"], n["temperature"])),
-    Part("thermoelastic", "thermoelastic", _thermoelastic),
+    LibraryPart("tension_spring", "tension_spring", lambda _, n: tension_spring(n["stiffness"], n["length"])),
+    LibraryPart("thermal_node", "thermal_node", lambda _, n: components.thermal_node(n["capacity"], n["temperature"])),
+    LibraryPart("thermoelastic", "thermoelastic", _thermoelastic),
 )

@@ -17,7 +17,7 @@ from ephs.mechanics.elements.components import no_potential
 from ephs.mechanics.elements.joints import between_frames
 from ephs.mechanics.shapes.gap import Gap, cross, dot, ramp
 from ephs.mechanics.shapes.impact import Impact, Meeting
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.mechanics.shapes.selecting import Vector
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
@@ -34,7 +34,7 @@ Q_R = Path.of("q_r")
 UNITS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def contact(touches: Sequence[Touch], law: Law | Impact, *, heat: bool = False) -> System:
+def contact(touches: Sequence[Touch], law: ConstitutiveLaw | Impact, *, heat: bool = False) -> System:
     """Contact of two surfaces, at each of their points that can touch; ports p1, p2 carry the bodies' momenta.
 
     Parameters
@@ -59,7 +59,7 @@ def contact(touches: Sequence[Touch], law: Law | Impact, *, heat: bool = False) 
     return System.of(Pattern(junctions=junctions, boxes=boxes), points)
 
 
-def _parts(gap: Gap, law: Law | Impact) -> tuple[Storage, Irreversible]:
+def _parts(gap: Gap, law: ConstitutiveLaw | Impact) -> tuple[Storage, Irreversible]:
     if isinstance(law, Impact):
         return replace(no_potential(RELATIVE, "q_r"), name="wall"), impact(gap, law)
     return contact_energy(gap, law), contact_loss(gap, law)
@@ -70,7 +70,7 @@ def lever(direction: Vector, point: Vector) -> tuple[Any, ...]:
     return (*cross(point, direction), *direction)
 
 
-def losses(gap: Gap, law: Law, pose: Any, twist: Any) -> list[tuple[Any, tuple[Any, ...]]]:
+def losses(gap: Gap, law: ConstitutiveLaw, pose: Any, twist: Any) -> list[tuple[Any, tuple[Any, ...]]]:
     """Losses (d, w) of a contact at a relative pose and twist: wrenches −d ⟨w|u⟩ w on the second body.
 
     Parameters
@@ -94,7 +94,7 @@ def losses(gap: Gap, law: Law, pose: Any, twist: Any) -> list[tuple[Any, tuple[A
     return terms
 
 
-def contact_energy(gap: Gap, law: Law) -> Storage:
+def contact_energy(gap: Gap, law: ConstitutiveLaw) -> Storage:
     """Energy of the overlap of two surfaces, no number beyond the depth of its support; port q_r of the free pair."""
 
     def energy(q_r: Any) -> Any:
@@ -120,7 +120,7 @@ def contact_energy(gap: Gap, law: Law) -> Storage:
     )
 
 
-def contact_loss(gap: Gap, law: Law) -> Irreversible:
+def contact_loss(gap: Gap, law: ConstitutiveLaw) -> Irreversible:
     """Loss of a contact: μ(q_r, u_r) of Hunt and Crossley's force, slip, rolling and spinning; ports p_r, s, q_r."""
     ports = {
         "p_r": PortType(quantity.joint_momentum("free"), True),

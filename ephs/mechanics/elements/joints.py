@@ -11,7 +11,7 @@ from ephs.mechanics.elements.limit import limited_friction, limited_spring, stop
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.operad import Pattern, junction, quantity
 from ephs.semantics import library
 from ephs.semantics.bundles.bundle import Array
@@ -99,7 +99,7 @@ def joint(
     heat: bool = False,
     driven: bool = False,
     limits: "ArrayLike | None" = None,
-    stop: Law | Impact | None = None,
+    stop: ConstitutiveLaw | Impact | None = None,
     dry: Dry | None = None,
 ) -> System:
     """A joint between two bodies; its ports p1, p2 carry the bodies' momenta.
@@ -161,7 +161,7 @@ def joint(
         raise StructureError("parameter", "joint", key="limits", found=found, expected="limits, their law, and numbers")
     else:
         held = stops(of, limits)
-        spring = limited_spring(of, k, zero, held, stop) if isinstance(stop, Law) else spring
+        spring = limited_spring(of, k, zero, held, stop) if isinstance(stop, ConstitutiveLaw) else spring
         loss = limited_friction(of, mu, held, stop, dry)
     return _joint(of, _frame(frame1), _frame(frame2), spring, loss, heat, driven)
 

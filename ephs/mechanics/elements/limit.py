@@ -10,7 +10,7 @@ from ephs.mechanics.elements.components import coordinate_energy, joint_momentum
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.gap import ramp
 from ephs.mechanics.shapes.impact import Halt, Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.operad import Directory, PortType, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
@@ -45,7 +45,7 @@ def stops(of: Pair, limits: "ArrayLike") -> Stops:
     return tuple((side, bound) for side, bound in ((1.0, lower), (-1.0, upper)) if np.isfinite(bound))
 
 
-def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: Law) -> Storage:
+def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: ConstitutiveLaw) -> Storage:
     """½ k (coordinate − rest)² and the energy of the stops; port q_r."""
     numbers = {f"bound{i}": bound for i, (_, bound) in enumerate(stops)}
 
@@ -65,7 +65,9 @@ def limited_spring(of: Pair, stiffness: Array, rest: Array, stops: Stops, law: L
     )
 
 
-def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law | Impact, dry: Dry | None = None) -> Irreversible:
+def limited_friction(
+    of: Pair, mu: Array, stops: Stops, law: ConstitutiveLaw | Impact, dry: Dry | None = None
+) -> Irreversible:
     """Friction μ of a joint with one degree of freedom, dry friction, and the loss of its stops or their impulses;
     ports p_r, s, q_r."""
     ports = {
@@ -78,7 +80,7 @@ def limited_friction(of: Pair, mu: Array, stops: Stops, law: Law | Impact, dry: 
     def resistance(x: Any, u: Any, _theta: Any) -> Any:
         rate, at = u[0], x[q_r][0]
         lost: list[Any] = []
-        if isinstance(law, Law):
+        if isinstance(law, ConstitutiveLaw):
             lost = [law.normal(ramp(side * (bound - at)), side * rate)[1] for side, bound in stops]
         return [[sum(lost, float(mu[0, 0])) + (0.0 if dry is None else dry.resistance(rate))]]
 

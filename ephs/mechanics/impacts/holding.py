@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
@@ -45,7 +45,7 @@ class Holding:
     """
 
     def __init__(
-        self, equations: Equations, touching: Touching, state: ReducedState, h: float, held: Index, axes: Index,
+        self, equations: ReducedEquations, touching: Touching, state: ReducedState, h: float, held: Index, axes: Index,
         slips: Array, may: NDArray[np.bool_],
     ) -> None:  # fmt: skip
         self._eq, self._touching = equations, touching

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.impacts.mobility import answer
 from ephs.mechanics.impacts.touching import Touching
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
@@ -55,7 +55,7 @@ class Pressing:
 
 
 def forces_at(
-    equations: Equations, touching: Touching, state: ReducedState, accelerations: Array
+    equations: ReducedEquations, touching: Touching, state: ReducedState, accelerations: Array
 ) -> tuple[Array, Array]:
     """(points, 3) forces in N on second bodies in world axes, and (points, 3, m) those that balance each other.
 
@@ -69,7 +69,7 @@ def forces_at(
     return out, balanced
 
 
-def pressing_at(equations: Equations, touching: Touching, state: ReducedState, accelerations: Array) -> Pressing:
+def pressing_at(equations: ReducedEquations, touching: Touching, state: ReducedState, accelerations: Array) -> Pressing:
     """Forces of contacts at a state, whose links are placed; NaN where no forces were found.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.elements.contact import lever
 from ephs.mechanics.shapes.gap import Gap
 from ephs.mechanics.shapes.impact import Halt, Impact, Meeting
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.frames import GROUND
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.operad import Path
@@ -28,7 +28,7 @@ BENT = 1e-5
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
+class _ImpactPoint:
     """Bodies of both frames, their offsets, the gap, and the process for the heat."""
 
     bodies: tuple[int, int]
@@ -65,11 +65,11 @@ class Touching:
         (points + stops,) places of their processes among those that make entropy.
     """
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: ReducedEquations) -> None:
         self._eq = equations
         reduced, t = equations.reduced, equations.reduced.tables
         components = equations.model.descriptor.components
-        self._points: list[_Point] = []
+        self._points: list[_ImpactPoint] = []
         self._stops: list[_Stop] = []
         self._cut = False
         for i, edge in enumerate(reduced.edges):
@@ -79,7 +79,7 @@ class Touching:
             law = slot.primitive.impulse if isinstance(slot.primitive, Irreversible) else None
             ends, offsets = (int(t.first[i]), int(t.second[i])), (edge.offset1, edge.offset2)
             if isinstance(law, Meeting):
-                self._points.append(_Point(ends, offsets, law.gap, law.law, slot.path))
+                self._points.append(_ImpactPoint(ends, offsets, law.gap, law.law, slot.path))
             elif isinstance(law, Halt):
                 self._cut = self._cut or t.kind[i] == CUT
                 place, along = int(t.q_at[i]), t.left[i, 0]

@@ -17,9 +17,9 @@ from ephs.mechanics.imports.mjcf_actuators import actuators, tendons
 from ephs.mechanics.imports.mjcf_contacts import contacts, rate_and_ratio
 from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Compiled, disabled
 from ephs.mechanics.imports.mjcf_links import Thread, loops, screws
-from ephs.mechanics.imports.mjcf_names import Names, noted
+from ephs.mechanics.imports.mjcf_names import MjcfNames, noted
 from ephs.mechanics.imports.mjcf_shapes import shapes
-from ephs.mechanics.imports.mjcf_source import Source
+from ephs.mechanics.imports.mjcf_source import MjcfSource
 from ephs.mechanics.scene.errors import fault
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.semantics.bundles.bundle import Array
@@ -61,7 +61,7 @@ class GivenInertia:
 
 def read_mjcf(root: Any, draft: Draft) -> None:
     """The bodies and joints of a model; several joints of a body get frames without mass between them."""
-    source = Source(root, draft)
+    source = MjcfSource(root, draft)
     if draft.faults:
         return
     try:
@@ -94,7 +94,7 @@ def read_mjcf(root: Any, draft: Draft) -> None:
         return
     for text in said:
         draft.leave("what MuJoCo warns of", " ".join(text.split()))
-    names = Names(model)
+    names = MjcfNames(model)
     draft.gravity = [0.0, 0.0, 0.0] if disabled(model, "GRAVITY") else list(model.opt.gravity)
     threads = screws(model, names)
     model.pass_by("bodies", 0)
@@ -176,14 +176,14 @@ def _tensor(entries: Any) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _body(model: Compiled, b: int, own: Mapping[int, GivenInertia], names: Names, draft: Draft) -> None:
+def _body(model: Compiled, b: int, own: Mapping[int, GivenInertia], names: MjcfNames, draft: Draft) -> None:
     principal = pose(rotation=model.body_iquat[b])[:4]
     given = own.get(b, GivenInertia(float(model.body_mass[b]), np.diag(model.body_inertia[b]), in_body=False))
     tensor = given.tensor if given.in_body else turned_tensor(principal, given.tensor)
     draft.body(names.bodies[b], given.mass, tensor, model.body_ipos[b])
 
 
-def _joints(model: Compiled, b: int, names: Names, threads: Mapping[int, Thread], draft: Draft) -> None:
+def _joints(model: Compiled, b: int, names: MjcfNames, threads: Mapping[int, Thread], draft: Draft) -> None:
     """The chain from a body's parent to it."""
     body, before = names.bodies[b], names.bodies[int(model.body_parentid[b])]
     at = pose(model.body_pos[b], model.body_quat[b])
@@ -222,7 +222,7 @@ def _joints(model: Compiled, b: int, names: Names, threads: Mapping[int, Thread]
         before, at = after, pose()
 
 
-def _stops(model: Compiled, j: int, names: Names, draft: Draft, *, of_screw: bool) -> None:
+def _stops(model: Compiled, j: int, names: MjcfNames, draft: Draft, *, of_screw: bool) -> None:
     """Limits of a joint; their stiffness is the inertia that it moves by MuJoCo's stiffness per inertia."""
     limits, name = np.array(model.jnt_range[j]), names.joints[j]
     off = not bool(model.jnt_limited[j]) or disabled(model, "LIMIT", "CONSTRAINT")

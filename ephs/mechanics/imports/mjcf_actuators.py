@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
 from ephs.mechanics.imports.mjcf_keys import SOFT_DRY, SOFT_STOPS, Compiled, disabled
-from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_names import MjcfNames
 from ephs.mechanics.imports.mjcf_routes import Route, route_of
 
 GROUPS = 31
@@ -29,7 +29,7 @@ class Line:
     length: float
 
 
-def tendons(model: Compiled, names: Names, draft: Draft) -> dict[int, str]:
+def tendons(model: Compiled, names: MjcfNames, draft: Draft) -> dict[int, str]:
     """Springs and dampers of fixed tendons, and of those from site to site; number -> name of the scene's tendons."""
     found: dict[int, str] = {}
     for t in range(model.ntendon):
@@ -59,7 +59,7 @@ def tendons(model: Compiled, names: Names, draft: Draft) -> dict[int, str]:
     return found
 
 
-def actuators(model: Compiled, names: Names, ropes: dict[int, str], draft: Draft) -> None:
+def actuators(model: Compiled, names: MjcfNames, ropes: dict[int, str], draft: Draft) -> None:
     """Actuators on joints with one degree of freedom and on tendons; ``ropes``: number -> name of the scene's tendons,
     to which those are added that are needed.
     """
@@ -138,7 +138,7 @@ def _of_tendon(model: Any, t: int) -> Line | None:
 
 
 def _pull(
-    name: str, line: Line | None, stiffness: float, rest: float, damping: float, names: Names, draft: Draft
+    name: str, line: Line | None, stiffness: float, rest: float, damping: float, names: MjcfNames, draft: Draft
 ) -> bool:
     """A spring and a damper along a length; whether the scene has them."""
     if line is None or not all(draft.knows(names.joints[j]) for j in line.joints):

@@ -17,7 +17,7 @@ import numpy as np
 from ephs.mechanics.imports.collisions import LOSS, MOST_FACETS, NO_CORNERS, SINKING, SLIP, hull, many, too_fine
 from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_keys import Compiled, disabled
-from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_names import MjcfNames
 from ephs.mechanics.scene.schema_numbers import LARGEST
 from ephs.mechanics.shapes.pairs import PAIRS
 from ephs.semantics.bundles.bundle import Array
@@ -35,7 +35,7 @@ class Parameters:
     condim: int
 
 
-def contacts(model: Compiled, names: Names, draft: Draft) -> None:
+def contacts(model: Compiled, names: MjcfNames, draft: Draft) -> None:
     """Surfaces and contacts of a model, or a note of its contacts."""
     pairs = {} if disabled(model, "CONTACT", "CONSTRAINT") else _pairs(model, names, draft)
     if not draft.contact:
@@ -83,7 +83,7 @@ def contacts(model: Compiled, names: Names, draft: Draft) -> None:
         draft.leave("options", "override")
 
 
-def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Draft) -> tuple[str, Array]:
+def _surface(model: Any, g: int, shape: tuple[str, Any], names: MjcfNames, draft: Draft) -> tuple[str, Array]:
     """The name of a geom's surface, and its corners (n, 3) if it is a mesh."""
     place = pose(model.geom_pos[g], model.geom_quat[g])
     body, name = names.bodies[int(model.geom_bodyid[g])], _named(model, names, g)
@@ -92,7 +92,7 @@ def _surface(model: Any, g: int, shape: tuple[str, Any], names: Names, draft: Dr
     return draft.surface(body, name, *shape, place), NO_CORNERS
 
 
-def _pairs(model: Any, names: Names, draft: Draft) -> dict[tuple[int, int], Parameters]:
+def _pairs(model: Any, names: MjcfNames, draft: Draft) -> dict[tuple[int, int], Parameters]:
     """Pairs of geoms with their parameters; those that the model names replace what is found."""
     found: dict[tuple[int, int], Parameters] = {}
     for p in range(model.npair):
@@ -164,7 +164,7 @@ def _shape(model: Any, g: int) -> tuple[str, Any] | None:
             return None
 
 
-def _named(model: Any, names: Names, g: int) -> str:
+def _named(model: Any, names: MjcfNames, g: int) -> str:
     body = names.bodies[int(model.geom_bodyid[g])] or "world"
     return str(model.geom(g).name) or f"{body}_{g - int(model.body_geomadr[int(model.geom_bodyid[g])])}"
 

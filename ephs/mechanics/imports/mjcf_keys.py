@@ -102,7 +102,7 @@ class Compiled:
             for number in np.ravel(numbers if at is None else at[numbers]).tolist():
                 self._seen.update((kind, number, word) for word in found)
 
-        return _Rows(value, note)
+        return _KeyedRows(value, note)
 
     def pass_by(self, kind: str, number: int, *words: str) -> None:
         """Let attributes of an element be, or all of it: they have no effect, or a note of their own."""
@@ -124,7 +124,7 @@ class Compiled:
 
 
 @final
-class _Rows:
+class _KeyedRows:
     """An array that tells which rows are read, and which column where it is one."""
 
     def __init__(self, values: Any, note: Callable[[Any, Any], None]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, pose
 from ephs.mechanics.imports.mjcf_keys import TORQUE_SCALE, disabled
-from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_names import MjcfNames
 
 ROUNDED_COSINE = 1e-12
 """Tolerance of the cosine between equal axes: unit vectors round by less."""
@@ -29,7 +29,7 @@ class Thread:
     equality: int
 
 
-def screws(model: Any, names: Names) -> dict[int, Thread]:
+def screws(model: Any, names: MjcfNames) -> dict[int, Thread]:
     """The screws of a model, by the number of the first of their two joints."""
     mujoco: Any = import_module("mujoco")
     found: dict[int, Thread] = {}
@@ -50,7 +50,7 @@ def screws(model: Any, names: Names) -> dict[int, Thread]:
     return found
 
 
-def loops(model: Any, names: Names, screwed: Set[int], draft: Draft) -> None:
+def loops(model: Any, names: MjcfNames, screwed: Set[int], draft: Draft) -> None:
     """A spherical joint for a ``connect``, a fixed one for a ``weld``; a joint that is held at a value gets the rate 0,
     one that follows another in a constant ratio a gear.
 
@@ -98,6 +98,6 @@ def _active(model: Any, e: int) -> bool:
     return bool(model.eq_active0[e]) and not disabled(model, "EQUALITY", "CONSTRAINT")
 
 
-def _in_ratio(names: Names, joints: tuple[int, int], data: Any) -> bool:
+def _in_ratio(names: MjcfNames, joints: tuple[int, int], data: Any) -> bool:
     """Whether the coordinates of two joints with one degree of freedom are in a constant ratio."""
     return not np.any(data[[0, 2, 3, 4]]) and all(names.kinds[j] in ("revolute", "prismatic") for j in joints)

@@ -10,7 +10,7 @@ KINDS = ("free", "spherical", "prismatic", "revolute")
 
 
 @final
-class Names:
+class MjcfNames:
     """Names of bodies and joints by their numbers, and the joints' kinds."""
 
     def __init__(self, model: Any) -> None:
@@ -29,7 +29,7 @@ class Names:
         return _made("", f"{self.bodies[body]}_after_{self.joints[joint]}", self._taken)
 
 
-def noted(model: Any, names: Names, draft: Draft) -> None:
+def noted(model: Any, names: MjcfNames, draft: Draft) -> None:
     """Record elements of the compiled model without a counterpart."""
 
     def dofs(values: Any) -> list[str]:

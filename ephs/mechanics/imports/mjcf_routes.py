@@ -11,7 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft
-from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_names import MjcfNames
 from ephs.semantics.bundles.bundle import Array
 
 MEETING = 1e-9
@@ -40,7 +40,7 @@ class Route:
         stiffness: float,
         rest: float,
         damping: float,
-        names: Names,
+        names: MjcfNames,
         draft: Draft,
         *,
         slack: bool = False,
@@ -63,7 +63,7 @@ class Route:
             c = 0.0
         return self.tendon(name, names, draft, stiffness=k, length=length, damping=c, slack=slack)
 
-    def tendon(self, name: str, names: Names, draft: Draft, **numbers: Any) -> str:
+    def tendon(self, name: str, names: MjcfNames, draft: Draft, **numbers: Any) -> str:
         """A tendon of the scene along this route; its name there."""
         return draft.tendon(name, [names.bodies[body] for body in self.bodies], self.points, **numbers)
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.imports.draft import Draft, pose
-from ephs.mechanics.imports.mjcf_source import Source
+from ephs.mechanics.imports.mjcf_source import MjcfSource
 from ephs.semantics.spaces import SE3
 
 
-def shapes(model: Any, b: int, body: str, source: Source, draft: Draft) -> None:
+def shapes(model: Any, b: int, body: str, source: MjcfSource, draft: Draft) -> None:
     """The geoms of a body; a capsule is a cylinder with two balls, an ellipsoid the box in it."""
     kinds: Any = import_module("mujoco").mjtGeom
     first = int(model.body_geomadr[b])
@@ -35,7 +35,7 @@ def shapes(model: Any, b: int, body: str, source: Source, draft: Draft) -> None:
                 draft.leave("shapes", f"{kinds(int(model.geom_type[g])).name} of {body}")
 
 
-def _mesh(model: Any, m: int, body: str, place: np.ndarray, source: Source, draft: Draft) -> None:
+def _mesh(model: Any, m: int, body: str, place: np.ndarray, source: MjcfSource, draft: Draft) -> None:
     """A mesh; MuJoCo has moved its points to their centre and principal axes."""
     start = int(model.mesh_pathadr[m])
     name = b"" if start < 0 else bytes(model.paths[start:]).partition(b"\0")[0]

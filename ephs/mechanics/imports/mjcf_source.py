@@ -56,7 +56,7 @@ _MOST_PARAMETER = 100.0
 
 
 @final
-class Source:
+class MjcfSource:
     """An MJCF prepared for MuJoCo.
 
     Attributes
@@ -71,7 +71,9 @@ class Source:
         Number of its elements, with all copies.
     """
 
-    def __init__(self, root: Element, draft: Draft, above: "Source | None" = None, file: Path | None = None) -> None:
+    def __init__(
+        self, root: Element, draft: Draft, above: "MjcfSource | None" = None, file: Path | None = None
+    ) -> None:
         self._draft = draft
         self._read: set[Path] = set()
         self._above: tuple[Path, ...] = () if above is None or file is None else (*above._above, file)
@@ -112,7 +114,7 @@ class Source:
             if inner.tag != "mujoco":
                 faults.append(fault("root element", key, f"<{inner.tag}>", known="<mujoco>"))
                 continue
-            source = Source(inner, self._draft, self, file)
+            source = MjcfSource(inner, self._draft, self, file)
             own = model.get("name") or inner.get("model") or file.stem
             model.set("name", own)
             model.set("file", f"{len(self.models)}.xml")

@@ -32,13 +32,13 @@ def read_tree(path: Path, faults: list[Fault], key: str = "") -> Element | None:
     text = _LEFT_OUT.sub(_blank, text)
     if declared := _DECLARATION.search(text):
         line = text.count("\n", 0, declared.start()) + 1
-        faults.append(fault("entities", _at(key, f"line {line}"), f"<!{declared[1]}"))
+        faults.append(fault("entities", _key_place(key, f"line {line}"), f"<!{declared[1]}"))
         return None
     try:
         root = _parsed(text)
     except expat.ExpatError as error:
         place = f"line {error.lineno}, column {error.offset + 1}"
-        faults.append(fault("xml", _at(key, place), expat.ErrorString(error.code)))
+        faults.append(fault("xml", _key_place(key, place), expat.ErrorString(error.code)))
         return None
     if _too_deep(root):
         faults.append(fault("deep", key, f"elements nested deeper than {MOST_LEVELS} levels", most=MOST_LEVELS))
@@ -107,7 +107,7 @@ def _counted(count: int) -> str:
     return "a finite number" if count == 1 else f"{count} finite numbers"
 
 
-def _at(key: str, place: str) -> str:
+def _key_place(key: str, place: str) -> str:
     return f"{key}, {place}" if key else place
 
 

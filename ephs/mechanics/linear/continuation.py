@@ -57,7 +57,7 @@ class StaticPath:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Balance:
+class _ForceBalance:
     """Forces at a configuration on its independent degrees of freedom, (k,), what they change by, and what the loads
     add; ``values`` are the eigenvalues of the scaled stiffness.
     """
@@ -106,7 +106,7 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
         met = [_critical(model, here, share, ahead, trial, metric, there, k) for k in _between(here, there)]
         critical += _distinct(critical, [x for x in met if x <= until * (1.0 + SAME)])
         if reached > until:
-            last = _held(model, there.state, until)
+            last = _equilibrium_at(model, there.state, until)
             if last is None:
                 step = 0.5 * trial
                 if step < SHORTEST:
@@ -118,7 +118,7 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
         points.append(here.state)
         unstable.append(here.unstable)
         if abs(share - until) <= SAME * until:
-            last = _held(model, here.state, until)
+            last = _equilibrium_at(model, here.state, until)
             points[-1] = here.state if last is None else last.state
             shares[-1] = until
             return StaticPath(np.array(shares), tuple(points), np.array(unstable), tuple(critical))
@@ -139,7 +139,7 @@ def _metric(model: Dynamics, length: float) -> Array:
     return weights
 
 
-def _balance(model: Dynamics, state: State, share: float) -> _Balance:
+def _balance(model: Dynamics, state: State, share: float) -> _ForceBalance:
     """Forces at rest: of accelerations, so that loops and prescribed joints are reckoned with."""
     zero = np.zeros(model.layout.n)
     model.loading.share = 0.0
@@ -154,7 +154,7 @@ def _balance(model: Dynamics, state: State, share: float) -> _Balance:
     load = mass @ (full - bare)[free.which]
     force = mass @ bare[free.which] + share * load
     stiffness = -mass @ (by.acceleration_q @ Z)[free.which]
-    return _Balance(state, force, stiffness, load, Z, _eigenvalues(stiffness))
+    return _ForceBalance(state, force, stiffness, load, Z, _eigenvalues(stiffness))
 
 
 def _eigenvalues(stiffness: Array) -> Array:
@@ -168,7 +168,7 @@ def _eigenvalues(stiffness: Array) -> Array:
     return np.sort(values) + FLAT
 
 
-def _tangent(here: _Balance, metric: Array) -> Array:
+def _tangent(here: _ForceBalance, metric: Array) -> Array:
     """(n + 1,) unit tangent of the path, configuration and part of the loads."""
     rows = np.column_stack([here.stiffness, -here.load])
     scale = np.abs(rows).max(axis=1, keepdims=True)
@@ -179,26 +179,26 @@ def _tangent(here: _Balance, metric: Array) -> Array:
 
 
 def _along(
-    model: Dynamics, here: _Balance, share: float, ahead: Array, distance: float, metric: Array
-) -> tuple[_Balance, float, int] | None:
+    model: Dynamics, here: _ForceBalance, share: float, ahead: Array, distance: float, metric: Array
+) -> tuple[_ForceBalance, float, int] | None:
     """The equilibrium at a distance along the tangent, its part of the loads, and the iterations."""
     made = distance * ahead
 
-    def bordered(at: _Balance) -> tuple[Array, Array]:
+    def bordered(at: _ForceBalance) -> tuple[Array, Array]:
         normal = metric * ahead
         matrix = np.block(
             [[at.stiffness, -at.load[:, None]], [(normal[:-1] @ at.Z)[None, :], np.array([[normal[-1]]])]]
         )
         return matrix, np.append(at.force, normal @ (distance * ahead - made))
 
-    def moved(change: Array, at: _Balance) -> None:
+    def moved(change: Array, at: _ForceBalance) -> None:
         made[:] += np.append(at.Z @ change[:-1], change[-1])
 
     start = _moved(model, here.state, made[:-1])
     return _solved(model, start, share + float(made[-1]), metric, bordered, moved)
 
 
-def _held(model: Dynamics, state: State, share: float) -> _Balance | None:
+def _equilibrium_at(model: Dynamics, state: State, share: float) -> _ForceBalance | None:
     """The equilibrium near by at a part of the loads."""
     metric = np.ones(model.layout.n + 1)
     found = _solved(model, state, share, metric, lambda at: (at.stiffness, at.force), lambda _change, _at: None)
@@ -210,9 +210,9 @@ def _solved(
     state: State,
     share: float,
     metric: Array,
-    system: Callable[[_Balance], tuple[Array, Array]],
-    moved: Callable[[Array, _Balance], None],
-) -> tuple[_Balance, float, int] | None:
+    system: Callable[[_ForceBalance], tuple[Array, Array]],
+    moved: Callable[[Array, _ForceBalance], None],
+) -> tuple[_ForceBalance, float, int] | None:
     """Newton's iteration to rounding; None where it does not converge."""
     last, at = np.inf, _balance(model, state, share)
     for count in range(1, ITERATIONS + 1):
@@ -241,13 +241,20 @@ def _moved(model: Dynamics, state: State, change: Array) -> State:
     return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
 
 
-def _between(one: _Balance, two: _Balance) -> range:
+def _between(one: _ForceBalance, two: _ForceBalance) -> range:
     """Places in the order of the eigenvalues whose sign differs between two equilibria."""
     return range(*sorted((one.unstable, two.unstable)))
 
 
 def _critical(
-    model: Dynamics, here: _Balance, share: float, ahead: Array, distance: float, metric: Array, there: _Balance, k: int
+    model: Dynamics,
+    here: _ForceBalance,
+    share: float,
+    ahead: Array,
+    distance: float,
+    metric: Array,
+    there: _ForceBalance,
+    k: int,
 ) -> float:
     """The part of the loads, between here and an equilibrium at a distance along the path, at which the k-th eigenvalue
     is zero: by regula falsi (Anderson and Björck), and bisection where that does not halve the bracket.

@@ -28,7 +28,7 @@ from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
 from ephs.solve.errors import OptionError
 from ephs.solve.heats import exponential_law
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import compile_model
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
@@ -55,12 +55,12 @@ def linear_mechanism(
         Names of points of bodies, each with its body and place there; None where the ports and states of the system
         are meant, too, and inputs are these ports by default.
     """
-    return _Linear(model, state, inputs, outputs, points).whole()
+    return _LinearisedMotion(model, state, inputs, outputs, points).whole()
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Port:
+class _PortRates:
     """A port: (d, n) its rates by the tree's, (d, n) their derivatives by the configuration at the state's rates, and
     whether its place is meant, not its rate.
     """
@@ -71,7 +71,7 @@ class _Port:
 
 
 @final
-class _Linear:
+class _LinearisedMotion:
     """Data shared by the parts of one linearisation."""
 
     def __init__(
@@ -223,19 +223,19 @@ class _Linear:
                 at += len(self._port(name).jacobian)
         return out
 
-    def _seen(self, port: "_Port") -> Array:
+    def _seen(self, port: "_PortRates") -> Array:
         """Rows of C of a displacement, or of a rate."""
         here, warm = port.jacobian, np.zeros((port.jacobian.shape[0], len(self.nodes)))
         if port.of_place:
             return np.hstack([here @ self.free.Z, np.zeros((here.shape[0], self.k)), warm])
         return np.hstack([here @ self.turned + port.turning @ self.free.Z, here @ self.free.Z, warm])
 
-    def _port(self, name: str) -> "_Port":
+    def _port(self, name: str) -> "_PortRates":
         """A port by its name."""
         if name in self.pushed:
             joint, part = self.pushed[name]
             whole = self._port(f"joints.{joint}")
-            return _Port(whole.jacobian[part], whole.turning[part], of_place=False)
+            return _PortRates(whole.jacobian[part], whole.turning[part], of_place=False)
         kind, _, rest = name.partition(".")
         words = {"joints": ".coordinate", "bodies": ".position", "markers": ".position"}
         model = self.model
@@ -250,12 +250,12 @@ class _Linear:
                 if kind == "joints":
                     jacobian = self._joint(own)
                     turning = self.velocities.joints.get(own, np.zeros_like(jacobian))
-                    return _Port(jacobian, turning, bool(suffix))
+                    return _PortRates(jacobian, turning, bool(suffix))
                 if kind == "markers":
                     return self._point(*self.points[own], of_place=bool(suffix))
                 if suffix:
                     return self._point(own, np.zeros(3), of_place=True)
-                return _Port(model.jacobian(self.state, own), self.velocities.bodies[own], of_place=False)
+                return _PortRates(model.jacobian(self.state, own), self.velocities.bodies[own], of_place=False)
         every = [f"{key}.{n}" for key, found in known.items() for n in found]
         every += [] if self.system is None else [*self.system.names, *self.system.states]
         hint = did_you_mean(name, every, f"such as {listing(every)}")
@@ -270,13 +270,13 @@ class _Linear:
         columns = [self.model.unpack(np.concatenate([q, unit, s])).rates[name] for unit in np.eye(self.n)]
         return np.array(columns).T
 
-    def _point(self, body: str, at: Array, *, of_place: bool) -> "_Port":
+    def _point(self, body: str, at: Array, *, of_place: bool) -> "_PortRates":
         """A point of a body: its velocity R (v + ω × at) in the world."""
         jacobian, by_twist = self.model.jacobian(self.state, body, at), self.model.jacobian(self.state, body)
         turn = self.model.bodies(self.state)[body].rotation
         (w, v), (dw, dv) = np.split(by_twist @ self.r, 2), np.split(self.velocities.bodies[body], 2)
         change = dv - hat(at) @ dw - hat(v + np.cross(w, at)) @ by_twist[:3]
-        return _Port(jacobian, turn @ change, of_place)
+        return _PortRates(jacobian, turn @ change, of_place)
 
     # ---- energy and dissipation --------------------------------------------------------------------------------
 
@@ -354,11 +354,11 @@ def _numbered(name: str, count: int) -> list[str]:
     return [f"{name}[{i}]" for i in range(count)] if count > 1 else [name]
 
 
-def _play(linear: _Linear, t: Array, moved: Array) -> Solution:
+def _play(linear: _LinearisedMotion, t: Array, moved: Array) -> Solution:
     """The mechanism along some displacements (frames, states) of the state."""
     problem = linear.model.problem
     model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
-    stored, rows = Stored(model), list[Row]()
+    stored, rows = StoredEnergies(model), list[Row]()
     for row in moved:
         at = linear.model.moved(linear.state, linear.free.Z @ row[: linear.k])
         q, _, s = _split(linear.model, at)

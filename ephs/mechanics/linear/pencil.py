@@ -19,7 +19,7 @@ from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, r
 from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
 from ephs.solve.methods.continuous import Continuous
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.sparse import Index
@@ -83,7 +83,7 @@ def mechanism_of(problem: Problem) -> "Dynamics | None":
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Parts:
+class DescriptorParts:
     """The linearised descriptor form at a state.
 
     Parameters
@@ -145,7 +145,7 @@ class Pencil:
         SolveError
             There are none near by.
         """
-        z = Stored(self.model).efforts(x)
+        z = StoredEnergies(self.model).efforts(x)
         for _ in range(30):
             residual = self.equations.residual(x, z, self._given)
             matrices = self.equations.matrices(x, z, self._given)
@@ -159,12 +159,12 @@ class Pencil:
                 return z
         raise SolveError(Outcome.DIVERGED, "", "rates and multipliers in this state")
 
-    def parts(self, x: Array, z: Array) -> Parts:
+    def parts(self, x: Array, z: Array) -> DescriptorParts:
         """The linearised equations at states x and unknowns z."""
         matrices = self.equations.matrices(x, z, self._given)
         return self._parts(matrices.unknowns.toarray(), matrices.states.toarray(), z)
 
-    def _parts(self, unknowns: Array, states: Array, z: Array) -> Parts:
+    def _parts(self, unknowns: Array, states: Array, z: Array) -> DescriptorParts:
         n_w, n_e, n_l = self.n_w, self.n_e, self.n_l
         w, b, c = slice(0, n_w), slice(n_w, n_w + n_e), slice(n_w + n_e, None)
         states = states[:, :n_w]
@@ -179,12 +179,12 @@ class Pencil:
             else:
                 force[slot.efforts, at : at + dim] = np.eye(dim)
             at += dim
-        return Parts(
+        return DescriptorParts(
             z[:n_w], unknowns[w, b], -states[w], unknowns[b, w], unknowns[b, b], states[b], unknowns[b, c],
             unknowns[c, b], states[c], force, given,
         )  # fmt: skip
 
-    def algebraic(self, parts: Parts) -> tuple[Array, Array, Array]:
+    def algebraic(self, parts: DescriptorParts) -> tuple[Array, Array, Array]:
         """The equations without rates: (rows on efforts, multipliers and outer flows; their right-hand sides by the
         states; by the inputs): efforts of storages, conditions, balances at junctions without storage."""
         bare = parts.bare
@@ -205,21 +205,21 @@ class Pencil:
         u, sigma, _ = svd(rows)
         return u[:, int(np.sum(sigma > ELIMINATION * sigma.max(initial=1.0))) :]
 
-    def _conditions(self, parts: Parts) -> Array:
+    def _conditions(self, parts: DescriptorParts) -> Array:
         """(c, n_w) conditions on the states' changes."""
         rows, by_states, _ = self.algebraic(parts)
         found = self._left(rows).T @ by_states
         largest = float(np.abs(by_states).max(initial=0.0))
         return found[np.abs(found).max(axis=1, initial=0.0) > NOTHING * largest]  # redundant ones add no conditions
 
-    def differentiated(self, parts: Parts) -> list[str]:
+    def differentiated(self, parts: DescriptorParts) -> list[str]:
         """Outer ports whose input holds states themselves, so that its derivative would act."""
         rows, _, by_inputs = self.algebraic(parts)
         held = np.abs(self._left(rows).T @ by_inputs).max(axis=0, initial=0.0) > CONSTRAINT
         names = [str(slot.path) for slot, _ in self.ports for _ in range(slot.quantity.space.dim)]
         return list(dict.fromkeys(name for name, hit in zip(names, held.tolist(), strict=True) if hit))
 
-    def independent(self, parts: Parts, left_out: Index) -> Index:
+    def independent(self, parts: DescriptorParts, left_out: Index) -> Index:
         """Places of independent states, without some that act on nothing."""
         from scipy.linalg import qr
 
@@ -236,7 +236,7 @@ class Pencil:
         rank = rank_of(diagonal, CONSTRAINT)
         return np.setdiff1d(np.sort(order[rank:]), left_out)
 
-    def span(self, parts: Parts, which: Index, left_out: Index) -> Array:
+    def span(self, parts: DescriptorParts, which: Index, left_out: Index) -> Array:
         """(n_w, k) X: the identity on the independent states, within the conditions; what is left out stays."""
         X = np.zeros((self.n_w, which.size))
         X[which, np.arange(which.size)] = 1.0

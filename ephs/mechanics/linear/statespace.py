@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.linear.modes import Complex, Mode, modes_of
-from ephs.mechanics.linear.structure import Law, PortHamiltonian, Sizes, laws_of
+from ephs.mechanics.linear.structure import MeasuredLaw, PortHamiltonian, Sizes, laws_of
 from ephs.semantics.bundles.bundle import Array
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class StateSpace:
         return all(mode.stable for mode in self.modes)
 
     @property
-    def laws(self) -> tuple[Law, ...]:
+    def laws(self) -> tuple[MeasuredLaw, ...]:
         """The laws of the structure; none where there is no structure."""
         if self.structure is None:
             return ()

@@ -14,7 +14,7 @@ ROUNDING = 1e-12
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Law:
+class MeasuredLaw:
     """An equation with both sides; ``scale`` is the size of their terms."""
 
     name: str
@@ -81,7 +81,7 @@ class Sizes:
 
 def laws_of(
     A: Array, B: Array, C: Array, D: Array, ph: PortHamiltonian, sizes: Sizes, *, conjugate: bool
-) -> tuple[Law, ...]:
+) -> tuple[MeasuredLaw, ...]:
     """The laws of the structure, both sides of each.
 
     Parameters
@@ -94,16 +94,18 @@ def laws_of(
     J, R, Q = ph.J, ph.R, ph.Q
     least = np.asarray(symmetric_eigenvalues(0.5 * (R + R.T)), dtype=float)
     out = [
-        Law("A = (J − R) Q", A, (J - R) @ Q, _size((np.abs(J) + np.abs(R)) @ np.abs(Q))),
-        Law("J is skew", J, -J.T, _size(J) + _size(R)),
-        Law("R is symmetric", R, R.T, _size(J) + _size(R)),
-        Law("Q is symmetric", Q, Q.T, _size(Q)),
-        Law("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(J) + _size(R)),
+        MeasuredLaw("A = (J − R) Q", A, (J - R) @ Q, _size((np.abs(J) + np.abs(R)) @ np.abs(Q))),
+        MeasuredLaw("J is skew", J, -J.T, _size(J) + _size(R)),
+        MeasuredLaw("R is symmetric", R, R.T, _size(J) + _size(R)),
+        MeasuredLaw("Q is symmetric", Q, Q.T, _size(Q)),
+        MeasuredLaw("R is not negative", np.minimum(least, 0.0), np.zeros_like(least), _size(J) + _size(R)),
     ]
     if conjugate:
         gain = np.asarray(symmetric_eigenvalues(D + D.T), dtype=float)
-        out.append(Law("C = Bᵀ Q", C, B.T @ Q, max(sizes.C, sizes.B * float(np.abs(Q).sum(axis=0).max(initial=0.0)))))
-        out.append(Law("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), sizes.D))
+        out.append(
+            MeasuredLaw("C = Bᵀ Q", C, B.T @ Q, max(sizes.C, sizes.B * float(np.abs(Q).sum(axis=0).max(initial=0.0))))
+        )
+        out.append(MeasuredLaw("D + Dᵀ is not negative", np.minimum(gain, 0.0), np.zeros_like(gain), sizes.D))
     return tuple(out)
 
 

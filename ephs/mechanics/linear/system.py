@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.linear.pencil import Parts, Pencil, system_problem
+from ephs.mechanics.linear.pencil import DescriptorParts, Pencil, system_problem
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
@@ -22,7 +22,7 @@ from ephs.semantics.spaces.decompositions import least_squares, pseudoinverse, s
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
 from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, failing_at
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Model
 from ephs.solve.problem import Problem
 from ephs.solve.result.replay import replay
@@ -183,7 +183,7 @@ class LinearSystem:
         return whole[:, : self.k], whole[:, self.k :], names
 
 
-def _structure(p: Parts, X: Array, which: Index, A: Array) -> tuple[PortHamiltonian | None, str]:
+def _structure(p: DescriptorParts, X: Array, which: Index, A: Array) -> tuple[PortHamiltonian | None, str]:
     """J, R and Q on the independent states, or why there are none.
 
     Efforts that satisfy the conditions are e = V c, those of storages ε = P c with P = T V. Balances projected on V
@@ -247,6 +247,6 @@ def _numbered(name: str, count: int) -> list[str]:
 def _play(problem: Problem, model: Model, x: Array, X: Array, t: Array, moved: Array) -> Solution:
     """The system along some displacements (frames, states) of the state."""
     xs = [problem.descriptor.advance(x, X @ row) for row in moved]
-    stored = Stored(model)
+    stored = StoredEnergies(model)
     rows = [Row(point, stored.energies(point), np.zeros(4)) for point in xs]
     return replay(problem, t, rows, "mode")

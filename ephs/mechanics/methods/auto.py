@@ -19,12 +19,12 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.semi import NAME as SEMI
 from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.stage import PLAIN
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
 from ephs.solve.loop import FINAL
-from ephs.solve.march import Control as Steering
+from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import PATIENCE, held_back
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Leg, Span
@@ -54,7 +54,7 @@ class Auto(ReducedMethod):
 
     name = "auto"
 
-    def __init__(self, equations: Equations, control: Control) -> None:
+    def __init__(self, equations: ReducedEquations, control: Control) -> None:
         super().__init__(equations, control)
         name = "rk87" if control.rtol.value < DIGITS else "rk54"
         self._explicit, self._limit = Explicit(equations, control, tableau(name)), LIMITS[name]
@@ -196,7 +196,7 @@ class Auto(ReducedMethod):
         self.name = own["name"]
 
 
-def _touches(equations: Equations) -> bool:
+def _touches(equations: ReducedEquations) -> bool:
     """Whether surfaces of a tree may touch, and implicit steps are taken many in one compiled call."""
     compiled = equations.constant and not (equations.engine.looped or equations.reduced.attaching.network.attached)
     return compiled and bool(equations.reduced.tables.support.any())

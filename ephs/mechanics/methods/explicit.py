@@ -14,7 +14,7 @@ from ephs.mechanics.methods import tableaux as t
 from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
@@ -95,7 +95,9 @@ class Explicit(ReducedMethod):
         Memory of semi-implicit steps, which need no rates at the start and turn energy that they lose into heat.
     """
 
-    def __init__(self, equations: Equations, control: Control, method: Tableau, lagged: "Semi | None" = None) -> None:
+    def __init__(
+        self, equations: ReducedEquations, control: Control, method: Tableau, lagged: "Semi | None" = None
+    ) -> None:
         super().__init__(equations, control)
         self.solve = equations.stages if lagged is None else lagged.stages
         self.lagged = lagged

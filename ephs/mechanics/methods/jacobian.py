@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.apart import columns_of_trees, directions
 from ephs.mechanics.tree.engine.slopes import Call, RateSlopes, calls_of
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.kept import once
 from ephs.solve.march import Status
@@ -28,7 +28,7 @@ class Jacobian:
     With ``counts`` the matrices are counted there, as ``jacobians``; ``holding`` is what held contacts in the last one.
     """
 
-    def __init__(self, equations: Equations, counts: dict[str, Any] | None = None) -> None:
+    def __init__(self, equations: ReducedEquations, counts: dict[str, Any] | None = None) -> None:
         self.equations = equations
         self.size = equations.nv + equations.n + equations.ns
         self._counts = {} if counts is None else counts

@@ -7,14 +7,14 @@ import numpy as np
 
 from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.stages import Kept
+from ephs.mechanics.methods.stages import KeptJacobian
 from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import LARGEST, Outcome, SolveError
-from ephs.solve.march import STEPS, Account, Ending, Status
-from ephs.solve.march import Control as Steering
+from ephs.solve.march import STEPS, Ending, RunAccount, Status
+from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import DAMPING, PATIENCE, STRICT
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Counts, Span, Taken
@@ -67,7 +67,7 @@ class March:
         span: Span[ReducedState],
         limit: float = 0.0,
         left: Leave | None = None,
-        kept: Kept | None = None,
+        kept: KeptJacobian | None = None,
         contest: Contest | None = None,
         lagged: "Semi | None" = None,
     ) -> None:
@@ -92,7 +92,7 @@ class March:
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
             "times": self.times, "carry": start.account[self.own :].copy(),
         }  # fmt: skip
-        self.steering, self.account = Steering.table(1), Account.table(1)
+        self.steering, self.account = Steering.table(1), RunAccount.table(1)
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))

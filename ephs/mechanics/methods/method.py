@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.errors import SolveError
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Instants, Leg, Row, Span, Taken, too_fast
 
@@ -53,7 +53,7 @@ class ReducedMethod(ABC):
     stiffness: float = 0.0
     rough: tuple[Array, ...] = ()
 
-    def __init__(self, equations: Equations, control: Control) -> None:
+    def __init__(self, equations: ReducedEquations, control: Control) -> None:
         self.equations, self.control = equations, control
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         self.counts: dict[str, Any] = {}
@@ -115,7 +115,7 @@ class ReducedMethod(ABC):
         """Record of a state."""
         return self.equations.row(state)
 
-    def record(self, taken: Instants[ReducedState]) -> Record:
+    def record(self, taken: Instants[ReducedState]) -> RunRecord:
         """Records of many instants."""
         if isinstance(taken, Taken):
             q, rest, put = taken.data

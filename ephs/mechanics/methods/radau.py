@@ -13,8 +13,8 @@ import numpy as np
 from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.marching import Leave, March
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.methods.stages import Kept, Stages, scheme_of
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
 from ephs.solve.methods.collocation import Collocation
@@ -39,7 +39,7 @@ class Implicit(ReducedMethod):
 
     name = "radau"
 
-    def __init__(self, equations: Equations, control: Control, counts: dict[str, Any] | None = None) -> None:
+    def __init__(self, equations: ReducedEquations, control: Control, counts: dict[str, Any] | None = None) -> None:
         super().__init__(equations, control)
         self.counts = self.counts if counts is None else counts
         self._known: tuple[Array, Array] | None = None
@@ -75,7 +75,7 @@ class Implicit(ReducedMethod):
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
         if looped or attached or not eq.constant:
             return None
-        return March(self, tableau(self.scheme), span, left=left, kept=Kept(self._stages), contest=contest)
+        return March(self, tableau(self.scheme), span, left=left, kept=KeptJacobian(self._stages), contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""

@@ -102,11 +102,13 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     """
 
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
-        from ephs.mechanics.tree.equations.equations import Equations  # its kernels take a quarter of a second to load
+        from ephs.mechanics.tree.equations.equations import (
+            ReducedEquations,  # its kernels take a quarter of a second to load
+        )
 
         hard = strikes(setting.problem.descriptor)
         try:
-            equations = setting.equations or Equations(setting.problem, setting.t0, pushed=hard is not None)
+            equations = setting.equations or ReducedEquations(setting.problem, setting.t0, pushed=hard is not None)
         except Unplaced as error:
             serving = ", ".join(m.name for m in METHODS.values() if m.systems and m.name != setting.method)
             raise OptionError("method", setting.method, f"{serving}: {error}") from None

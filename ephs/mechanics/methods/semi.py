@@ -14,16 +14,16 @@ from ephs.mechanics.methods.explicit import Explicit, Tableau
 from ephs.mechanics.tree.engine.drags import chains, frictions, memory_of
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.stages import evaluated
 from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.derive.irreversible import Irreversible
+from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
 from ephs.solve.control import Control
-from ephs.solve.march import Control as Steering
+from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march import Status
 
 NAME: Final = "semi"
@@ -73,7 +73,7 @@ class Semi:
         Addresses of the programs of M/θ₀ of the components of friction, by their numbers.
     """
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: ReducedEquations) -> None:
         self._equations = equations
         self.onsager = once(equations.reduced, "programs of friction", lambda: _programs(equations))
         self._made: tuple[Engine, dict[str, Any], Bound] | None = None
@@ -103,11 +103,11 @@ class Semi:
         """The rates k at the stages of a step, each under the inputs at its node, and y at its end into y1.
 
         Returns y at the last stage. Stages are explicit where constraints nearly repeat each other. See
-        `Equations.stages`.
+        `ReducedEquations.stages`.
         """
         (engine, _, stage), eq, before = self._of_engine(), self._equations, y0
 
-        def at(part: float, y: Array) -> Array:
+        def rates_at(part: float, y: Array) -> Array:
             return eq.rates(state.t + part * h, state.q, y)
 
         self._base[:], self._start[:] = state.q, y0
@@ -120,14 +120,14 @@ class Semi:
             eq.evaluations += anew
             status = int(stage(i, h))
             if status == Status.DEPENDENT:
-                before, y1[:] = evaluated(at, scheme["a"], c, h, y0, k)
+                before, y1[:] = evaluated(rates_at, scheme["a"], c, h, y0, k)
                 return before
             eq.refuse(status, engine.failed)
         k[:], y1[:] = self._k, self._y
         return before
 
 
-def semi_implicit(equations: Equations, control: Control) -> Explicit:
+def semi_implicit(equations: ReducedEquations, control: Control) -> Explicit:
     """The method on one mechanism."""
     tableau = TABLEAU
     if control.rtol.value <= FINE:
@@ -135,22 +135,22 @@ def semi_implicit(equations: Equations, control: Control) -> Explicit:
     return Explicit(equations, control, tableau, lagged=Semi(equations))
 
 
-def cheap(equations: Equations) -> bool:
+def cheap(equations: ReducedEquations) -> bool:
     """Whether the masses of a tree are factorised in little time, and no contact is hard."""
     reach = chains(links_of(equations.reduced).parts)["reach"]
     narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
     return bool(narrow) and strikes(equations.problem.descriptor) is None
 
 
-def _programs(equations: Equations) -> dict[int, int]:
+def _programs(equations: ReducedEquations) -> dict[int, int]:
     """Addresses of M/θ₀ of the components of friction, by their numbers."""
     return {number: onsager(one).compiled()["value"].address for number, one in _relations(equations)}
 
 
-def _relations(equations: Equations) -> Iterator[tuple[int, Irreversible]]:
+def _relations(equations: ReducedEquations) -> Iterator[tuple[int, IrreversibleStep]]:
     """Numbers and relations of the components of friction."""
     for number in frictions(equations.engine.tables):
         kernel = equations.problem.descriptor.components[number].primitive.kernel
         assert kernel is not None
-        assert isinstance(kernel.relation, Irreversible)
+        assert isinstance(kernel.relation, IrreversibleStep)
         yield number, kernel.relation

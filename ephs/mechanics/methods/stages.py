@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.jacobian import Jacobian
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
@@ -46,7 +46,7 @@ def costs(freedoms: int, stages: int) -> tuple[int, int]:
     return FACTORS + freedoms * work // (5 * FACTORED), 1 + work // (5 * SUBSTITUTED)
 
 
-def scheme_of(equations: Equations, control: Control) -> Collocation:
+def scheme_of(equations: ReducedEquations, control: Control) -> Collocation:
     """The stages of radau on a mechanism: by the tolerance, fewer where surfaces may touch or loops lose rank."""
     kinked = bool(equations.reduced.tables.support.any())
     rtol = control.rtol.value if control.step is None else None
@@ -75,7 +75,9 @@ class Stages:
         that is good enough where the iteration gets no further.
     """
 
-    def __init__(self, equations: Equations, control: Control, scheme: Collocation, counts: dict[str, Any]) -> None:
+    def __init__(
+        self, equations: ReducedEquations, control: Control, scheme: Collocation, counts: dict[str, Any]
+    ) -> None:
         self.equations, self.scheme, self.inverse = equations, scheme, np.linalg.inv(scheme.coefficients)
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         if control.step is None:
@@ -190,7 +192,7 @@ class Stages:
 
 
 @final
-class Kept:
+class KeptJacobian:
     """The Jacobian of compiled implicit steps, and their memory: `ephs.solve.march.Stiff`.
 
     Parameters

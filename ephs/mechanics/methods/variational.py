@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.mechanics.tree.finding.tables import CUT
@@ -53,7 +53,7 @@ class Variational(ReducedMethod):
     name = "variational"
     exponent = 3.0
 
-    def __init__(self, equations: Equations, control: Control, keep: str = "momentum") -> None:
+    def __init__(self, equations: ReducedEquations, control: Control, keep: str = "momentum") -> None:
         super().__init__(equations, control)
         equations.accounts.keep(keep, ("momentum",))
         self._keep = keep

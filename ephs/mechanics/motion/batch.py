@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ephs.mechanics.scene.geometry import Coupling
+from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
@@ -42,7 +42,7 @@ def gap(a: Array, b: Array) -> tuple[Array, Array]:
     return 2.0 * np.sqrt(np.sum(turn * turn, axis=0)), np.sqrt(np.sum(way * way, axis=0))
 
 
-def included(coupling: Coupling, coordinates: Array) -> Array:
+def included(coupling: JointCoupling, coordinates: Array) -> Array:
     """(n, 7) poses of C2 in C1 at a joint's coordinates (n, d)."""
     pair = coupling.pair
     if coupling.middle is not None:

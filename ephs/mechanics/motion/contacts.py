@@ -15,7 +15,7 @@ from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.shapes.gap import Gap, ramp
 from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import Touch
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -69,7 +69,7 @@ class Pressed(Moving, Protocol):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
+class _ContactPoint:
     """One point of a contact: the values of `ContactMotion`, and wrenches (n, 6) on bodies 1 and 2 in their frames."""
 
     gap: Array
@@ -129,13 +129,13 @@ def _masks(of: Contact, read: Pressed, points: int, instants: int) -> tuple[NDAr
     return whole, each
 
 
-def _points(scene: Scene, of: Contact, read: Pressed) -> Iterator[tuple[tuple[str, str], _Point]]:
+def _points(scene: Scene, of: Contact, read: Pressed) -> Iterator[tuple[tuple[str, str], _ContactPoint]]:
     bodies, touches = contact_points(scene, of)
     for i, touch in enumerate(touches):
         yield bodies, _point(bodies, touch, of, read, i)
 
 
-def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, number: int) -> _Point:
+def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, number: int) -> _ContactPoint:
     frame1, frame2, gap = touch
     poses = [read.poses(name) for name in bodies]
     ends = [compose(pose, np.broadcast_to(o, pose.shape)) for pose, o in zip(poses, (frame1, frame2), strict=True)]
@@ -158,11 +158,13 @@ def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, nu
     slip = np.linalg.norm(np.cross(_rows(normal, len(relative)), velocity), axis=1)
     place = ends[1][:, 4:] + turned(ends[1], _rows(point, len(relative)))
     one, two = (_carried(o, wrench) for o in (offset1, np.broadcast_to(frame2, relative.shape)))
-    return _Point(distance, turned(poses[1], two[:, 3:]), place, np.where(touching, slip, 0.0), heat, (-one, two))
+    return _ContactPoint(
+        distance, turned(poses[1], two[:, 3:]), place, np.where(touching, slip, 0.0), heat, (-one, two)
+    )
 
 
 def _elastic(
-    gap: Gap, law: Law, relative: Array, twist: Array, normal: tuple[Any, ...], distance: Array
+    gap: Gap, law: ConstitutiveLaw, relative: Array, twist: Array, normal: tuple[Any, ...], distance: Array
 ) -> tuple[Array, Array]:
     """(n, 6) wrenches of an elastic contact on the second body, in the axes of C2, and its heat flow (n,)."""
     wrench = _rows(normal, len(relative)) * law.force(ramp(-distance))[:, None]

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, included
-from ephs.mechanics.scene.geometry import Coupling
+from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, Link, LinkJoint
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -102,7 +102,7 @@ class GeneralMotion:
     def _rows(self, joint: LinkJoint) -> tuple[Array, Array]:
         """Ad_{I⁻¹}Ad_{o₁⁻¹} and −Ad_{o₂⁻¹}, (n, 6, 6): a joint's relation on the twists of its links."""
         n = len(self._solution)
-        relative = included(Coupling(joint.pair), self._solution[joint.state.path].reshape(n, joint.pair.dim))
+        relative = included(JointCoupling(joint.pair), self._solution[joint.state.path].reshape(n, joint.pair.dim))
         before = compose(np.broadcast_to(joint.first.offset, (n, 7)), relative)
         after = np.broadcast_to(SE3.adjoint(SE3.inverse(joint.second.offset)), (n, 6, 6))
         return adjoint_inverse(before), -after

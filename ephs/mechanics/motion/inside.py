@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, cast, final
 import numpy as np
 
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion, MarkerMotion, SceneMotion, ThermalMotion
-from ephs.mechanics.motion.moving import Part
+from ephs.mechanics.motion.moving import BoxMotion
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -44,7 +44,7 @@ class Inside:
         self._solution, self._path, self.scene = solution, Path.of(path), scene
         self.t, self.name = solution.t, f"{solution.name}.{path}"
         self.problem = None  # the loads on the mechanism do not define a problem
-        self._motion = SceneMotion(scene, cast(Any, self), lambda: Part(motion_of(solution), self._path))
+        self._motion = SceneMotion(scene, cast(Any, self), lambda: BoxMotion(motion_of(solution), self._path))
         for name, _ in scene.all_bodies():
             self._motion.poses(name)
 

@@ -11,7 +11,7 @@ from ephs.mechanics.motion.motion import BodyMotion, JointMotion
 from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
-from ephs.mechanics.scene.geometry import Coupling
+from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
@@ -110,7 +110,7 @@ class LinkMotion:
             ends = joint.first, joint.second
             if not {end.link for end in ends} <= {SOLID, *names}:
                 continue
-            of = Coupling(joint.pair)
+            of = JointCoupling(joint.pair)
             rows = self._solution[joint.state.path].reshape(-1, joint.pair.dim)
             inside = np.array([of.include(of.element(row)) for row in rows]).reshape(-1, 7)
             frames = compose(np.broadcast_to(joint.first.offset, inside.shape), inside), joint.second.offset

@@ -20,14 +20,14 @@ from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.scene.build import component_path
-from ephs.mechanics.scene.geometry import Coupling, coupling_of
+from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
 from ephs.semantics.spaces import SE3
 from ephs.semantics.systems.markup import table
-from ephs.solve.result.dataset import Variable
+from ephs.solve.result.dataset import DatasetVariable
 from ephs.solve.result.labels import Labels
 
 if TYPE_CHECKING:
@@ -313,7 +313,7 @@ class SceneMotion:
             return np.zeros((len(self._solution), 6))
         return self._found.wrench(self._boxes(name)[-1]) if self._own is None else self._own.wrench(name)
 
-    def variables(self, *, wrenches: bool) -> dict[str, Variable]:
+    def variables(self, *, wrenches: bool) -> dict[str, DatasetVariable]:
         """Bodies, joints, thermal nodes and markers as labelled arrays."""
         return variables(self._scene, self, wrenches=wrenches)
 
@@ -342,7 +342,7 @@ class SceneMotion:
             second = -np.broadcast_to(SE3.adjoint(SE3.inverse(joint.frame2)), first.shape)
             yield name, first, second, self._basis(joint, coupling, name, at)
 
-    def _basis(self, joint: Joint, coupling: Coupling, name: str, at: slice) -> Array:
+    def _basis(self, joint: Joint, coupling: JointCoupling, name: str, at: slice) -> Array:
         x = self.coordinates(name)[at]
         if joint.middle is None:
             return np.broadcast_to(coupling.basis(coupling.identity()), (x.shape[0], 6, coupling.dim))

@@ -54,7 +54,7 @@ class ByPath(Protocol):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class BoxMotion:
     """The motion of a box of a system, by the paths within it."""
 
     whole: ByPath

@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.own_units import SI, Units, in_own_units, units_of_states
+from ephs.mechanics.scene.own_units import SI, OwnUnits, in_own_units, units_of_states
 from ephs.mechanics.scene.rescaled import freedom_units
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.solution import Solution
@@ -29,7 +29,7 @@ class OwnMotion:
 
     motion: Any
     scene: Scene
-    units: Units
+    units: OwnUnits
 
     def velocities(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """(n, 6) twists by body and (n, d) rates by joint, implicit free joints included."""
@@ -51,7 +51,7 @@ class OwnMotion:
 def own_motion(solution: Solution, make: Callable[[Scene, Solution], Any]) -> OwnMotion | None:
     """The motion of a solution in its own units, as ``make`` reads scenes; None if those are close to SI."""
     problem = solution.problem
-    if problem is None or problem.scene is None or (units := Units.of(problem.scene)) == SI:
+    if problem is None or problem.scene is None or (units := OwnUnits.of(problem.scene)) == SI:
         return None
     own = in_own_units(problem)
     own = replace(own, shown=None, motion=lambda seen: make(own.scene, seen))

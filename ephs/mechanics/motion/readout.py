@@ -10,7 +10,7 @@ from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Joint, Scene
 from ephs.mechanics.scene.own_units import mobility_of
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.result.dataset import Variable
+from ephs.solve.result.dataset import DatasetVariable
 from ephs.solve.result.labels import POSE, TWIST, WRENCH, Labels, freedoms
 from ephs.solve.result.solution import Solution
 
@@ -43,9 +43,9 @@ def freedoms_of(joint: Joint) -> Labels:
     return UNIVERSAL if joint.middle is not None else freedoms(coupling_of(joint).pair)
 
 
-def variables(scene: Scene, motion: Reading, *, wrenches: bool) -> dict[str, Variable]:
+def variables(scene: Scene, motion: Reading, *, wrenches: bool) -> dict[str, DatasetVariable]:
     """Arrays of a motion, under ``body_position``, ``coordinate:JOINT`` and the like."""
-    out: dict[str, Variable] = {}
+    out: dict[str, DatasetVariable] = {}
     bodies, joints = [name for name, _ in scene.all_bodies()], [name for name, _ in scene.all_joints()]
     nodes, markers = [name for name, _ in scene.all_thermal()], [name for name, _ in scene.all_markers()]
     if bodies:
@@ -62,8 +62,8 @@ def variables(scene: Scene, motion: Reading, *, wrenches: bool) -> dict[str, Var
     for name, joint in (*scene.all_joints(), *scene.implicit_joints()):
         labels, seen = freedoms_of(joint), motion.joint(name)
         rates = Labels(labels.dimension, labels.names, tuple(f"{unit}/s" for unit in labels.units))
-        out[f"coordinate:{name}"] = Variable.of(seen.coordinate, labels, f"coordinates of {name}")
-        out[f"rate:{name}"] = Variable.of(seen.rate, rates, f"twist of {name} in the axes of C2")
+        out[f"coordinate:{name}"] = DatasetVariable.of(seen.coordinate, labels, f"coordinates of {name}")
+        out[f"rate:{name}"] = DatasetVariable.of(seen.rate, rates, f"twist of {name} in the axes of C2")
     if wrenches and joints:
         of, six = ("joint", tuple(joints)), (WRENCH.dimension, WRENCH.names)
         values = [motion.joint(name).wrench for name in joints]
@@ -78,8 +78,8 @@ def variables(scene: Scene, motion: Reading, *, wrenches: bool) -> dict[str, Var
     return out
 
 
-def _stack(values: list[Array], units: str, says: str, *axes: tuple[str, tuple[str, ...]]) -> Variable:
-    return Variable(np.stack(values, axis=1), units, says, axes)
+def _stack(values: list[Array], units: str, says: str, *axes: tuple[str, tuple[str, ...]]) -> DatasetVariable:
+    return DatasetVariable(np.stack(values, axis=1), units, says, axes)
 
 
 def summary(scene: Scene, solution: Solution, motion: Any, joints: Sequence[str]) -> dict[str, Any]:

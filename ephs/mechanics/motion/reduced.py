@@ -17,7 +17,7 @@ from ephs.mechanics.motion.general import GeneralMotion
 from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.transmitted import Transmission
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.impulses import Impulses
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
@@ -41,7 +41,7 @@ class ReducedMotion:
         Path of a body -> (n, 6) in its frame; rad/s, m/s.
     """
 
-    def __init__(self, solution: Solution, equations: Equations) -> None:
+    def __init__(self, solution: Solution, equations: ReducedEquations) -> None:
         self._solution, self._eq = solution, equations
         reduced, t = equations.reduced, equations.reduced.tables
         self._number = {edge.path: i for i, edge in enumerate(reduced.edges) if edge.path is not None}
@@ -63,7 +63,7 @@ class ReducedMotion:
         if solution.problem is None or not len(solution):
             return None
         try:
-            return ReducedMotion(solution, Equations(_at_rest(solution.problem), 0.0, apart=True))
+            return ReducedMotion(solution, ReducedEquations(_at_rest(solution.problem), 0.0, apart=True))
         except (Unplaced, OptionError, SolveError):
             return None
 

@@ -88,7 +88,7 @@ class Transmission:
         Parameters
         ----------
         places
-            (links, …), as `ephs.mechanics.road.records.Place`.
+            (links, …), as `ephs.mechanics.road.records.LinkPlace`.
         accelerations, force
             (n,) of the tree's degrees of freedom, and forces on them.
         pushed

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar, final
 import numpy as np
 
 from ephs.mechanics.scene.build import component_path
-from ephs.mechanics.scene.kinematics import Link, twist
+from ephs.mechanics.scene.kinematics import AssemblyJoint, twist
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.scene.state import Snapshot
@@ -118,7 +118,7 @@ class ThermalState:
 
 
 @final
-class Named(Mapping[str, Item], Generic[Item]):
+class NamedViews(Mapping[str, Item], Generic[Item]):
     """Elements of one kind by name, as attributes or keys: ``joints.waist``, ``joints["left.waist"]``."""
 
     __slots__ = ("_kind", "_names", "_read")
@@ -153,7 +153,7 @@ class Names:
 
     def __init__(self, scene: Scene) -> None:
         now = Snapshot.of(scene)
-        self.links: dict[str, Link] = {}
+        self.links: dict[str, AssemblyJoint] = {}
         for link in now.links:  # a joint takes precedence over an implicit one of its name
             self.links.setdefault(link.name, link)
         self.axial = {name: _axial_rows(link) for name, link in self.links.items() if _axial(link)}
@@ -207,24 +207,24 @@ class StateView(Mapping[Path, Array]):
         return len(self._states)
 
     @property
-    def joints(self) -> Named[JointState]:
+    def joints(self) -> NamedViews[JointState]:
         """Joints by name."""
-        return Named("joints", self._names.links, lambda name: JointState(self, name))
+        return NamedViews("joints", self._names.links, lambda name: JointState(self, name))
 
     @property
-    def bodies(self) -> Named[BodyState]:
+    def bodies(self) -> NamedViews[BodyState]:
         """Bodies by name."""
-        return Named("bodies", self._names.number, self._body)
+        return NamedViews("bodies", self._names.number, self._body)
 
     @property
-    def markers(self) -> Named[MarkerState]:
+    def markers(self) -> NamedViews[MarkerState]:
         """Markers by name."""
-        return Named("markers", self._names.markers, self._marker)
+        return NamedViews("markers", self._names.markers, self._marker)
 
     @property
-    def thermal(self) -> Named[ThermalState]:
+    def thermal(self) -> NamedViews[ThermalState]:
         """Thermal nodes by name."""
-        return Named("thermal", self._names.nodes, self._node)
+        return NamedViews("thermal", self._names.nodes, self._node)
 
     # ---- reading -------------------------------------------------------------------------------------------------
 
@@ -305,11 +305,11 @@ class StateView(Mapping[Path, Array]):
         return np.asarray(found[:first], dtype=float).reshape(-1, 6)
 
 
-def _axial(link: Link) -> bool:
+def _axial(link: AssemblyJoint) -> bool:
     return link.coupling.middle is None and link.coupling.pair.name in AXIAL
 
 
-def _axial_rows(link: Link) -> tuple[Array, Array]:
+def _axial_rows(link: AssemblyJoint) -> tuple[Array, Array]:
     """(d, 6) each: the rate of a joint about one axis from the twists of its bodies."""
     left = link.coupling.left_inverse(link.coupling.basis(link.coupling.identity()))
     first, second = (left @ SE3.adjoint(SE3.inverse(frame)) for frame in (link.frame1, link.frame2))

@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.redundancy import dependences, in_words
 from ephs.mechanics.constraints.subgroup import Subgroup, generated
 from ephs.mechanics.rewrite.rewrite import Strength
@@ -29,7 +29,7 @@ from ephs.solve.sparse import Index
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class ConnectedBodies:
     """A mechanism: bodies that joints and springs connect without the ground.
 
     Parameters
@@ -50,7 +50,7 @@ class Part:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Loop:
+class CutLoop:
     """A loop that a cut joint closes.
 
     Parameters
@@ -92,28 +92,30 @@ def coordinate_steps(scene: Scene, problem: Problem, before: int) -> Iterator[St
             yield done
 
 
-def mechanisms(reduced: Reduced) -> tuple[Part, ...]:
+def mechanisms(reduced: Reduced) -> tuple[ConnectedBodies, ...]:
     """The mechanisms, connected only through the ground and heat, in the order of their links."""
     sets = DisjointSets[int]()
     ends = [(int(a), int(b)) for a, b in zip(reduced.tables.first, reduced.tables.second, strict=True)]
     for a, b in ends:
         if a >= 0 and b >= 0:
             sets.join(*sorted(sets.leaders((a, b))))  # the least one leads
-    out: list[Part] = []
+    out: list[ConnectedBodies] = []
     leaders = sets.leaders(range(reduced.links))
     for root in sorted(set(leaders)):
         links = frozenset(link for link, leader in enumerate(leaders) if leader == root)
         edges = tuple(i for i, pair in enumerate(ends) if links & set(pair))
         twists = [reduced.twists[i].T for i in edges if reduced.tables.kind[i] != SPRING]
         names = tuple(name for link in sorted(links) if (name := reduced.bodies[link]) is not None)
-        out.append(Part(names, links, edges, generated(np.concatenate(twists) if twists else np.zeros((0, 6)))))
+        out.append(
+            ConnectedBodies(names, links, edges, generated(np.concatenate(twists) if twists else np.zeros((0, 6))))
+        )
     return tuple(out)
 
 
-def loops(reduced: Reduced) -> tuple[Loop, ...]:
+def loops(reduced: Reduced) -> tuple[CutLoop, ...]:
     """The loop of each cut joint."""
     t = reduced.tables
-    out: list[Loop] = []
+    out: list[CutLoop] = []
     for i, edge in enumerate(reduced.edges):
         if t.kind[i] != CUT:
             continue
@@ -126,11 +128,11 @@ def loops(reduced: Reduced) -> tuple[Loop, ...]:
         of = [*(link for link, _ in way), i]
         names = tuple(dict.fromkeys(reduced.edges[j].name for j in of))
         group = generated(np.concatenate([reduced.twists[j].T for j in of]))
-        out.append(Loop(edge.name, names, i, tuple(way), group, edge.pair.dim))
+        out.append(CutLoop(edge.name, names, i, tuple(way), group, edge.pair.dim))
     return tuple(out)
 
 
-def cyclic(reduced: Reduced, part: Part) -> Subgroup:
+def cyclic(reduced: Reduced, part: ConnectedBodies) -> Subgroup:
     """Symmetries of a whole mechanism: the Lie algebra, in world axes, of its cyclic coordinates.
 
     They are motions of its only joint with the ground that leave gravity's potential as it is, where that joint has no
@@ -239,7 +241,7 @@ def _redundant(scene: Scene, reduced: Reduced, before: int) -> Step | None:
     rows = sum(loop.rows for loop in found)
     if _rank(reduced, found) == rows:
         return None
-    repeated = dependences(Mechanism.of(scene))
+    repeated = dependences(ConfiguredMechanism.of(scene))
     lasting = sum(len(each.directions) - each.here for each in repeated)
     left = lasting - sum(6 - loop.group.dim for loop in found)
     if left <= 0:  # the redundancy is absent in neighbouring configurations
@@ -249,7 +251,7 @@ def _redundant(scene: Scene, reduced: Reduced, before: int) -> Step | None:
     return Step("redundant constraints", Strength.MOTION, where, reason, before, before - min(left, rows))
 
 
-def _rank(reduced: Reduced, found: Sequence[Loop]) -> int:
+def _rank(reduced: Reduced, found: Sequence[CutLoop]) -> int:
     """The rank of all loops' equations on the rates of the tree, in the initial configuration."""
     t = reduced.tables
     at = dict(zip(range(reduced.links), np.cumsum([0, *t.dim[: reduced.links]]).tolist(), strict=False))
@@ -337,7 +339,7 @@ def _vector(values: Array) -> str:
     return "(" + ", ".join(f"{round(float(value), 4) + 0.0:g}" for value in values) + ")"
 
 
-def _called(part: Part) -> str:
+def _called(part: ConnectedBodies) -> str:
     if len(part.bodies) < 3:
         return " and ".join(part.bodies)
     return f"{part.bodies[0]} … {part.bodies[-1]}"

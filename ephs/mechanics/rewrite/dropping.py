@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ephs.mechanics.rewrite.frames import Joint, anchor, bodies, inertia_at, joint_at, joints, reach
+from ephs.mechanics.rewrite.frames import DraftJoint, anchor, bodies, inertia_at, joint_at, joints, reach
 from ephs.mechanics.rewrite.merging import MERGE
-from ephs.mechanics.rewrite.rewrite import Draft, Rule, Site, State, StateMap, Strength
+from ephs.mechanics.rewrite.rewrite import Rule, RuleSite, State, StateMap, Strength, SystemDraft
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
@@ -35,7 +35,7 @@ def _free_of_energy(part: Primitive | None) -> bool:
 # ---- friction ---------------------------------------------------------------------------------------------------
 
 
-def _frictions(draft: Draft) -> Iterator[tuple[Path, ...]]:
+def _frictions(draft: SystemDraft) -> Iterator[tuple[Path, ...]]:
     return ((box,) for box, part in list(draft.fillings.items()) if isinstance(part, Irreversible))
 
 
@@ -50,7 +50,7 @@ def _resists(part: Irreversible) -> bool:
     return bool(np.any(part.matrix({}, efforts, Reference())[:, :-1]))
 
 
-def _friction(draft: Draft, place: tuple[Path, ...]) -> Site | None:
+def _friction(draft: SystemDraft, place: tuple[Path, ...]) -> RuleSite | None:
     (box,) = place
     part = draft.fillings.get(box)
     if not isinstance(part, Irreversible):
@@ -69,7 +69,7 @@ def _friction(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     if not refusal and lonely:
         refusal = f"nothing else is connected to the outer port {lonely[0]}"
 
-    def make(draft: Draft) -> StateMap:
+    def make(draft: SystemDraft) -> StateMap:
         touched = [where.junction for where in draft.wires[box].values()]
         lost = {sink / port for sink in sinks for port in _storage(draft, sink).bundle.ports}
         draft.remove([box, *sinks])
@@ -77,10 +77,10 @@ def _friction(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         return _without(lost, lambda _state, start: {path: start[path] for path in lost})
 
     reason = f"{box} resists nothing" + (f", and no heat reaches {sinks[0]}" if sinks else "")
-    return Site("remove friction of zero resistance", box, Strength.RELATION, reason, refusal, make)
+    return RuleSite("remove friction of zero resistance", box, Strength.RELATION, reason, refusal, make)
 
 
-def _storage(draft: Draft, box: Path) -> Storage:
+def _storage(draft: SystemDraft, box: Path) -> Storage:
     part = draft.fillings[box]
     assert isinstance(part, Storage)
     return part
@@ -101,7 +101,7 @@ def _without(lost: set[Path], rebuilt: Callable[[State, State], dict[Path, Array
 # ---- poses --------------------------------------------------------------------------------------------------------
 
 
-def _potentials(draft: Draft) -> Iterator[tuple[Path, ...]]:
+def _potentials(draft: SystemDraft) -> Iterator[tuple[Path, ...]]:
     return ((box,) for box, part in list(draft.fillings.items()) if isinstance(part, Storage) and _is_pose(part))
 
 
@@ -109,7 +109,7 @@ def _is_pose(part: Storage) -> bool:
     return [q.kind for _, _, q in part.bundle.items()] == ["pose"]
 
 
-def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
+def _pose(draft: SystemDraft, place: tuple[Path, ...]) -> RuleSite | None:
     (box,) = place
     found = bodies(draft)
     body = next((b for b in found.values() if b.potential == box), None)
@@ -126,7 +126,7 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         refusal = f"{others[0]} acts on the pose"
     elif {b for b, _ in draft.on(body.momentum)} == {body.coupling} and draft.junctions[body.momentum].exposed:
         refusal = f"nothing else is connected to the outer port {body.momentum}"
-    elif waiting := [at for at in _at(draft, body.momentum) if _goes(draft, at)]:
+    elif waiting := [at for at in _joints_of(draft, body.momentum) if _goes(draft, at)]:
         refusal = f"{waiting[0]} {FIRST}"  # it stores the pose too, or is reconstructed from it
     else:
         # of bodies without connection to the ground the first keeps its pose, in any order of the others
@@ -135,7 +135,7 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
             refusal = "no joint ties the body to a frame whose pose is kept: it could not be computed from the others"
     known = {None: None} | {j: b.state for j, b in found.items()}
 
-    def make(draft: Draft) -> StateMap:
+    def make(draft: SystemDraft) -> StateMap:
         draft.remove([box, body.coupling], [body.pose])
         if not draft.on(body.momentum) and not draft.junctions[body.momentum].exposed:
             draft.remove([], [body.momentum])
@@ -153,21 +153,21 @@ def _pose(draft: Draft, place: tuple[Path, ...]) -> Site | None:
 
     path = "" if way is None else f", and it follows from {' and '.join(str(joint.box) for joint, _ in way)}"
     reason = f"no other part depends on the pose of {body.momentum}{path}"
-    return Site("remove an unused pose", box, Strength.RELATION, reason, refusal, make)
+    return RuleSite("remove an unused pose", box, Strength.RELATION, reason, refusal, make)
 
 
-def _at(draft: Draft, momentum: Path) -> list[Path]:
+def _joints_of(draft: SystemDraft, momentum: Path) -> list[Path]:
     """The joints of a body."""
     return [joint.box for joint in joints(draft) if momentum in joint.ends]
 
 
-def _goes(draft: Draft, box: Path) -> bool:
+def _goes(draft: SystemDraft, box: Path) -> bool:
     """Whether a joint is free or rigid, now or after another rewrite."""
     site = _joint(draft, (box,))
     return _merges(draft, box) or (site is not None and (not site.refusal or site.refusal.endswith("first")))
 
 
-def _merges(draft: Draft, box: Path) -> bool:
+def _merges(draft: SystemDraft, box: Path) -> bool:
     site = MERGE.at(draft, (box,))
     return site is not None and (not site.refusal or site.refusal.endswith("first"))
 
@@ -175,11 +175,11 @@ def _merges(draft: Draft, box: Path) -> bool:
 # ---- joints that hold nothing ---------------------------------------------------------------------------------------
 
 
-def _relations(draft: Draft) -> Iterator[tuple[Path, ...]]:
+def _relations(draft: SystemDraft) -> Iterator[tuple[Path, ...]]:
     return ((box,) for box, part in list(draft.fillings.items()) if part.name == "holonomic")
 
 
-def _joint(draft: Draft, place: tuple[Path, ...]) -> Site | None:
+def _joint(draft: SystemDraft, place: tuple[Path, ...]) -> RuleSite | None:
     (box,) = place
     joint = joint_at(draft, box)
     if joint is None or joint.pair.dim != 6:
@@ -203,7 +203,7 @@ def _joint(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         refusal = f"the pose of {lost[0]} is not kept, so the relative pose could not be computed from it"
     ends = [None if end is None else found[end].state for end in joint.ends if end is None or end in found]
 
-    def make(draft: Draft) -> StateMap:
+    def make(draft: SystemDraft) -> StateMap:
         touched = [where.junction for where in draft.wires[box].values()]
         draft.remove([box, *couplings, *([energy] if energy is not None else [])])
         draft.remove([], [j for j in dict.fromkeys([*touched, relative]) if _empty(draft, j)])
@@ -218,21 +218,21 @@ def _joint(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         return _without({joint.relative}, rebuilt)
 
     reason = f"{box} has six degrees of freedom, without constraint, spring and friction"
-    return Site("remove a joint without effect", box, Strength.RELATION, reason, refusal, make)
+    return RuleSite("remove a joint without effect", box, Strength.RELATION, reason, refusal, make)
 
 
-def _empty(draft: Draft, junction: Path) -> bool:
+def _empty(draft: SystemDraft, junction: Path) -> bool:
     return not draft.on(junction) and not draft.reading(junction) and not draft.junctions[junction].exposed
 
 
 # ---- gyroscopic forces ------------------------------------------------------------------------------------------
 
 
-def _gyroscopes(draft: Draft) -> Iterator[tuple[Path, ...]]:
+def _gyroscopes(draft: SystemDraft) -> Iterator[tuple[Path, ...]]:
     return ((box,) for box, part in list(draft.fillings.items()) if part.name == "lie_poisson")
 
 
-def _gyroscopic(draft: Draft, place: tuple[Path, ...]) -> Site | None:
+def _gyroscopic(draft: SystemDraft, place: tuple[Path, ...]) -> RuleSite | None:
     (box,) = place
     part = draft.fillings.get(box)
     if not isinstance(part, Reversible) or part.kernel is None or part.name != "lie_poisson":
@@ -244,7 +244,7 @@ def _gyroscopic(draft: Draft, place: tuple[Path, ...]) -> Site | None:
         refusal = "a wrench from outside may turn it"
     elif inertia is None:
         refusal = "nothing stores its momentum"
-    elif waiting := [at for at in _at(draft, momentum) if _merges(draft, at)]:
+    elif waiting := [at for at in _joints_of(draft, momentum) if _merges(draft, at)]:
         refusal = f"{waiting[0]} {FIRST}"
     else:
         if part.kernel.name == "lie_poisson":
@@ -264,11 +264,11 @@ def _gyroscopic(draft: Draft, place: tuple[Path, ...]) -> Site | None:
             elif moves.shape[1] <= 3:
                 refusal += ": in planar motion, too, the transport term p_υ × ω remains"
 
-    def make(draft: Draft) -> StateMap:
+    def make(draft: SystemDraft) -> StateMap:
         draft.remove([box])
         return StateMap()
 
-    return Site("remove vanishing gyroscopic forces", box, Strength.RELATION, reason, refusal, make)
+    return RuleSite("remove vanishing gyroscopic forces", box, Strength.RELATION, reason, refusal, make)
 
 
 def _vanish(part: Reversible, inertia: Array, moves: Array) -> bool:
@@ -283,7 +283,7 @@ def _vanish(part: Reversible, inertia: Array, moves: Array) -> bool:
     return all(float(np.abs(force(a, b) + force(b, a)).max()) <= ROUNDING * size for a, b in pairs)
 
 
-def _moves(draft: Draft, momentum: Path) -> Array:
+def _moves(draft: SystemDraft, momentum: Path) -> Array:
     """(6, k), orthonormal: a space of all possible twists of the body, by the joints from the ground to it.
 
     The joints' coordinates are drawn, so that no special configuration is taken for all.
@@ -301,7 +301,7 @@ def _moves(draft: Draft, momentum: Path) -> Array:
     return u[:, : rank_of(sizes, CONSTRAINT)] if sizes.size and sizes[0] > 0.0 else np.zeros((6, 0))
 
 
-def _carried(joint: Joint, forward: bool, span: Array, rng: np.random.Generator) -> Array:
+def _carried(joint: DraftJoint, forward: bool, span: Array, rng: np.random.Generator) -> Array:
     """Twists of the next body from those of the last one and the joint's own, at a random element."""
     pose = joint.pair.include(joint.pair.manifold.random(rng))
     near, far = joint.offsets if forward else joint.offsets[::-1]

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.rewrite.folding import FOLD
 from ephs.mechanics.rewrite.rewrite import rewrite
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 
 
 def folded_problem(problem: Problem) -> Problem:
@@ -25,7 +25,7 @@ def folded_problem(problem: Problem) -> Problem:
     places = {slot.path: slot.point for slot in paper.states}
     order = [i for slot in descriptor.states for i in range(places[slot.path].start, places[slot.path].stop)]
 
-    def shown(record: Record, stats: Mapping[str, Any]) -> tuple[Problem, Record, Mapping[str, Any]]:
+    def shown(record: RunRecord, stats: Mapping[str, Any]) -> tuple[Problem, RunRecord, Mapping[str, Any]]:
         x = np.zeros_like(record.x)
         x[:, order] = record.x
         energies = np.zeros((record.energies.shape[0], len(paper.components)))

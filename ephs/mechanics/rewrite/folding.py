@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.rewrite.rewrite import Draft, Rule, Site, StateMap, Strength
+from ephs.mechanics.rewrite.rewrite import Rule, RuleSite, StateMap, Strength, SystemDraft
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
@@ -29,7 +29,7 @@ def _determining(primitive: Primitive) -> tuple[Array, Array] | None:
     return (skew, constraint) if primitive.multipliers and not np.any(skew) else None
 
 
-def _columns(draft: Draft, box: Path, primitive: Reversible, constraint: Array) -> dict[Path, Array]:
+def _columns(draft: SystemDraft, box: Path, primitive: Reversible, constraint: Array) -> dict[Path, Array]:
     """The constraint on the efforts at each junction: ports on one junction share theirs."""
     out: dict[Path, Array] = {}
     for port, where, _ in primitive.bundle.items():
@@ -51,7 +51,7 @@ def _map(columns: Mapping[Path, Array], size: float, inner: Path) -> tuple[Array
     return np.asarray(-np.linalg.solve(block, columns[others[0]]), dtype=float), others[0]
 
 
-def _places(draft: Draft) -> Iterator[tuple[Path, ...]]:
+def _places(draft: SystemDraft) -> Iterator[tuple[Path, ...]]:
     for box, primitive in draft.fillings.items():
         if _determining(primitive) is not None:
             yield (box,)
@@ -60,7 +60,7 @@ def _places(draft: Draft) -> Iterator[tuple[Path, ...]]:
                 yield box, junction
 
 
-def _folds(draft: Draft, box: Path) -> Iterator["_Fold"]:
+def _folds(draft: SystemDraft, box: Path) -> Iterator["_Fold"]:
     """Junctions that a box may fold: those at which it determines the effort."""
     primitive = draft.fillings.get(box)
     found = None if primitive is None else _determining(primitive)
@@ -74,7 +74,7 @@ def _folds(draft: Draft, box: Path) -> Iterator["_Fold"]:
             yield _Fold(box, junction, *mapped)
 
 
-def transformations(draft: Draft, junction: Path) -> Iterator[tuple[Array, Path | None]]:
+def transformations(draft: SystemDraft, junction: Path) -> Iterator[tuple[Array, Path | None]]:
     """(matrix, other junction) of each component that determines the effort at a junction; None where it is zero."""
     for box, _ in draft.on(junction):
         for fold in _folds(draft, box):
@@ -82,7 +82,7 @@ def transformations(draft: Draft, junction: Path) -> Iterator[tuple[Array, Path 
                 yield fold.matrix, fold.target
 
 
-def _idle(draft: Draft, box: Path) -> Site | None:
+def _idle(draft: SystemDraft, box: Path) -> RuleSite | None:
     """A component without effect: a closed loop of levers."""
     primitive = draft.fillings.get(box)
     found = None if primitive is None else _determining(primitive)
@@ -95,20 +95,20 @@ def _idle(draft: Draft, box: Path) -> Site | None:
     if any(draft.junctions[j].exposed and {b for b, _ in draft.on(j)} == {box} for j in columns):
         return None  # an outer port needs a junction
 
-    def make(draft: Draft) -> StateMap:
+    def make(draft: SystemDraft) -> StateMap:
         draft.remove([box])
         draft.remove([], _deserted(draft, columns))
         return StateMap()
 
-    return Site(NAME, box, Strength.RELATION, f"{box} repeats equations of others for the same efforts", "", make)
+    return RuleSite(NAME, box, Strength.RELATION, f"{box} repeats equations of others for the same efforts", "", make)
 
 
-def _deserted(draft: Draft, junctions: Iterable[Path]) -> list[Path]:
+def _deserted(draft: SystemDraft, junctions: Iterable[Path]) -> list[Path]:
     """Junctions without ports."""
     return [j for j in junctions if not draft.on(j) and not draft.reading(j) and not draft.junctions[j].exposed]
 
 
-def _at(draft: Draft, place: tuple[Path, ...]) -> Site | None:
+def _fold_site(draft: SystemDraft, place: tuple[Path, ...]) -> RuleSite | None:
     if len(place) == 1:
         return _idle(draft, place[0])
     box, junction = place
@@ -116,7 +116,7 @@ def _at(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     if fold is None:
         return None
     refusal = fold.refusal(draft) or fold.choice(draft)
-    return Site(NAME, box, Strength.RELATION, fold.reason(draft), refusal, fold.make)
+    return RuleSite(NAME, box, Strength.RELATION, fold.reason(draft), refusal, fold.make)
 
 
 @final
@@ -126,11 +126,11 @@ class _Fold:
     def __init__(self, box: Path, junction: Path, matrix: Array, target: Path | None) -> None:
         self.box, self.junction, self.matrix, self.target = box, junction, matrix, target
 
-    def neighbours(self, draft: Draft) -> list[tuple[Path, Path]]:
+    def neighbours(self, draft: SystemDraft) -> list[tuple[Path, Path]]:
         """The other power ports on the junction."""
         return [where for where in draft.on(self.junction) if where[0] != self.box]
 
-    def reason(self, draft: Draft) -> str:
+    def reason(self, draft: SystemDraft) -> str:
         """Why, in words."""
         into = ", ".join(sorted({str(box) for box, _ in self.neighbours(draft)})) or "nothing"
         if self.target is None:
@@ -140,7 +140,7 @@ class _Fold:
             return f"the effort at {self.junction} is that at {self.target}, and nothing is stored there"
         return f"nothing is stored at {self.junction}: {into} can be connected to {self.target} by a constant matrix"
 
-    def refusal(self, draft: Draft) -> str:
+    def refusal(self, draft: SystemDraft) -> str:
         """Why not, in words."""
         if draft.junctions[self.junction].exposed:
             return f"{self.junction} is an outer port"
@@ -162,7 +162,7 @@ class _Fold:
                 return f"the compiled relation of {box} would be lost"
         return ""
 
-    def choice(self, draft: Draft) -> str:
+    def choice(self, draft: SystemDraft) -> str:
         """Reason for refusal: another component determines the effort too, and either choice would be arbitrary.
 
         It is not where all junctions that determine one another end in one, nor where two are in series.
@@ -178,7 +178,7 @@ class _Fold:
             return ""
         return f"{rivals[0]} determines the effort at {self.junction} as well"
 
-    def make(self, draft: Draft) -> StateMap:
+    def make(self, draft: SystemDraft) -> StateMap:
         """Apply the fold."""
         neighbours: dict[Path, list[Path]] = {}
         for box, port in self.neighbours(draft):
@@ -197,7 +197,7 @@ class _Fold:
         return StateMap()
 
 
-def _ends(draft: Draft, start: Path) -> int:
+def _ends(draft: SystemDraft, start: Path) -> int:
     """Number of junctions in a cycle of efforts that cannot be folded; that of no effort is one."""
     seen, queue, ends, still = {start}, [start], 0, False
     while queue:
@@ -220,5 +220,5 @@ WHY = (
     "nothing is stored, read or exposed at its inner junction, so the parts there are connected to the outer one by a "
     "constant matrix; and junctions with zero effort, as at the ground, need no ports"
 )
-FOLD = Rule(NAME, Strength.RELATION, WHY, _places, _at)
+FOLD = Rule(NAME, Strength.RELATION, WHY, _places, _fold_site)
 """Fold components that determine one effort from another."""

@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.rewrite.folding import transformations
-from ephs.mechanics.rewrite.rewrite import Draft
+from ephs.mechanics.rewrite.rewrite import SystemDraft
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
@@ -24,7 +24,7 @@ CONSTRAINED = "holonomic"
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint:
+class DraftJoint:
     """A joint's relation in a draft.
 
     Parameters
@@ -55,7 +55,7 @@ class Joint:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Body:
+class DraftBody:
     """A body in a draft: the junctions of its momentum and pose, their coupling, and its storages' paths."""
 
     momentum: Path
@@ -69,26 +69,26 @@ class Body:
         return self.potential / "q"
 
 
-def bodies(draft: Draft) -> dict[Path, Body]:
+def bodies(draft: SystemDraft) -> dict[Path, DraftBody]:
     """The bodies that keep a pose, by the junction of their momentum."""
-    out: dict[Path, Body] = {}
+    out: dict[Path, DraftBody] = {}
     for box, part in draft.fillings.items():
         if part.name != "pkc" or not isinstance(part, Reversible):
             continue
         ports = {part.interface[port].quantity.kind: draft.wires[box][port].junction for port in part.bundle.ports}
         if set(ports) == {"pose", "momentum"} and (storage := draft.stored(ports["pose"])) is not None:
-            out[ports["momentum"]] = Body(ports["momentum"], ports["pose"], box, storage)
+            out[ports["momentum"]] = DraftBody(ports["momentum"], ports["pose"], box, storage)
     return out
 
 
-def joints(draft: Draft) -> Iterator[Joint]:
+def joints(draft: SystemDraft) -> Iterator[DraftJoint]:
     """The joints whose relative pose is stored."""
     for box, part in draft.fillings.items():
         if part.name == CONSTRAINED and (found := joint_at(draft, box)) is not None:
             yield found
 
 
-def joint_at(draft: Draft, box: Path) -> Joint | None:
+def joint_at(draft: SystemDraft, box: Path) -> DraftJoint | None:
     """The joint of a box; None where there is none, or its ends are no frames at constant offsets."""
     part = draft.fillings.get(box)
     if part is None or part.name != CONSTRAINED or part.kernel is None:
@@ -115,7 +115,7 @@ def joint_at(draft: Draft, box: Path) -> Joint | None:
         ends.append(end)
         offsets.append(_offset(matrix))
     space = part.interface[read].quantity.space
-    return Joint(box, (ends[0], ends[1]), (offsets[0], offsets[1]), Pair.from_space(space), source / "q_r")
+    return DraftJoint(box, (ends[0], ends[1]), (offsets[0], offsets[1]), Pair.from_space(space), source / "q_r")
 
 
 def _folded(part: Primitive, port: Path) -> Array:
@@ -135,14 +135,14 @@ def _offset(matrix: Array) -> Array:
     return SE3.normalise(SE3.inverse(np.concatenate([matrix_to_quaternion(turn), at])))
 
 
-def reach(draft: Draft, start: Path, known: set[Path | None]) -> tuple[tuple[Joint, bool], ...] | None:
+def reach(draft: SystemDraft, start: Path, known: set[Path | None]) -> tuple[tuple[DraftJoint, bool], ...] | None:
     """Joints from a known frame to a body, each with whether it is passed from its first to its second body."""
-    at: dict[Path | None, list[tuple[Joint, bool, Path | None]]] = {}
+    at: dict[Path | None, list[tuple[DraftJoint, bool, Path | None]]] = {}
     for joint in joints(draft):
         one, two = joint.ends
         at.setdefault(one, []).append((joint, True, two))
         at.setdefault(two, []).append((joint, False, one))
-    queue: list[tuple[Path | None, tuple[tuple[Joint, bool], ...]]] = [(start, ())]
+    queue: list[tuple[Path | None, tuple[tuple[DraftJoint, bool], ...]]] = [(start, ())]
     seen: set[Path | None] = {start}
     while queue:
         here, way = queue.pop(0)
@@ -158,13 +158,13 @@ def reach(draft: Draft, start: Path, known: set[Path | None]) -> tuple[tuple[Joi
     return None
 
 
-def anchor(way: tuple[tuple[Joint, bool], ...]) -> Path | None:
+def anchor(way: tuple[tuple[DraftJoint, bool], ...]) -> Path | None:
     """The frame at which a way begins."""
     joint, forward = way[0]
     return joint.ends[0] if forward else joint.ends[1]
 
 
-def inertia_at(draft: Draft, momentum: Path) -> Array | None:
+def inertia_at(draft: SystemDraft, momentum: Path) -> Array | None:
     """(6, 6) inertia of the quadratic storage of a momentum; None where there is none."""
     for box, _ in draft.on(momentum):
         part = draft.fillings[box]

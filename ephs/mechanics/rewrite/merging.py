@@ -11,8 +11,8 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.elements import components
-from ephs.mechanics.rewrite.frames import Body, bodies, inertia_at, joint_at
-from ephs.mechanics.rewrite.rewrite import Draft, Rule, Site, State, StateMap, Strength
+from ephs.mechanics.rewrite.frames import DraftBody, bodies, inertia_at, joint_at
+from ephs.mechanics.rewrite.rewrite import Rule, RuleSite, State, StateMap, Strength, SystemDraft
 from ephs.operad import Path, quantity
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.primitives import structures
@@ -27,16 +27,16 @@ REFERENCE = Reference()
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Parts:
+class _BodyBoxes:
     """A body's boxes and its inertia (6, 6)."""
 
-    body: Body
+    body: DraftBody
     kinetic: Path
     gyroscopic: Path
     inertia: Array
 
 
-def _parts(draft: Draft, body: Body | None) -> _Parts | None:
+def _parts(draft: SystemDraft, body: DraftBody | None) -> _BodyBoxes | None:
     """None where the junction is not that of a whole body."""
     if body is None:
         return None
@@ -45,14 +45,14 @@ def _parts(draft: Draft, body: Body | None) -> _Parts | None:
     turning = next((box for box in on if draft.fillings[box].name == "lie_poisson"), None)
     if kinetic is None or inertia is None or turning is None:
         return None
-    return _Parts(body, kinetic, turning, inertia)
+    return _BodyBoxes(body, kinetic, turning, inertia)
 
 
-def _places(draft: Draft) -> Iterator[tuple[Path, ...]]:
+def _places(draft: SystemDraft) -> Iterator[tuple[Path, ...]]:
     return ((box,) for box, part in list(draft.fillings.items()) if part.name == "holonomic")
 
 
-def _at(draft: Draft, place: tuple[Path, ...]) -> Site | None:
+def _merge_site(draft: SystemDraft, place: tuple[Path, ...]) -> RuleSite | None:
     (box,) = place
     joint = joint_at(draft, box)
     if joint is None or joint.pair.dim != 0:
@@ -63,32 +63,32 @@ def _at(draft: Draft, place: tuple[Path, ...]) -> Site | None:
     first, second = (_parts(draft, found.get(end) if end is not None else None) for end in joint.ends)
     if first is None or second is None:
         refusal = "one of its ends is not a body with inertia and pose"
-        return Site(NAME, box, Strength.TRAJECTORIES, reason, refusal, lambda _draft: StateMap())
+        return RuleSite(NAME, box, Strength.TRAJECTORIES, reason, refusal, lambda _draft: StateMap())
     x = SE3.compose(joint.offsets[0], SE3.inverse(joint.offsets[1]))
     if direct != list(joint.ends):
-        return Site(NAME, box, Strength.TRAJECTORIES, reason, "its offsets come first", lambda _draft: StateMap())
+        return RuleSite(NAME, box, Strength.TRAJECTORIES, reason, "its offsets come first", lambda _draft: StateMap())
     if second.body.momentum < first.body.momentum:  # the first name is kept
         first, second, x = second, first, SE3.inverse(x)
     merge = _Merge(box, first, second, SE3.normalise(x), joint.relative)
-    return Site(NAME, box, Strength.TRAJECTORIES, reason, merge.refusal(draft), merge.make)
+    return RuleSite(NAME, box, Strength.TRAJECTORIES, reason, merge.refusal(draft), merge.make)
 
 
 @final
 class _Merge:
     """The second body becomes part of the first one."""
 
-    def __init__(self, box: Path, first: _Parts, second: _Parts, x: Array, relative: Path) -> None:
+    def __init__(self, box: Path, first: _BodyBoxes, second: _BodyBoxes, x: Array, relative: Path) -> None:
         self.box, self.first, self.second, self.x, self.relative = box, first, second, x, relative
         self.carried = SE3.adjoint(SE3.inverse(x))
         self.inertia = first.inertia + self.carried.T @ second.inertia @ self.carried
 
-    def _own(self, draft: Draft) -> list[Path]:
+    def _own(self, draft: SystemDraft) -> list[Path]:
         """The boxes of the joint."""
         wires = draft.wires[self.box]
         inner = [wires[Path.of(port)].junction for port in ("p_r", "q_r")]
         return list(dict.fromkeys(box for junction in inner for box, _ in draft.on(junction)))
 
-    def refusal(self, draft: Draft) -> str:
+    def refusal(self, draft: SystemDraft) -> str:
         """Why not, in words."""
         gone = self.second.body
         if draft.junctions[gone.momentum].exposed:
@@ -104,7 +104,7 @@ class _Merge:
             return f"{others[0]} comes first"
         return ""
 
-    def make(self, draft: Draft) -> StateMap:
+    def make(self, draft: SystemDraft) -> StateMap:
         """Apply the merge."""
         first, second = self.first, self.second
         own = self._own(draft)
@@ -185,5 +185,5 @@ class _Merge:
 
 
 WHY = "rigidly connected bodies move as one: the twist of the second is that of the first, in its own frame"
-MERGE = Rule(NAME, Strength.TRAJECTORIES, WHY, _places, _at)
+MERGE = Rule(NAME, Strength.TRAJECTORIES, WHY, _places, _merge_site)
 """Fixed joints between bodies: their wrenches are lost, all else stays."""

@@ -63,7 +63,7 @@ class StateMap:
 
 
 @final
-class Draft:
+class SystemDraft:
     """Draft of a flat system under rewriting, which rules read and change, so that many sites cost one new pattern.
 
     Attributes
@@ -140,7 +140,7 @@ class Draft:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Site:
+class RuleSite:
     """A place where a rule applies, or would if its condition held.
 
     Parameters
@@ -162,7 +162,7 @@ class Site:
     strength: Strength
     reason: str
     refusal: str
-    make: Callable[[Draft], StateMap]
+    make: Callable[[SystemDraft], StateMap]
 
     def apply(self, system: System) -> "Rewritten":
         """The system rewritten at this site.
@@ -174,7 +174,7 @@ class Site:
         """
         if self.refusal:
             raise AssemblyError("rewrite", self.where, rule=self.rule, found=self.refusal)
-        draft = Draft(system)
+        draft = SystemDraft(system)
         states = self.make(draft)
         return Rewritten(_begun(draft.system(), system, states), states, (self,))
 
@@ -196,7 +196,7 @@ class Rewritten:
 
     system: System
     states: StateMap
-    done: tuple[Site, ...]
+    done: tuple[RuleSite, ...]
 
     def then(self, other: "Rewritten") -> "Rewritten":
         """These rewrites, then others."""
@@ -221,13 +221,13 @@ class Rule:
     name: str
     strength: Strength
     why: str
-    places: Callable[[Draft], Iterable[tuple[Path, ...]]]
-    at: Callable[[Draft, tuple[Path, ...]], Site | None]
+    places: Callable[[SystemDraft], Iterable[tuple[Path, ...]]]
+    at: Callable[[SystemDraft, tuple[Path, ...]], RuleSite | None]
 
 
-def sites_of(system: System, rule: Rule) -> tuple[Site, ...]:
+def sites_of(system: System, rule: Rule) -> tuple[RuleSite, ...]:
     """Matches of a rule, and its refusals, anywhere in a hierarchical system; paths are those of its flat form."""
-    draft = Draft(system)
+    draft = SystemDraft(system)
     found = (rule.at(draft, place) for place in rule.places(draft))
     return tuple(site for site in found if site is not None)
 
@@ -240,8 +240,8 @@ def rewrite(system: System, rules: Iterable[Rule]) -> Rewritten:
     OptionError
         Rules do not come to an end: they were used `MOST` times for each box and junction.
     """
-    draft = Draft(system)
-    states, done, known = StateMap(), list[Site](), tuple(rules)
+    draft = SystemDraft(system)
+    states, done, known = StateMap(), list[RuleSite](), tuple(rules)
     size = len(draft.fillings) + len(draft.junctions)
     again = True
     while again:

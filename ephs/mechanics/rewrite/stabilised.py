@@ -3,7 +3,7 @@
 from ephs.mechanics.elements.closing import Q1, Q2, Q_R, closing
 from ephs.mechanics.elements.components import holonomic
 from ephs.mechanics.rewrite.frames import CONSTRAINED, bodies, inertia_at, joint_at
-from ephs.mechanics.rewrite.rewrite import Draft
+from ephs.mechanics.rewrite.rewrite import SystemDraft
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
@@ -23,7 +23,7 @@ def stabilised(system: System) -> System:
     AssemblyError
         A joint between frames that have no pose or no inertia, as inside universal joints; it names the joint.
     """
-    draft = Draft(system)
+    draft = SystemDraft(system)
     found = bodies(draft)
     for box in [box for box, part in draft.fillings.items() if part.name == CONSTRAINED]:
         joint = joint_at(draft, box)

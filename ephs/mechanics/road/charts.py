@@ -13,7 +13,7 @@ TIE: Final = 100
 
 @final
 @dataclass(frozen=True, slots=True, order=True)
-class Kind:
+class GroupKind:
     """A group, and how many numbers an element and an increment have; known while staging."""
 
     code: int
@@ -34,7 +34,7 @@ class Chart(Record):
 
 
 def visit_kind(
-    on: Evaluator, kinds: tuple[Kind, ...], code: Integer, dim: Integer, body: Callable[[Kind], None]
+    on: Evaluator, kinds: tuple[GroupKind, ...], code: Integer, dim: Integer, body: Callable[[GroupKind], None]
 ) -> None:
     """Call body(kind) with the kind of a joint, which is then known."""
 
@@ -50,23 +50,25 @@ def visit_kind(
         among(0)
 
 
-def of_joints(kinds: tuple[Kind, ...]) -> tuple[Kind, ...]:
+def of_joints(kinds: tuple[GroupKind, ...]) -> tuple[GroupKind, ...]:
     """The kinds but for those of gears, which have no charts."""
     return tuple(kind for kind in kinds if kind.code != TIE)
 
 
-def advance(on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], base: Vector, v: Vector, q: Vector) -> None:
+def advance(
+    on: Evaluator, kinds: tuple[GroupKind, ...], charts: Table[Chart], base: Vector, v: Vector, q: Vector
+) -> None:
     """q = base·exp(v), joint by joint."""
 
-    def one(i: Integer) -> None:
+    def each_chart(i: Integer) -> None:
         chart = charts[i]
 
-        def of(kind: Kind) -> None:
+        def with_kind(kind: GroupKind) -> None:
             element = [base[chart.q_at + k] for k in range(kind.size)]
             change = [v[chart.v_at + j] for j in range(kind.dim)]
             for k, x in enumerate(STAGED[kind.code].retract(on, element, change)):
                 q[chart.q_at + k] = x
 
-        visit_kind(on, of_joints(kinds), chart.code, chart.dim, of)
+        visit_kind(on, of_joints(kinds), chart.code, chart.dim, with_kind)
 
-    on.loop(charts.size, one)
+    on.loop(charts.size, each_chart)

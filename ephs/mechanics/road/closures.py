@@ -51,11 +51,11 @@ class Closures:
     def each_row(self, on: Evaluator, body: Callable[[Cut, Integer, Integer], None]) -> None:
         """Call body(joint, row, place of its first end) for all rows."""
 
-        def of(i: Integer) -> None:
+        def each_cut(i: Integer) -> None:
             cut = self.cuts[i]
             on.loop(cut.rows, lambda j: body(cut, cut.row + j, cut.end + 2 * j))
 
-        on.loop(self.cuts.size, of)
+        on.loop(self.cuts.size, each_cut)
 
     def at_end(self, e: Integer) -> list[Real]:
         """The covector of a row on one of its links."""
@@ -64,18 +64,18 @@ class Closures:
     def push(self, on: Evaluator, tree: Tree, multiplier: Vector) -> None:
         """Take the wrenches of multipliers off the links' loads."""
 
-        def one(cut: Cut, row: Integer, end: Integer) -> None:
+        def each_row(cut: Cut, row: Integer, end: Integer) -> None:
             for link, e in ((cut.first, end), (cut.second, end + 1)):
                 on.when(link >= 0, lambda link=link, e=e: _load(tree, link, scale(-multiplier[row], self.at_end(e))))
 
-        self.each_row(on, one)
+        self.each_row(on, each_row)
 
     def along(self, on: Evaluator, rates: Vector, changes: Vector, first: Integer) -> None:
         """The cut joints' rates and accelerations along their degrees of freedom; ``first`` is the place of the first
         in v.
         """
 
-        def of(i: Integer) -> None:
+        def each_cut(i: Integer) -> None:
             cut, start = self.cuts[i], i * self.motions.columns
             motion = Relative(self.cuts.integers, 0, self.motions.cells, self.motions.start + start)
             twist, change = motion.twist, motion.change
@@ -87,7 +87,7 @@ class Closures:
 
             on.loop(cut.dim, freedom)
 
-        on.loop(self.cuts.size, of)
+        on.loop(self.cuts.size, each_cut)
 
 
 def _load(tree: Tree, link: Integer, by: list[Real]) -> None:

@@ -11,9 +11,9 @@ where the element is not the one at which the gear meshes.
 
 from collections.abc import Callable
 
-from ephs.mechanics.road.charts import TIE, Chart, Kind, of_joints, visit_kind
+from ephs.mechanics.road.charts import TIE, Chart, GroupKind, of_joints, visit_kind
 from ephs.mechanics.road.needs import NO_INTEGERS
-from ephs.mechanics.road.records import Place
+from ephs.mechanics.road.records import LinkPlace
 from ephs.mechanics.road.tree import shift, shift_back, turned
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.spaces.se3 import bracket
@@ -107,10 +107,10 @@ class Relative(Record):
     change = reals(6)
 
 
-def place_of(on: Evaluator, places: Matrix, link: Integer) -> Place:
+def place_of(on: Evaluator, places: Matrix, link: Integer) -> LinkPlace:
     """Row of a link; the ground's is the last."""
     row = on.select(link < 0, places.rows - 1, link)
-    return Place(NO_INTEGERS, 0, places.cells, places.start + row * places.columns)
+    return LinkPlace(NO_INTEGERS, 0, places.cells, places.start + row * places.columns)
 
 
 def motion_of(motion: Matrix, i: Integer) -> Relative:
@@ -118,7 +118,7 @@ def motion_of(motion: Matrix, i: Integer) -> Relative:
     return Relative(NO_INTEGERS, 0, motion.cells, motion.start + i * motion.columns)
 
 
-def frame_on(place: Place, turn: Rows, at: Entries) -> tuple[Rows, list[Real]]:
+def frame_on(place: LinkPlace, turn: Rows, at: Entries) -> tuple[Rows, list[Real]]:
     """A frame in the world, given in that of a link."""
     return product(place.turn, turn), add(place.at, apply(place.turn, at))
 
@@ -129,7 +129,7 @@ def pose_of(on: Evaluator, first: tuple[Rows, Entries], second: tuple[Rows, Entr
     return [*so3.quaternion(on, turn), *apply_transposed(first[0], sub(second[1], first[1]))]
 
 
-def twist_of(near: Place, far: Place, turn: Rows, at: Entries) -> list[Real]:
+def twist_of(near: LinkPlace, far: LinkPlace, turn: Rows, at: Entries) -> list[Real]:
     """The far link's twist relative to the near one, in the axes of a frame in the world."""
     return turned(transposed(turn), sub(shift(far.twist, sub(at, far.at)), shift(near.twist, sub(at, near.at))))
 
@@ -137,21 +137,21 @@ def twist_of(near: Place, far: Place, turn: Rows, at: Entries) -> list[Real]:
 def _each_row(on: Evaluator, cut: Cut, body: Callable[[Integer, Integer, list[Real]], None]) -> None:
     """Call body(row, place in ``end``, n) for the rows of a cut joint."""
 
-    def one(j: Integer) -> None:
+    def each_row(j: Integer) -> None:
         normal = Vector(cut.reals, cut.real_start + Cut.normal.offset + 6 * j, 6)
         body(cut.row + j, cut.end + 2 * j, [normal[k] for k in range(6)])
 
-    on.loop(cut.rows, one)
+    on.loop(cut.rows, each_row)
 
 
 def _clear(on: Evaluator, value: Matrix) -> None:
-    def one(a: Integer) -> None:
+    def each_row(a: Integer) -> None:
         value[a, 0] = 0.0
 
-    on.loop(value.rows, one)
+    on.loop(value.rows, each_row)
 
 
-def _pose(on: Evaluator, kind: Kind, cut: Cut, q: Vector) -> list[Real]:
+def _pose(on: Evaluator, kind: GroupKind, cut: Cut, q: Vector) -> list[Real]:
     """Pose of an element of a joint."""
     x = [q[cut.q_at + k] for k in range(kind.size)]
     if kind.code == codes.SO3:
@@ -165,7 +165,7 @@ def _pose(on: Evaluator, kind: Kind, cut: Cut, q: Vector) -> list[Real]:
     return se3.exp(on, combine(columns, x) if kind.dim else [0.0] * 6)
 
 
-def _gap(on: Evaluator, kind: Kind, cut: Cut, motion: Relative, q: Vector) -> list[Real]:
+def _gap(on: Evaluator, kind: GroupKind, cut: Cut, motion: Relative, q: Vector) -> list[Real]:
     """log of the pose that is from the one that the joint's element stands for; of a gear, how far a joint is from
     where it meshes."""
     if kind.code == TIE:
@@ -181,7 +181,7 @@ def rows(
     Parameters
     ----------
     places
-        (links + 1, …): rows of links and the ground that begin with `Place`.
+        (links + 1, …): rows of links and the ground that begin with `LinkPlace`.
     motions
         (cuts, 31): receives `Relative`, but for poses.
     end
@@ -194,7 +194,7 @@ def rows(
         for k in range(6):
             covector[slot, k] = covector[slot, k] + by[k]
 
-    def one(i: Integer) -> None:
+    def each_cut(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
         near, far = place_of(on, places, cut.first), place_of(on, places, cut.second)
         turn, at = frame_on(far, cut.outer_turn, cut.outer_at)
@@ -215,27 +215,27 @@ def rows(
         _each_row(on, cut, row)
 
     _clear(on, value)
-    on.loop(cuts.size, one)
+    on.loop(cuts.size, each_cut)
 
 
 def poses(on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix) -> None:
     """Write poses of second frames in first ones, where `rows` has been."""
 
-    def one(i: Integer) -> None:
+    def each_cut(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
         inner = frame_on(place_of(on, places, cut.first), cut.inner_turn, cut.inner_at)
         motion.pose = pose_of(on, inner, (motion.turn, motion.at))
 
-    on.loop(cuts.size, one)
+    on.loop(cuts.size, each_cut)
 
 
-def fit(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matrix, q: Vector) -> None:
+def fit(on: Evaluator, kinds: tuple[GroupKind, ...], cuts: Table[Cut], motions: Matrix, q: Vector) -> None:
     """Move the cut joints' elements to where their bodies put them."""
 
-    def one(i: Integer) -> None:
+    def each_cut(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
 
-        def of(kind: Kind) -> None:
+        def with_kind(kind: GroupKind) -> None:
             def closer(_: Integer) -> None:
                 log, left = _gap(on, kind, cut, motion, q), cut.left
                 change = [dot(left[j], log) for j in range(kind.dim)]
@@ -246,19 +246,21 @@ def fit(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matri
             if kind.dim:
                 on.loop(3 if kind.dim > 1 or kind.code != codes.VECTOR else 2, closer)
 
-        visit_kind(on, kinds, cut.code, cut.dim, of)
+        visit_kind(on, kinds, cut.code, cut.dim, with_kind)
 
-    on.loop(cuts.size, one)
+    on.loop(cuts.size, each_cut)
 
 
-def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matrix, q: Vector, value: Matrix) -> Real:
+def gaps(
+    on: Evaluator, kinds: tuple[GroupKind, ...], cuts: Table[Cut], motions: Matrix, q: Vector, value: Matrix
+) -> Real:
     """Write targets that close the joints in one step of Newton's method; return how far they are open (m, rad)."""
     worst = on.variable(0.0)
 
-    def one(i: Integer) -> None:
+    def each_cut(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
 
-        def of(kind: Kind) -> None:
+        def with_kind(kind: GroupKind) -> None:
             log = _gap(on, kind, cut, motion, q)
 
             def row(a: Integer, e: Integer, normal: list[Real]) -> None:
@@ -266,10 +268,10 @@ def gaps(on: Evaluator, kinds: tuple[Kind, ...], cuts: Table[Cut], motions: Matr
 
             _each_row(on, cut, row)
 
-        visit_kind(on, kinds, cut.code, cut.dim, of)
+        visit_kind(on, kinds, cut.code, cut.dim, with_kind)
 
     _clear(on, value)
-    on.loop(cuts.size, one)
+    on.loop(cuts.size, each_cut)
     on.loop(value.rows, lambda a: _widen(on, worst, value[a, 0]))
     return worst.value
 
@@ -283,7 +285,7 @@ def _widen(on: Evaluator, worst: Variable[Real], x: Real) -> None:
 def relative_rates(on: Evaluator, cuts: Table[Cut], motions: Matrix, value: Matrix) -> None:
     """Write targets that take the cut joints' forbidden velocities away, where `rows` has been."""
 
-    def one(i: Integer) -> None:
+    def each_cut(i: Integer) -> None:
         twist = motion_of(motions, i).twist
 
         def row(a: Integer, e: Integer, normal: list[Real]) -> None:
@@ -292,7 +294,7 @@ def relative_rates(on: Evaluator, cuts: Table[Cut], motions: Matrix, value: Matr
         _each_row(on, cuts[i], row)
 
     _clear(on, value)
-    on.loop(cuts.size, one)
+    on.loop(cuts.size, each_cut)
 
 
 def across(on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix, value: Matrix) -> None:
@@ -302,7 +304,7 @@ def across(on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix, val
         place = place_of(on, places, link)
         return shift(place.change, sub(at, place.at))
 
-    def one(i: Integer) -> None:
+    def each_cut(i: Integer) -> None:
         cut, motion = cuts[i], motion_of(motions, i)
         at = motion.at
         moved = turned(transposed(motion.turn), sub(change(cut.second, at), change(cut.first, at)))
@@ -313,19 +315,19 @@ def across(on: Evaluator, cuts: Table[Cut], places: Matrix, motions: Matrix, val
         _each_row(on, cut, row)
 
     _clear(on, value)
-    on.loop(cuts.size, one)
+    on.loop(cuts.size, each_cut)
 
 
 def velocities(
-    on: Evaluator, kinds: tuple[Kind, ...], charts: Table[Chart], cuts: Table[Cut], motions: Matrix, v: Vector,
+    on: Evaluator, kinds: tuple[GroupKind, ...], charts: Table[Chart], cuts: Table[Cut], motions: Matrix, v: Vector,
     r: Vector, out: Vector,
 ) -> None:  # fmt: skip
     """v̇ = dexp⁻¹(v) r of all joints, that of cut ones from their relative motions, into ``out``."""
 
-    def one(i: Integer) -> None:
+    def each_chart(i: Integer) -> None:
         chart = charts[i]
 
-        def of(kind: Kind) -> None:
+        def with_kind(kind: GroupKind) -> None:
             rates = [on.variable(0.0) for _ in range(kind.dim)]
 
             def on_tree() -> None:
@@ -345,6 +347,6 @@ def velocities(
             for j, x in enumerate(found):
                 out[chart.v_at + j] = x
 
-        visit_kind(on, of_joints(kinds), chart.code, chart.dim, of)
+        visit_kind(on, of_joints(kinds), chart.code, chart.dim, with_kind)
 
-    on.loop(charts.size, one)
+    on.loop(charts.size, each_chart)

@@ -16,7 +16,7 @@ from ephs.operad.disjoint import DisjointSets
 from ephs.solve.sparse import Index
 
 
-class Closing(NamedTuple):
+class ClosingProgram(NamedTuple):
     """The program of the elimination, for links 0 … n − 1 and the ground as link n."""
 
     at: Index  # (n + 1, 4): first slot, slots, of them eliminated here (they come first), first pair in `flat`
@@ -28,7 +28,7 @@ class Closing(NamedTuple):
     blocks: int  # groups of rows that are coupled
 
 
-def closing(parents: Sequence[int], ends: Sequence[Sequence[int]]) -> Closing:
+def closing(parents: Sequence[int], ends: Sequence[Sequence[int]]) -> ClosingProgram:
     """The program for links with these parents, −1 for the ground, and rows among these links.
 
     A link's number is larger than its parent's.
@@ -106,7 +106,7 @@ def closing(parents: Sequence[int], ends: Sequence[Sequence[int]]) -> Closing:
     blocks: dict[int, int] = {}
     rows_at[:, 3] = [blocks.setdefault(sets.leader(row), len(blocks)) for row in range(m)]
     places = [number[x if x >= 0 else ground, row] for row, links in enumerate(ends) for x in links]
-    return Closing(
+    return ClosingProgram(
         at,
         np.array(slots, dtype=np.int64).reshape(-1, 2),
         np.array(places, dtype=np.int64),

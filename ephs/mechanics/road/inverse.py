@@ -7,21 +7,21 @@ units, all else is zero), and covectors on links as rows on the rates.
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-from ephs.mechanics.road.records import Joint, Link, Tree
+from ephs.mechanics.road.records import JointKind, LinkConstants, Tree
 from ephs.mechanics.road.tree import Inertia, axes_of, moved_by, shift_back, spread
 from ephs.semantics.spaces.se3 import bracket
 from ephs.semantics.spaces.vectors import add, dot, sub
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector
 
-Take: TypeAlias = Callable[[Integer, Joint, Link, list[Real], list[Real]], None]
+Take: TypeAlias = Callable[[Integer, JointKind, LinkConstants, list[Real], list[Real]], None]
 """Called with a link's number, joint and constants, the load on it, and the force that this is on the joint's rates."""
 
 
 def gather(on: Evaluator, tree: Tree, take: Take) -> None:
     """Carry the links' loads inwards, and let ``take`` see what each joint bears."""
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state = tree.states[i]
             load = state.load
             force = [dot(axis, load) for axis in axes_of(joint, link, state)]
@@ -35,21 +35,21 @@ def gather(on: Evaluator, tree: Tree, take: Take) -> None:
 
         tree.visit(on, i, through)
 
-    tree.each(on, one, down=True)
+    tree.each(on, each_link, down=True)
 
 
 def _accelerated(on: Evaluator, tree: Tree, *, alone: bool) -> None:
     """Add I δa of all links to their loads; alone: in place of them."""
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state = tree.states[i]
             inertial = Inertia.of(link, state.turn).momentum(state.change)
             state.load = inertial if alone else add(state.load, inertial)
 
         tree.visit(on, i, through)
 
-    tree.each(on, one)
+    tree.each(on, each_link)
 
 
 def needed_forces(on: Evaluator, tree: Tree, out: Vector) -> None:
@@ -59,7 +59,7 @@ def needed_forces(on: Evaluator, tree: Tree, out: Vector) -> None:
     """
     _accelerated(on, tree, alone=False)
 
-    def take(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+    def take(i: Integer, joint: JointKind, link: LinkConstants, load: list[Real], force: list[Real]) -> None:
         for j, value in enumerate(force):
             out[link.r_at + j] = out[link.r_at + j] + value
 
@@ -69,29 +69,29 @@ def needed_forces(on: Evaluator, tree: Tree, out: Vector) -> None:
 def armatures(on: Evaluator, tree: Tree, rates: Vector, out: Vector) -> None:
     """Add the inertias that joints' rates have themselves, times rates (n,), to forces or momenta (n,)."""
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             if joint.armature:
                 out[link.r_at] = out[link.r_at] + link.armature * rates[link.r_at]
 
         tree.visit(on, i, through)
 
     if any(joint.armature for joint in tree.joints):
-        tree.each(on, one)
+        tree.each(on, each_link)
 
 
 def weigh(on: Evaluator, tree: Tree) -> None:
     """Put the weights of links alone into their loads, where `outward` has been."""
     ground = tree.states[tree.size].bias[3:]
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state = tree.states[i]
             state.load = Inertia.of(link, state.turn).momentum([0.0, 0.0, 0.0, *ground])
 
         tree.visit(on, i, through)
 
-    tree.each(on, one)
+    tree.each(on, each_link)
 
 
 def action(on: Evaluator, tree: Tree, r: Vector, p: Vector, g: Vector) -> None:
@@ -106,14 +106,14 @@ def action(on: Evaluator, tree: Tree, r: Vector, p: Vector, g: Vector) -> None:
         (n,): holds what acts on the rates, negated.
     """
 
-    def take(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+    def take(i: Integer, joint: JointKind, link: LinkConstants, load: list[Real], force: list[Real]) -> None:
         for j, value in enumerate(force):
             g[link.r_at + j] = -(g[link.r_at + j] + value)
 
     gather(on, tree, take)
 
     def moving(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state = tree.states[i]
             state.load = Inertia.of(link, state.turn).momentum(state.twist)
 
@@ -121,7 +121,7 @@ def action(on: Evaluator, tree: Tree, r: Vector, p: Vector, g: Vector) -> None:
 
     tree.each(on, moving)
 
-    def one(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+    def joint_action(i: Integer, joint: JointKind, link: LinkConstants, load: list[Real], force: list[Real]) -> None:
         state = tree.states[i]
         twist = state.twist
         if joint.dim and not joint.backward:
@@ -130,7 +130,7 @@ def action(on: Evaluator, tree: Tree, r: Vector, p: Vector, g: Vector) -> None:
             p[link.r_at + j] = value
             g[link.r_at + j] = g[link.r_at + j] + dot(load, bracket(twist, axis))
 
-    gather(on, tree, one)
+    gather(on, tree, joint_action)
     armatures(on, tree, r, p)
 
 
@@ -146,7 +146,7 @@ def masses(on: Evaluator, tree: Tree, unit: Vector, mass: Matrix) -> None:
         unit[k] = 0.0
         _accelerated(on, tree, alone=True)
 
-        def take(i: Integer, joint: Joint, link: Link, load: list[Real], force: list[Real]) -> None:
+        def take(i: Integer, joint: JointKind, link: LinkConstants, load: list[Real], force: list[Real]) -> None:
             for j, value in enumerate(force):
                 mass[k, link.r_at + j] = value
 
@@ -178,15 +178,15 @@ def row_of_covector(
     def clear(i: Integer) -> None:
         tree.states[i].load = [0.0] * 6
 
-    def put() -> None:
+    def load_link() -> None:
         tree.states[link].load = covector
 
-    def take(i: Integer, joint: Joint, at: Link, load: list[Real], force: list[Real]) -> None:
+    def take(i: Integer, joint: JointKind, at: LinkConstants, load: list[Real], force: list[Real]) -> None:
         size = on.sqrt(sum((load[k] * load[k] for k in seen), 0.0))
         for j, (column, value) in enumerate(zip(joint.basis, force, strict=True)):
             row[at.r_at + j] = row[at.r_at + j] + value
             count(at.r_at + j, size * sum(x * x for x in column) ** 0.5)
 
     on.loop(tree.size, clear)
-    on.when(link >= 0, put)
+    on.when(link >= 0, load_link)
     gather(on, tree, take)

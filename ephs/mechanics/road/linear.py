@@ -8,8 +8,8 @@ as I − U D⁻¹ Uᵀ and P + U D⁻¹ (τ − SᵀP). Featherstone, *Rigid Bod
 from collections.abc import Callable
 from typing import TypeAlias
 
-from ephs.mechanics.road.records import Joint, Link, State, Tree
-from ephs.mechanics.road.rows import MULTIPLIER, Rows
+from ephs.mechanics.road.records import JointKind, LinkConstants, LinkState, Tree
+from ephs.mechanics.road.rows import MULTIPLIER, LoopRows
 from ephs.mechanics.road.tree import (
     forces_along,
     freedoms_of,
@@ -36,11 +36,11 @@ from ephs.semantics.spaces.vectors import (
 )
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
 
-Force: TypeAlias = Callable[[Integer, Joint, Link], list[Real]]
+Force: TypeAlias = Callable[[Integer, JointKind, LinkConstants], list[Real]]
 """The forces (d,) on the rates of a link's joint: called with the link's number, its joint and its constants."""
 
 
-def no_force(i: Integer, joint: Joint, link: Link) -> list[Real]:
+def no_force(i: Integer, joint: JointKind, link: LinkConstants) -> list[Real]:
     """Nothing acts in the joints."""
     return [0.0] * joint.dim
 
@@ -52,7 +52,7 @@ def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> N
     already.
     """
 
-    def one(joint: Joint, link: Link) -> None:
+    def at_joint(joint: JointKind, link: LinkConstants) -> None:
         state = tree.states[i]
         inertia = _blocks(state)
         if joint.dim and not joint.driven:
@@ -60,10 +60,10 @@ def inward(on: Evaluator, tree: Tree, i: Integer, fault: Variable[Integer]) -> N
             fault.value = on.select(on.either(sound, fault.value > 0), fault.value, i + 1)
         on.when(link.parent < tree.size, lambda: _take_up(tree.states[link.parent], state, inertia))
 
-    tree.visit(on, i, one)
+    tree.visit(on, i, at_joint)
 
 
-def _blocks(state: State) -> vectors.Rows:
+def _blocks(state: LinkState) -> vectors.Rows:
     """The articulated inertia, (6, 6)."""
     angular, mixed, linear = symmetric(state.angular), state.mixed, symmetric(state.linear)
     return [
@@ -73,7 +73,7 @@ def _blocks(state: State) -> vectors.Rows:
 
 
 def _eliminated(
-    on: Evaluator, tree: Tree, joint: Joint, link: Link, state: State, inertia: vectors.Rows
+    on: Evaluator, tree: Tree, joint: JointKind, link: LinkConstants, state: LinkState, inertia: vectors.Rows
 ) -> tuple[vectors.Rows, Truth]:
     """I − U D⁻¹ Uᵀ, and whether D is positive definite; rows of freedoms that are entries of a twist are zero."""
     axes = freedoms_of(joint, link, state)
@@ -96,7 +96,7 @@ def _eliminated(
     return left, sound
 
 
-def _take_up(parent: State, state: State, inertia: vectors.Rows) -> None:
+def _take_up(parent: LinkState, state: LinkState, inertia: vectors.Rows) -> None:
     """Add an inertia of a link to its parent's, about whose origin its blocks A, C and M are, with the way d to the
     link and E = C + d̂ M, A + d̂ Cᵀ − E d̂, E and M.
     """
@@ -114,7 +114,7 @@ def _take_up(parent: State, state: State, inertia: vectors.Rows) -> None:
 def load_inward(on: Evaluator, tree: Tree, force: Force, i: Integer) -> None:
     """Eliminate the joint of link i from its load, which its parent takes up; force(i, joint, link) is on its rates."""
 
-    def one(joint: Joint, link: Link) -> None:
+    def at_joint(joint: JointKind, link: LinkConstants) -> None:
         state = tree.states[i]
         load: Entries = state.load
         if joint.dim and not joint.driven:
@@ -134,13 +134,13 @@ def load_inward(on: Evaluator, tree: Tree, force: Force, i: Integer) -> None:
 
         on.when(link.parent < tree.size, take_up)
 
-    tree.visit(on, i, one)
+    tree.visit(on, i, at_joint)
 
 
 def accelerate_outward(on: Evaluator, tree: Tree, rate: Vector, i: Integer) -> None:
     """ṙ of link i's joint and the link's acceleration beyond its bias, where the parent's is known."""
 
-    def one(joint: Joint, link: Link) -> None:
+    def at_joint(joint: JointKind, link: LinkConstants) -> None:
         state = tree.states[i]
         change = shift(tree.states[link.parent].change, state.down)
         rates: list[Real] = [0.0] * joint.dim
@@ -151,7 +151,7 @@ def accelerate_outward(on: Evaluator, tree: Tree, rate: Vector, i: Integer) -> N
         for j, value in enumerate(rates):
             rate[link.r_at + j] = value
 
-    tree.visit(on, i, one)
+    tree.visit(on, i, at_joint)
 
 
 def accelerations(on: Evaluator, tree: Tree, q: Vector, r: Vector, rate: Vector, force: Force = no_force) -> Integer:
@@ -168,7 +168,7 @@ def accelerations(on: Evaluator, tree: Tree, q: Vector, r: Vector, rate: Vector,
     return fault.value
 
 
-def _needed(state: State) -> list[Real]:
+def _needed(state: LinkState) -> list[Real]:
     """The wrench I δa + P on a link and what it carries."""
     turning, moving, mixed = state.change[:3], state.change[3:], state.mixed
     torque = add(apply(symmetric(state.angular), turning), apply(mixed, moving))
@@ -176,12 +176,12 @@ def _needed(state: State) -> list[Real]:
     return add(state.load, [*torque, *force])
 
 
-def driven_power(on: Evaluator, tree: Tree, rows: Rows, r: Vector, force: Vector) -> Real:
+def driven_power(on: Evaluator, tree: Tree, rows: LoopRows, r: Vector, force: Vector) -> Real:
     """The power of the joints whose motion is prescribed, beside that of the forces in them."""
     total = on.variable(0.0)
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             if not joint.driven:
                 return
             state, rate = tree.states[i], [r[link.r_at + j] for j in range(joint.dim)]
@@ -197,5 +197,5 @@ def driven_power(on: Evaluator, tree: Tree, rows: Rows, r: Vector, force: Vector
 
         tree.visit(on, i, through)
 
-    tree.each(on, one)
+    tree.each(on, each_link)
     return total.value

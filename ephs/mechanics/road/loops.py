@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from ephs.mechanics.road import charts, cuts
-from ephs.mechanics.road.charts import Chart, Kind
+from ephs.mechanics.road.charts import Chart, GroupKind
 from ephs.mechanics.road.cuts import Cut
 from ephs.semantics.spaces import codes
 from ephs.semantics.stage import (
@@ -25,9 +25,9 @@ from ephs.semantics.stage import (
 from ephs.semantics.stage.memory import ArrayReals
 
 
-def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[Kind, ...]:
+def kinds_of(joints: Iterable[tuple[int, int, int]]) -> tuple[GroupKind, ...]:
     """The kinds among joints (code, size, dim), in order."""
-    return tuple(sorted({Kind(int(code), int(size), int(dim)) for code, size, dim in joints}))
+    return tuple(sorted({GroupKind(int(code), int(size), int(dim)) for code, size, dim in joints}))
 
 
 NO_REALS: Final = ArrayReals(np.zeros(0))
@@ -53,7 +53,7 @@ ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
 
 
 @cache
-def loop_program(kinds: tuple[Kind, ...]) -> Program:
+def loop_program(kinds: tuple[GroupKind, ...]) -> Program:
     """Return the program for joints of these kinds."""
 
     def joints(cut: Integers, numbers: Vector) -> Table[Cut]:

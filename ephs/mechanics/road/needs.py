@@ -16,7 +16,7 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function
 from ephs.semantics.stage.kinds import Atom, Kind
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
-from ephs.semantics.stage.numbers import Condition, Count, IntegerOperation, Number, Operation, Order
+from ephs.semantics.stage.numbers import Count, IntegerOperation, Number, Operation, Order, StagedCondition
 from ephs.semantics.stage.reaching import Part
 
 Row = TypeVar("Row", bound=Record)
@@ -24,7 +24,7 @@ Row = TypeVar("Row", bound=Record)
 
 @final
 @dataclass(frozen=True, slots=True)
-class Layout:
+class FieldLayout:
     """Positions of the fields of a record.
 
     Attributes
@@ -55,7 +55,7 @@ class Layout:
 class LaidOut(RealCells):
     """The real numbers of one row of a record with a layout."""
 
-    layout: Layout
+    layout: FieldLayout
     cells: RealCells
     start: Integer
 
@@ -78,7 +78,7 @@ class Compact(Generic[Row]):
     """Rows of a record of real numbers, kept as a layout says."""
 
     record: type[Row]
-    layout: Layout
+    layout: FieldLayout
     memory: Vector
 
     def __getitem__(self, i: Integer) -> Row:
@@ -105,13 +105,13 @@ NO_INTEGERS = _NoIntegers()
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Trace(Number):
+class _DependenceTrace(Number):
     """A number of which nothing is known but the entries that it depends on, as bits."""
 
     on: int
 
     def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
-        return _Trace(_bits(left) | _bits(right))
+        return _DependenceTrace(_bits(left) | _bits(right))
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
         return _TraceTruth(_bits(left) | _bits(right))
@@ -122,7 +122,7 @@ class _Trace(Number):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _TraceTruth(Condition):
+class _TraceTruth(StagedCondition):
     """An unknown condition with its dependencies."""
 
     on: int
@@ -145,7 +145,7 @@ class _TraceCount(Count):
 def _bits(*values: object) -> int:
     found = 0
     for value in values:
-        found |= value.on if isinstance(value, _Trace | _TraceTruth | _TraceCount) else 0
+        found |= value.on if isinstance(value, _DependenceTrace | _TraceTruth | _TraceCount) else 0
     return found
 
 
@@ -160,7 +160,7 @@ class _Entries:
 
     def load(self, entry: int) -> Real:
         value = self.assumed.get(entry, 0.0)
-        return _Trace(1 << entry) if value is None else value
+        return _DependenceTrace(1 << entry) if value is None else value
 
     def store(self, entry: int, value: Real, why: int) -> None:
         known = None if isinstance(value, Number) else float(value)
@@ -193,7 +193,7 @@ class _SurveyedReals(RealCells):
     entries: bool
 
     def load(self, index: Integer) -> Real:
-        return self.on.entries.load(index) if self.entries and isinstance(index, int) else _Trace(0)
+        return self.on.entries.load(index) if self.entries and isinstance(index, int) else _DependenceTrace(0)
 
     def store(self, index: Integer, value: Real) -> None:
         if self.entries and isinstance(index, int):
@@ -222,7 +222,7 @@ class _HeldReal(RealCells):
     entry: int
 
     def load(self, index: Integer) -> Real:
-        return _Trace(1 << self.entry)
+        return _DependenceTrace(1 << self.entry)
 
     def store(self, index: Integer, value: Real) -> None:
         self.on.hold(self.entry, value)
@@ -263,7 +263,7 @@ class Survey(Evaluator):
         makers: dict[Atom, Callable[[], Any]] = {
             "reals": lambda: _SurveyedReals(self, entries=False),
             "integers": _SurveyedIntegers,
-            "real": lambda: _Trace(0),
+            "real": lambda: _DependenceTrace(0),
             "integer": _TraceCount,
         }
         return kind.join([makers[atom]() for atom in kind.atoms])
@@ -273,34 +273,34 @@ class Survey(Evaluator):
         self.entries.live |= _bits(value)
 
     def _function(self, name: Function, *arguments: Real) -> Real:
-        return _Trace(_bits(*arguments))
+        return _DependenceTrace(_bits(*arguments))
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         if isinstance(one, bool | _TraceTruth):
             return _TraceTruth(_bits(truth, one, other))
         if isinstance(one, _TraceCount | int) and isinstance(other, _TraceCount | int):
             return _TraceCount(_bits(truth, one, other))
         if not isinstance(one, Number) and not isinstance(other, Number) and one == other:
             return one
-        return _Trace(_bits(truth, one, other))
+        return _DependenceTrace(_bits(truth, one, other))
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return _TraceTruth(_bits(one, other))
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return truth
 
     def _same(self, one: Integer, other: Integer) -> Truth:
         return _TraceTruth(_bits(one, other))
 
     def real(self, integer: Integer) -> Real:
-        return float(integer) if isinstance(integer, int) else _Trace(_bits(integer))
+        return float(integer) if isinstance(integer, int) else _DependenceTrace(_bits(integer))
 
     def integer(self, real: Real) -> Integer:
         return _TraceCount(_bits(real))
 
     def scale(self, real: Real, power: Integer) -> Real:
-        return _Trace(_bits(real, power))
+        return _DependenceTrace(_bits(real, power))
 
     @contextmanager
     def _because(self, reason: object) -> Iterator[None]:
@@ -316,9 +316,9 @@ class Survey(Evaluator):
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
         with self._because(truth):
-            if isinstance(truth, Condition) or truth:
+            if isinstance(truth, StagedCondition) or truth:
                 yes()
-            if no is not None and (isinstance(truth, Condition) or not truth):
+            if no is not None and (isinstance(truth, StagedCondition) or not truth):
                 no()
 
     def repeat(self, body: Callable[[], Truth]) -> None:
@@ -353,7 +353,7 @@ class Survey(Evaluator):
         return function(on, *arguments)
 
 
-def layout_of(width: int, run: Callable[[Survey], None], shared: int = 0) -> Layout:
+def layout_of(width: int, run: Callable[[Survey], None], shared: int = 0) -> FieldLayout:
     """The layout of a record with so many entries that a program needs.
 
     run(survey) evaluates all its entry functions, with ``survey.memory()`` as the record's numbers. The first entries,
@@ -371,4 +371,4 @@ def layout_of(width: int, run: Callable[[Survey], None], shared: int = 0) -> Lay
     found, needed = survey.entries.assumed, survey.entries.needed()
     varying = [k for k in range(shared, width) if found.get(k, 0.0) is None and needed >> k & 1]
     constants = {k: value for k, value in found.items() if k < width and value is not None}
-    return Layout(constants, {k: column for column, k in enumerate([*range(shared), *varying])})
+    return FieldLayout(constants, {k: column for column, k in enumerate([*range(shared), *varying])})

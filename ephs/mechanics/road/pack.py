@@ -8,34 +8,34 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.road.records import Joint, Link
+from ephs.mechanics.road.records import JointKind, LinkConstants
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import codes, pair
 from ephs.semantics.stage import Table
 
-TURN = Joint(codes.VECTOR, 1, ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),))
+TURN = JointKind(codes.VECTOR, 1, ((0.0, 0.0, 1.0, 0.0, 0.0, 0.0),))
 """A joint that turns about z."""
-SLIDE = Joint(codes.VECTOR, 1, ((0.0, 0.0, 0.0, 1.0, 0.0, 0.0),))
+SLIDE = JointKind(codes.VECTOR, 1, ((0.0, 0.0, 0.0, 1.0, 0.0, 0.0),))
 """A joint that slides along x, as planar mechanisms have it."""
 
 
-def _of(name: str, *, backward: bool) -> Joint:
+def _joint_kind(name: str, *, backward: bool) -> JointKind:
     found = pair(name)
-    return Joint(found.code, found.size, tuple(tuple(column) for column in found.basis.T.tolist()), backward)
+    return JointKind(found.code, found.size, tuple(tuple(column) for column in found.basis.T.tolist()), backward)
 
 
-STANDARD: tuple[Joint, ...] = (
+STANDARD: tuple[JointKind, ...] = (
     TURN,
     SLIDE,
-    *(_of(name, backward=False) for name in ("prismatic", "cylindrical", "planar", "spherical", "free")),
-    *(_of(name, backward=True) for name in ("planar", "spherical", "free")),
+    *(_joint_kind(name, backward=False) for name in ("prismatic", "cylindrical", "planar", "spherical", "free")),
+    *(_joint_kind(name, backward=True) for name in ("planar", "spherical", "free")),
 )
 """Joints without parameters: one looped program serves all mechanisms of these."""
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class PackedLink:
     """A link on its way into the records.
 
     Attributes
@@ -45,7 +45,7 @@ class Part:
     parent
         Number of the parent, −1 for the ground.
     q_at, r_at, sense
-        As in `Link`.
+        As in `LinkConstants`.
     numbers
         (22,): rows of R and p of the joint in the parent's frame, mass, first moments, inertia about the frame (upper
         triangle).
@@ -53,7 +53,7 @@ class Part:
         Inertia of its joint's rate itself.
     """
 
-    joint: Joint
+    joint: JointKind
     parent: int
     q_at: int
     r_at: int
@@ -75,20 +75,20 @@ class Class:
         All moves parallel to the plane of x and y.
     """
 
-    joints: tuple[Joint, ...]
+    joints: tuple[JointKind, ...]
     planar: bool
 
     def constants(self, kind: int) -> dict[int, float]:
-        """Constants of all links with a kind of joints: offset in `Link` and the value, 0 or 1."""
-        turn, moment, inertia = Link.rotation.offset, Link.moment.offset, Link.inertia.offset
-        own = {} if self.joints[kind].armature else {Link.armature.offset: 0.0}
+        """Constants of all links with a kind of joints: offset in `LinkConstants` and the value, 0 or 1."""
+        turn, moment, inertia = LinkConstants.rotation.offset, LinkConstants.moment.offset, LinkConstants.inertia.offset
+        own = {} if self.joints[kind].armature else {LinkConstants.armature.offset: 0.0}
         if not self.planar:
-            return own | {Link.shift.offset: 0.0}
+            return own | {LinkConstants.shift.offset: 0.0}
         out = own | {turn + k: float(k == 8) for k in (2, 5, 6, 7, 8)}
         if self.joints[kind].revolute:
             out |= {turn + k: float(k in (0, 4)) for k in (0, 1, 3, 4)}
         else:
-            out[Link.shift.offset] = 0.0
+            out[LinkConstants.shift.offset] = 0.0
         return out | {moment + 2: 0.0} | {inertia + k: 0.0 for k in range(5)}
 
 
@@ -98,13 +98,13 @@ class Packed:
     """A mechanism's records: its class, constants of its links, gravity (3,) in the ground's frame."""
 
     kind: Class
-    links: Table[Link]
+    links: Table[LinkConstants]
     gravity: Array
 
     @property
     def size(self) -> int:
         """Number of links."""
-        return int(self.integers.size // Link.integer_width)
+        return int(self.integers.size // LinkConstants.integer_width)
 
     @property
     def integers(self) -> NDArray[np.int64]:
@@ -117,7 +117,7 @@ class Packed:
         return self.links.arrays[1]
 
 
-def packed(parts: Sequence[Part], gravity: Array, *, planar: bool, among: Sequence[Joint] = ()) -> Packed:
+def packed(parts: Sequence[PackedLink], gravity: Array, *, planar: bool, among: Sequence[JointKind] = ()) -> Packed:
     """The records of a mechanism's tree, whose parts stand after their parents.
 
     Parameters
@@ -130,7 +130,7 @@ def packed(parts: Sequence[Part], gravity: Array, *, planar: bool, among: Sequen
         Further kinds of joints that the class has.
     """
     count, joints = len(parts), tuple(sorted({part.joint for part in parts} | set(among), key=repr))
-    links = Link.table(count)
+    links = LinkConstants.table(count)
     for i, part in enumerate(parts):
         link, c = links[i], [float(x) for x in part.numbers]
         link.parent = part.parent if part.parent >= 0 else count

@@ -16,11 +16,11 @@ from ephs.mechanics.road.linear import (
     load_inward,
     no_force,
 )
-from ephs.mechanics.road.needs import NO_INTEGERS, Compact, LaidOut, Layout, Survey, layout_of
+from ephs.mechanics.road.needs import NO_INTEGERS, Compact, FieldLayout, LaidOut, Survey, layout_of
 from ephs.mechanics.road.pack import SLIDE, TURN, Class
-from ephs.mechanics.road.records import Link, Place, State, States, Tree
+from ephs.mechanics.road.records import LinkConstants, LinkPlace, LinkState, LinkStates, Tree
 from ephs.mechanics.road.rigid import SUMS, rigid
-from ephs.mechanics.road.rows import Rows
+from ephs.mechanics.road.rows import LoopRows
 from ephs.mechanics.road.tree import axes, energy, outward, spread
 from ephs.semantics.spaces.rank import SPARSE
 from ephs.semantics.stage import (
@@ -42,28 +42,28 @@ from ephs.semantics.stage.memory import IntegerCells, RealCells
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Links:
+class _KnownLinks:
     """Constants of links, of which those that a kind of joints has in common are known."""
 
-    constants: tuple[Layout, ...]
+    constants: tuple[FieldLayout, ...]
     integers: IntegerCells
     reals: RealCells
 
-    def of(self, i: Integer, kind: int | None) -> Link:
-        start = i * Link.real_width
+    def of(self, i: Integer, kind: int | None) -> LinkConstants:
+        start = i * LinkConstants.real_width
         cells = self.reals if kind is None else LaidOut(self.constants[kind], self.reals, start)
-        return Link(self.integers, i * Link.integer_width, cells, start if kind is None else 0)
+        return LinkConstants(self.integers, i * LinkConstants.integer_width, cells, start if kind is None else 0)
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Whole:
+class _SurveyedMemory:
     """Memory of a survey: all rows are one."""
 
     cells: RealCells
 
-    def __getitem__(self, i: Integer) -> State:
-        return State(NO_INTEGERS, 0, self.cells, 0)
+    def __getitem__(self, i: Integer) -> LinkState:
+        return LinkState(NO_INTEGERS, 0, self.cells, 0)
 
 
 MECHANISM: Final[dict[str, Any]] = {
@@ -74,7 +74,7 @@ ROWS: Final[dict[str, Any]] = {
     "at": indices(), "slot": indices(), "row": indices(), "flat": indices(), "value": matrix(4), "entry": vector(),
     "covector": matrix(6), "along": matrix(12),
 }  # fmt: skip
-"""The rows of its loops: see `ephs.mechanics.road.rows.Rows`."""
+"""The rows of its loops: see `ephs.mechanics.road.rows.LoopRows`."""
 ARGUMENTS: Final[dict[str, dict[str, Any]]] = {
     "accelerations": {**MECHANISM, "q": vector(), "r": vector(), "force": vector(), "rate": vector()},
     "move": {**MECHANISM, "q": vector(), "r": vector(), "lead": vector()},
@@ -119,7 +119,7 @@ class Sweeps:
     made_of
         The arguments.
     width
-        Numbers of memory that a link takes; the ground takes as many. If ``general``, each row begins with `Place`.
+        Numbers of memory that a link takes; the ground takes as many. If ``general``, each row begins with `LinkPlace`.
     program
         Entry functions for mechanisms with loops, wrenches on links or prescribed motions, or for trees on which
         nothing but gravity and forces on the rates act.
@@ -131,17 +131,17 @@ class Sweeps:
         self._class, self.made_of = kind, (kind, general, others)
         self._zeros = (0, 1, 5) if kind.planar else ()
         self._constants = tuple(
-            Layout(known, {k: k for k in range(Link.real_width) if k not in known})
+            FieldLayout(known, {k: k for k in range(LinkConstants.real_width) if k not in known})
             for known in (kind.constants(number) for number in range(len(kind.joints)))
         )
-        self._states: States | None = None
+        self._states: LinkStates | None = None
         entries = others(self) if others is not None else self._general() if general else self._free()
-        self._layout: Layout | None = None
-        shared = Place.real_width if general else 0
+        self._layout: FieldLayout | None = None
+        shared = LinkPlace.real_width if general else 0
         constants, columns = known(
-            ("layout", self), lambda: layout_of(State.real_width, partial(self._survey, entries), shared).pairs
+            ("layout", self), lambda: layout_of(LinkState.real_width, partial(self._survey, entries), shared).pairs
         )
-        self._layout = Layout(dict(constants), dict(columns))
+        self._layout = FieldLayout(dict(constants), dict(columns))
         self.width = self._layout.width
         self.program = Program(_name(kind, general=general), **entries)
 
@@ -156,7 +156,7 @@ class Sweeps:
         )
 
     def _survey(self, entries: dict[str, Entry], survey: Survey) -> None:
-        self._states = _Whole(survey.memory())
+        self._states = _SurveyedMemory(survey.memory())
         for entry in entries.values():
             survey.returned(entry.function(survey, *(survey.argument(kind) for kind in entry.kinds.values())))
         self._states = None
@@ -166,18 +166,18 @@ class Sweeps:
         states, pull = self._states, [gravity[k] for k in range(3)]
         if states is None:
             assert self._layout is not None
-            states = Compact(State, self._layout, memory)
+            states = Compact(LinkState, self._layout, memory)
         return Tree(
-            self._class.joints, size, _Links(self._constants, integers.cells, reals.cells), states, pull,
+            self._class.joints, size, _KnownLinks(self._constants, integers.cells, reals.cells), states, pull,
             self._class.planar,
         )  # fmt: skip
 
     def _rows(
         self, at: Integers, slot: Integers, row: Integers, flat: Integers, value: Matrix, entry: Vector,
         covector: Matrix, along: Matrix,
-    ) -> Rows:  # fmt: skip
+    ) -> LoopRows:  # fmt: skip
         whole = Vector(covector.cells, covector.start, covector.rows * 6)
-        return Rows(at, slot, row, flat, value, entry, whole, along, self._zeros)
+        return LoopRows(at, slot, row, flat, value, entry, whole, along, self._zeros)
 
     def entry(
         self, function: Callable[..., Any], kinds: Mapping[str, Any], *made: tuple[Iterable[str], Callable[..., Any]]
@@ -193,10 +193,10 @@ class Sweeps:
             return accelerations(on, tree, q, r, rate, _given_force(force))
 
         def evaluations(on: Evaluator, tree: Tree, q: Matrix, r: Matrix, rates: Matrix, repeats: Integer) -> None:
-            def one(k: Integer) -> None:
+            def each_row(k: Integer) -> None:
                 accelerations(on, tree, q.row(k), r.row(k), rates.row(k))
 
-            on.loop(repeats, lambda _: on.loop(q.rows, one))
+            on.loop(repeats, lambda _: on.loop(q.rows, each_row))
 
         repeated = {"q": matrix(), "r": matrix(), "rates": matrix(), "repeats": integer()}
         return {
@@ -220,10 +220,10 @@ class Sweeps:
     # ---- mechanisms with loops, wrenches on links, prescribed motions --------------------------------------------
 
     def _general(self) -> dict[str, Entry]:
-        def fold(on: Evaluator, tree: Tree, rows: Rows, force: Vector, wrench: Matrix) -> Integer:
+        def fold(on: Evaluator, tree: Tree, rows: LoopRows, force: Vector, wrench: Matrix) -> Integer:
             fault = on.counter(0)
 
-            def one(i: Integer) -> None:
+            def each_link(i: Integer) -> None:
                 state = tree.states[i]
                 state.load = [x - wrench[i, k] for k, x in enumerate(state.load)]
                 closing.eliminate(on, rows, i, state)
@@ -233,39 +233,39 @@ class Sweeps:
                 closing.carry(on, tree, rows, i)
                 closing.carry_load(on, tree, rows, i)
 
-            tree.each(on, one, down=True)
+            tree.each(on, each_link, down=True)
             closing.eliminate(on, rows, tree.size, None)
             closing.eliminate_load(on, rows, tree.size, None)
             return fault.value
 
-        def outwards(on: Evaluator, tree: Tree, rows: Rows, rate: Vector) -> None:
+        def outwards(on: Evaluator, tree: Tree, rows: LoopRows, rate: Vector) -> None:
             closing.multipliers(on, rows, tree.size, None)
 
-            def one(i: Integer) -> None:
+            def each_link(i: Integer) -> None:
                 closing.push(on, tree, rows, i)
                 accelerate_outward(on, tree, rate, i)
                 closing.multipliers(on, rows, i, tree.states[i])
 
-            tree.each(on, one)
+            tree.each(on, each_link)
 
-        def resolve(on: Evaluator, tree: Tree, rows: Rows, rate: Vector) -> None:
+        def resolve(on: Evaluator, tree: Tree, rows: LoopRows, rate: Vector) -> None:
             def unloaded(i: Integer) -> None:
                 tree.states[i].load = [0.0] * 6
 
-            def one(i: Integer) -> None:
+            def each_link(i: Integer) -> None:
                 closing.eliminate_load(on, rows, i, tree.states[i])
                 load_inward(on, tree, no_force, i)
                 closing.carry_load(on, tree, rows, i)
 
             on.loop(tree.size, unloaded)
-            tree.each(on, one, down=True)
+            tree.each(on, each_link, down=True)
             closing.eliminate_load(on, rows, tree.size, None)
             outwards(on, tree, rows, rate)
 
-        def power(on: Evaluator, tree: Tree, rows: Rows, r: Vector, force: Vector, out: Vector) -> None:
+        def power(on: Evaluator, tree: Tree, rows: LoopRows, r: Vector, force: Vector, out: Vector) -> None:
             out[0] = driven_power(on, tree, rows, r, force)
 
-        def dependent(on: Evaluator, rows: Rows, largest: Vector) -> Integer:
+        def dependent(on: Evaluator, rows: LoopRows, largest: Vector) -> Integer:
             return on.select(closing.dependent(on, rows, largest, SPARSE), 1, 0)
 
         functions: dict[str, Callable[..., Any]] = {

@@ -9,7 +9,7 @@ from ephs.semantics.stage import Evaluator, Integer, Real, Record, integer, real
 Row = TypeVar("Row")
 
 
-class Link(Record):
+class LinkConstants(Record):
     """Constants of a link, in the frame at its tree joint; parents come first, the ground is the row after the last.
 
     Attributes
@@ -46,8 +46,8 @@ class Link(Record):
     armature = real()
 
 
-class Place(Record):
-    """Motion of a link, in world axes about the origin of its frame: what stands first in its `State`.
+class LinkPlace(Record):
+    """Motion of a link, in world axes about the origin of its frame: what stands first in its `LinkState`.
 
     Attributes
     ----------
@@ -66,13 +66,13 @@ class Place(Record):
     change = reals(6)
 
 
-class State(Record):
+class LinkState(Record):
     """Quantities of a link that the sweeps keep, in world axes about the origin of its frame.
 
     Attributes
     ----------
     turn, at, twist, bias, change
-        See `Place`.
+        See `LinkPlace`.
     down
         The frame's origin from that of the link's parent.
     axes
@@ -106,7 +106,7 @@ class State(Record):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Joint:
+class JointKind:
     """A kind of joints: a subgroup of SE(3), known while a program is staged.
 
     Attributes
@@ -150,15 +150,15 @@ class Joint:
 class Links(Protocol):
     """Constants of links, by row."""
 
-    def of(self, i: Integer, kind: int | None) -> Link:
+    def of(self, i: Integer, kind: int | None) -> LinkConstants:
         """Row i, which is known to have the kind of joint with this number."""
         ...
 
 
-class States(Protocol):
+class LinkStates(Protocol):
     """Memory of links and the ground, by row."""
 
-    def __getitem__(self, i: Integer, /) -> State: ...
+    def __getitem__(self, i: Integer, /) -> LinkState: ...
 
 
 @final
@@ -178,14 +178,14 @@ class Tree:
         All moves parallel to the plane of x and y, and all joints turn about z or slide.
     """
 
-    joints: tuple[Joint, ...]
+    joints: tuple[JointKind, ...]
     size: Integer
     links: Links
-    states: States
+    states: LinkStates
     gravity: list[Real]
     planar: bool
 
-    def units(self, joint: Joint) -> dict[int, int]:
+    def units(self, joint: JointKind) -> dict[int, int]:
         """Entries of a twist that are degrees of freedom -> number of the degree of freedom, where that is known while
         staging: a joint that turns about the plane's normal, or about or along all axes. None where rates have inertia.
         """
@@ -201,7 +201,7 @@ class Tree:
         else:
             on.loop(self.size, body, down=down)
 
-    def visit(self, on: Evaluator, i: Integer, body: Callable[[Joint, Link], None]) -> None:
+    def visit(self, on: Evaluator, i: Integer, body: Callable[[JointKind, LinkConstants], None]) -> None:
         """Call body(joint, link) of link i with the kind of its joint, which is then known."""
         kind = self.links.of(i, None).kind
 

@@ -9,7 +9,7 @@ left of the rates has no momenta.
 from collections.abc import Sequence
 from typing import Final
 
-from ephs.mechanics.road.records import Joint, Link, State, Tree
+from ephs.mechanics.road.records import JointKind, LinkConstants, LinkState, Tree
 from ephs.mechanics.road.tree import Inertia, outward, rates_of, shift, shift_back
 from ephs.semantics.spaces.se3 import cobracket
 from ephs.semantics.spaces.vectors import (
@@ -70,14 +70,14 @@ def rigid(
         for j in range(SUMS):
             sums[k, j] = 0.0
 
-    def one(i: Integer) -> None:
+    def each_link(i: Integer) -> None:
         tree.visit(on, i, lambda joint, link: _add(on, tree.states[i], link, island[i], sums))
 
     def each(k: Integer) -> None:
         _solve(on, k, bases, target, sums, momenta, torque, along)
 
     def turn(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             def root() -> None:
                 state, k = tree.states[i], island[i]
                 twist = shift([sums[k, j] for j in range(6)], state.at)
@@ -89,12 +89,12 @@ def rigid(
         tree.visit(on, i, through)
 
     on.loop(sums.rows, empty)
-    tree.each(on, one)
+    tree.each(on, each_link)
     on.loop(sums.rows, each)
     tree.each(on, turn)
 
 
-def _add(on: Evaluator, state: State, link: Link, k: Integer, sums: Matrix) -> None:
+def _add(on: Evaluator, state: LinkState, link: LinkConstants, k: Integer, sums: Matrix) -> None:
     """Add a link to its island, number k."""
 
     def count() -> None:

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.road.needs import LaidOut, Layout
-from ephs.mechanics.road.records import Joint, Link, State, Tree
+from ephs.mechanics.road.needs import FieldLayout, LaidOut
+from ephs.mechanics.road.records import JointKind, LinkConstants, LinkState, Tree
 from ephs.mechanics.road.tree import freedoms_of, shift_back
 from ephs.semantics.spaces.vectors import add, apply, combine, dot, scale, sub, symmetric
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
@@ -21,13 +21,13 @@ TARGET, MULTIPLIER, SIZE, PIVOT = range(4)
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class LoopRows:
     """The rows of all loops, the program of their elimination, and its memory.
 
     Attributes
     ----------
     at, slot, row, flat
-        As in `ephs.mechanics.road.elimination.Closing`, row by row.
+        As in `ephs.mechanics.road.elimination.ClosingProgram`, row by row.
     value
         (rows, 4): target, multiplier, size before elimination, pivot.
     entry
@@ -63,7 +63,7 @@ class Rows:
         return self.at[4 * i] + self.at[4 * i + 1]
 
     def _cells(self, s: Integer) -> Vector:
-        layout = Layout(dict.fromkeys(self.zeros, 0.0), {k: k for k in range(6) if k not in self.zeros})
+        layout = FieldLayout(dict.fromkeys(self.zeros, 0.0), {k: k for k in range(6) if k not in self.zeros})
         return Vector(LaidOut(layout, self.covector.cells, self.covector.start + 6 * s), 0, 6)
 
     def at_slot(self, s: Integer) -> list[Real]:
@@ -86,14 +86,14 @@ class Rows:
         )
 
 
-def _put(vector: Vector, k: Integer) -> None:
+def _clear_entry(vector: Vector, k: Integer) -> None:
     vector[k] = 0.0
 
 
-def eliminate(on: Evaluator, rows: Rows, i: Integer, state: State | None) -> None:
+def eliminate(on: Evaluator, rows: LoopRows, i: Integer, state: LinkState | None) -> None:
     """Eliminate the rows that end at link i, into its inertia (None: the ground's) and what couples the others."""
 
-    def one(s: Integer) -> None:
+    def each_row(s: Integer) -> None:
         a = rows.slot[2 * s]
         pivot = rows.entry[a]
         rows.value[a, PIVOT] = pivot
@@ -115,10 +115,10 @@ def eliminate(on: Evaluator, rows: Rows, i: Integer, state: State | None) -> Non
 
         on.loop(count, couple)
 
-    on.loop(rows.ended(i), one, start=rows.first(i))
+    on.loop(rows.ended(i), each_row, start=rows.first(i))
 
 
-def _stiffen(state: State, k: list[Real], inverse: Real) -> None:
+def _stiffen(state: LinkState, k: list[Real], inverse: Real) -> None:
     """Add K Kᵀ/pivot to a link's inertia."""
     pairs = [(i, j) for i in range(3) for j in range(i, 3)]
     state.angular = [x + k[i] * k[j] * inverse for x, (i, j) in zip(state.angular, pairs, strict=True)]
@@ -126,10 +126,10 @@ def _stiffen(state: State, k: list[Real], inverse: Real) -> None:
     state.mixed = [[x + k[i] * k[3 + j] * inverse for j, x in enumerate(row)] for i, row in enumerate(state.mixed)]
 
 
-def eliminate_load(on: Evaluator, rows: Rows, i: Integer, state: State | None) -> None:
+def eliminate_load(on: Evaluator, rows: LoopRows, i: Integer, state: LinkState | None) -> None:
     """The same for the targets and the load of link i."""
 
-    def one(s: Integer) -> None:
+    def each_row(s: Integer) -> None:
         a = rows.slot[2 * s]
         pushed = rows.value[a, TARGET] / rows.value[a, PIVOT]
         if state is not None:
@@ -140,24 +140,24 @@ def eliminate_load(on: Evaluator, rows: Rows, i: Integer, state: State | None) -
 
         rows.later(on, a, lower)
 
-    on.loop(rows.ended(i), one, start=rows.first(i))
+    on.loop(rows.ended(i), each_row, start=rows.first(i))
 
 
-def _through(joint: Joint, rows: Rows, s: Integer, at: int) -> list[Real]:
+def _through(joint: JointKind, rows: LoopRows, s: Integer, at: int) -> list[Real]:
     return [rows.along[s, at + j] for j in range(joint.dim)]
 
 
-def carry(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
+def carry(on: Evaluator, tree: Tree, rows: LoopRows, i: Integer) -> None:
     """Take the open rows of link i through its joint, to its parent; ``along`` keeps SᵀK and D⁻¹SᵀK."""
 
-    def through(joint: Joint, link: Link) -> None:
+    def through(joint: JointKind, link: LinkConstants) -> None:
         state = tree.states[i]
         pair = on.counter(rows.at[4 * i + 3])
         first, last = rows.ended(i), rows.last(i)
         free = joint.dim and not joint.driven
         axes = freedoms_of(joint, link, state) if free else []
 
-        def one(s: Integer) -> None:
+        def each_row(s: Integer) -> None:
             a, k = rows.slot[2 * s], rows.at_slot(s)
             if free:
                 part = [dot(axis, k) for axis in axes]
@@ -177,48 +177,48 @@ def carry(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
                 k = [0.0 if x in units else value for x, value in enumerate(rest)]
             rows.grow(rows.slot[2 * s + 1], shift_back(k, state.down))
 
-        on.loop(last, one, start=first)
+        on.loop(last, each_row, start=first)
 
     tree.visit(on, i, through)
 
 
-def carry_load(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
+def carry_load(on: Evaluator, tree: Tree, rows: LoopRows, i: Integer) -> None:
     """Change of the targets of the open rows by the joint of link i."""
 
-    def through(joint: Joint, link: Link) -> None:
+    def through(joint: JointKind, link: LinkConstants) -> None:
         if not joint.dim or joint.driven:
             return
 
-        def one(s: Integer) -> None:
+        def each_row(s: Integer) -> None:
             a, pushed = rows.slot[2 * s], tree.states[i].push[: joint.dim]
             rows.value[a, TARGET] = rows.value[a, TARGET] - dot(_through(joint, rows, s, 0), pushed)
 
-        on.loop(rows.last(i), one, start=rows.ended(i))
+        on.loop(rows.last(i), each_row, start=rows.ended(i))
 
     tree.visit(on, i, through)
 
 
-def push(on: Evaluator, tree: Tree, rows: Rows, i: Integer) -> None:
+def push(on: Evaluator, tree: Tree, rows: LoopRows, i: Integer) -> None:
     """Add what the multipliers do to link i's joint."""
 
-    def through(joint: Joint, link: Link) -> None:
+    def through(joint: JointKind, link: LinkConstants) -> None:
         if not joint.dim or joint.driven:
             return
 
-        def one(s: Integer) -> None:
+        def each_row(s: Integer) -> None:
             state = tree.states[i]
             pushed = scale(rows.value[rows.slot[2 * s], MULTIPLIER], _through(joint, rows, s, 6))
             state.push = [*add(state.push[: joint.dim], pushed), *state.push[joint.dim :]]
 
-        on.loop(rows.last(i), one, start=rows.ended(i))
+        on.loop(rows.last(i), each_row, start=rows.ended(i))
 
     tree.visit(on, i, through)
 
 
-def multipliers(on: Evaluator, rows: Rows, i: Integer, state: State | None) -> None:
+def multipliers(on: Evaluator, rows: LoopRows, i: Integer, state: LinkState | None) -> None:
     """Multipliers of the rows that were eliminated at link i, whose acceleration is known; None: of the ground."""
 
-    def one(s: Integer) -> None:
+    def each_row(s: Integer) -> None:
         a = rows.slot[2 * s]
         value = on.variable(rows.value[a, TARGET])
         if state is not None:
@@ -230,15 +230,15 @@ def multipliers(on: Evaluator, rows: Rows, i: Integer, state: State | None) -> N
         rows.later(on, a, lower)
         rows.value[a, MULTIPLIER] = value.value / rows.value[a, PIVOT]
 
-    on.loop(rows.ended(i), one, start=rows.first(i), down=True)
+    on.loop(rows.ended(i), each_row, start=rows.first(i), down=True)
 
 
-def dependent(on: Evaluator, rows: Rows, largest: Vector, limit: Real) -> Truth:
+def dependent(on: Evaluator, rows: LoopRows, largest: Vector, limit: Real) -> Truth:
     """Whether a row, once the others are out of it, is less than ``limit`` of the largest one that it is coupled to.
 
     ``largest`` is memory for a number of each group of rows that are coupled.
     """
-    on.loop(largest.size, lambda k: _put(largest, k))
+    on.loop(largest.size, lambda k: _clear_entry(largest, k))
 
     def measure(a: Integer) -> None:
         block = rows.row[4 * a + 3]

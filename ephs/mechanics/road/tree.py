@@ -8,7 +8,7 @@ r of a joint with the basis B turn and move the link by Ad B r of the second fra
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.road.records import Joint, Link, State, Tree
+from ephs.mechanics.road.records import JointKind, LinkConstants, LinkState, Tree
 from ephs.semantics.spaces.se3 import bracket, cobracket
 from ephs.semantics.spaces.staged_groups import about_z, included
 from ephs.semantics.spaces.vectors import (
@@ -55,7 +55,7 @@ class Inertia:
     angular: list[Real]
 
     @staticmethod
-    def of(link: Link, turn: Columns) -> "Inertia":
+    def of(link: LinkConstants, turn: Columns) -> "Inertia":
         """Return that of a link about the origin of its frame, whose axes are the columns of a rotation."""
         half = product(turn, symmetric(link.inertia))
         angular = [dot(half[i], turn[j]) for i in range(3) for j in range(i, 3)]
@@ -80,42 +80,42 @@ class Inertia:
         return [*angular, *add(scale(self.mass, u[3:]), cross(u[:3], self.moment))]
 
 
-def axes_of(joint: Joint, link: Link, state: State) -> list[list[Real]]:
+def axes_of(joint: JointKind, link: LinkConstants, state: LinkState) -> list[list[Real]]:
     """Twists (d, 6) of a link by units of its joint's rates."""
     if joint.backward:
         return state.axes[: joint.dim]
     return [scale(link.sense, turned(state.turn, column)) for column in joint.basis]
 
 
-def freedoms_of(joint: Joint, link: Link, state: State) -> list[list[Real]]:
+def freedoms_of(joint: JointKind, link: LinkConstants, state: LinkState) -> list[list[Real]]:
     """Twists (d, 6) that span those of a joint: units along world axes where its freedoms are those of any axes."""
     if not joint.round or joint.armature:
         return axes_of(joint, link, state)
     return [[float(j == k) for k in range(6)] for j in range(joint.dim)]
 
 
-def rates_along(joint: Joint, link: Link, state: State, along: list[Real]) -> list[Real]:
+def rates_along(joint: JointKind, link: LinkConstants, state: LinkState, along: list[Real]) -> list[Real]:
     """The rates (d,) of a joint, from those along `freedoms_of`."""
     if not joint.round or joint.armature:
         return along
     return [dot(axis[: joint.dim], along) for axis in axes_of(joint, link, state)]
 
 
-def forces_along(joint: Joint, link: Link, state: State, force: list[Real]) -> list[Real]:
+def forces_along(joint: JointKind, link: LinkConstants, state: LinkState, force: list[Real]) -> list[Real]:
     """Forces (d,) on the rates along `freedoms_of`, from those on the joint's rates."""
     if not joint.round or joint.armature:
         return force
     return combine(axes_of(joint, link, state), force)[: joint.dim]
 
 
-def moved_by(joint: Joint, link: Link, state: State, rates: Entries) -> list[Real]:
+def moved_by(joint: JointKind, link: LinkConstants, state: LinkState, rates: Entries) -> list[Real]:
     """The twist of a link that rates (d,) of its joint make."""
     if joint.backward:
         return combine(state.axes[: joint.dim], rates)
     return turned(state.turn, combine(joint.basis, scale(link.sense, rates)))
 
 
-def rates_of(joint: Joint, link: Link, state: State, parent: State, twist: Entries) -> list[Real]:
+def rates_of(joint: JointKind, link: LinkConstants, state: LinkState, parent: LinkState, twist: Entries) -> list[Real]:
     """The rates (d,) of a joint that moves its link by a twist in its own subgroup."""
     if joint.backward:  # the frame in which the basis is constant is the parent's
         way = sub(add(parent.at, apply(parent.turn, link.place)), state.at)
@@ -138,15 +138,22 @@ def outward(on: Evaluator, tree: Tree, q: Vector, r: Vector, lead: Vector | None
     ground.twist, ground.change, ground.reach = [0.0] * 6, [0.0] * 6, 0.0
     ground.bias = [0.0, 0.0, 0.0, *scale(-1.0, tree.gravity)]
 
-    def one(i: Integer) -> None:
+    def each_link(i: Integer) -> None:
         tree.visit(on, i, lambda joint, link: _step(on, tree, i, joint, link, q, r, lead))
 
-    tree.each(on, one)
+    tree.each(on, each_link)
 
 
 def _step(
-    on: Evaluator, tree: Tree, i: Integer, joint: Joint, link: Link, q: Vector, r: Vector, lead: Vector | None
-) -> None:  # fmt: skip
+    on: Evaluator,
+    tree: Tree,
+    i: Integer,
+    joint: JointKind,
+    link: LinkConstants,
+    q: Vector,
+    r: Vector,
+    lead: Vector | None,
+) -> None:
     state, parent = tree.states[i], tree.states[link.parent]
     _frame(on, tree, joint, link, state, parent, q)
     moving = moved_by(joint, link, state, [r[link.r_at + k] for k in range(joint.dim)]) if joint.dim else [0.0] * 6
@@ -160,7 +167,9 @@ def _step(
     state.load = sub(own.momentum(bias), cobracket(twist, own.momentum(twist)))
 
 
-def _frame(on: Evaluator, tree: Tree, joint: Joint, link: Link, state: State, parent: State, q: Vector) -> None:
+def _frame(
+    on: Evaluator, tree: Tree, joint: JointKind, link: LinkConstants, state: LinkState, parent: LinkState, q: Vector
+) -> None:
     """The link's frame; the axes of a joint that is walked backward."""
     rotation, place = _element(on, joint, link, q)
     around, down = product(parent.turn, link.rotation), apply(parent.turn, link.place)
@@ -176,7 +185,7 @@ def _frame(on: Evaluator, tree: Tree, joint: Joint, link: Link, state: State, pa
     state.down, state.at = down, add(parent.at, down)
 
 
-def _element(on: Evaluator, joint: Joint, link: Link, q: Vector) -> tuple[Rows, list[Real]]:
+def _element(on: Evaluator, joint: JointKind, link: LinkConstants, q: Vector) -> tuple[Rows, list[Real]]:
     """The frame of the joint's element as it is stored, or, of abelian pairs, as it is walked."""
     element = scale(link.sense, [q[link.q_at + k] for k in range(joint.size)])
     if joint.revolute:
@@ -187,8 +196,8 @@ def _element(on: Evaluator, joint: Joint, link: Link, q: Vector) -> tuple[Rows, 
 def spread(on: Evaluator, tree: Tree, x: Vector) -> None:
     """The twists that rates x of the joints make, to where links keep their accelerations."""
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state = tree.states[i]
             change = shift(tree.states[link.parent].change, state.down)
             rates = [x[link.r_at + j] for j in range(joint.dim)]
@@ -196,14 +205,14 @@ def spread(on: Evaluator, tree: Tree, x: Vector) -> None:
 
         tree.visit(on, i, through)
 
-    tree.each(on, one)
+    tree.each(on, each_link)
 
 
 def axes(on: Evaluator, tree: Tree, columns: Matrix) -> None:
     """The twists (n, 6) about the ground's origin that units of the joints' rates make."""
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state = tree.states[i]
             back = scale(-1.0, state.at)
             for j, axis in enumerate(axes_of(joint, link, state)):
@@ -212,7 +221,7 @@ def axes(on: Evaluator, tree: Tree, columns: Matrix) -> None:
 
         tree.visit(on, i, through)
 
-    tree.each(on, one)
+    tree.each(on, each_link)
 
 
 def energy(on: Evaluator, tree: Tree, q: Vector, r: Vector, momenta: Matrix, spin: Vector, out: Vector) -> None:
@@ -226,8 +235,8 @@ def energy(on: Evaluator, tree: Tree, q: Vector, r: Vector, momenta: Matrix, spi
     pull = _length(on, tree.gravity)
     out[0], out[1], out[2] = 0.0, 0.0, 0.0
 
-    def one(i: Integer) -> None:
-        def through(joint: Joint, link: Link) -> None:
+    def each_link(i: Integer) -> None:
+        def through(joint: JointKind, link: LinkConstants) -> None:
             state, parent = tree.states[i], tree.states[link.parent]
             reach = parent.reach + _length(on, state.down)
             state.reach = reach
@@ -245,7 +254,7 @@ def energy(on: Evaluator, tree: Tree, q: Vector, r: Vector, momenta: Matrix, spi
 
         tree.visit(on, i, through)
 
-    tree.each(on, one)
+    tree.each(on, each_link)
 
 
 def _length(on: Evaluator, x: Entries) -> Real:

@@ -12,14 +12,14 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.motion.batch import compose, inverse
 from ephs.mechanics.scene.adjust import mass_roots
-from ephs.mechanics.scene.geometry import Coupling
-from ephs.mechanics.scene.kinematics import Link, extent
+from ephs.mechanics.scene.geometry import JointCoupling
+from ephs.mechanics.scene.kinematics import AssemblyJoint, extent
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
-from ephs.mechanics.tree.finding.wiring import Wiring
+from ephs.mechanics.tree.finding.wiring import Incidence
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
@@ -30,7 +30,7 @@ from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.systems.system import System
 from ephs.solve.ending import solution_of
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 from ephs.solve.result.solution import Solution
 
 TENSION_SPRINGS = ("tension_spring", "slack_spring")
@@ -58,7 +58,7 @@ class FlatJoints:
         Links and joints as they are found in the system.
     """
 
-    links: tuple[Link, ...]
+    links: tuple[AssemblyJoint, ...]
     relative: tuple[Path, ...]
     poses: tuple[Path | None, ...]
     frames: Frames
@@ -105,7 +105,9 @@ def flat_joints(d: Descriptor) -> FlatJoints:
     found = frames_of(d)
     return FlatJoints(
         tuple(
-            Link(str(j.path), j.first.link, j.second.link, j.first.offset, j.second.offset, Coupling(j.pair))
+            AssemblyJoint(
+                str(j.path), j.first.link, j.second.link, j.first.offset, j.second.offset, JointCoupling(j.pair)
+            )
             for j in found.joints
         ),
         tuple(j.state.path for j in found.joints),
@@ -153,7 +155,7 @@ def tendon_lengths(frames: Frames, state: Mapping[Path, Array]) -> Iterator[tupl
                     yield found[1].path, np.array([length * back / turn])
 
 
-def _coupled(wiring: Wiring, junction: int) -> Iterator[tuple[int, float]]:
+def _coupled(wiring: Incidence, junction: int) -> Iterator[tuple[int, float]]:
     """Other junctions of constant gyrators of two scalar ports on a junction, each with its flow by the effort here."""
     for number, port in wiring.on(junction):
         primitive, ports = wiring.components[number].primitive, wiring.ports(number)
@@ -201,10 +203,10 @@ def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection
     return out
 
 
-def constraints_of(joints: FlatJoints, problem: Problem) -> Mechanism:
+def constraints_of(joints: FlatJoints, problem: Problem) -> ConfiguredMechanism:
     """What the joints of a system hold in its initial state."""
     state, wiring = problem.initial, joints.frames.wiring
-    links: list[Link] = []
+    links: list[AssemblyJoint] = []
     for link, joint in zip(joints.links, joints.frames.joints, strict=True):
         port = wiring.outer.get(joint.rate)
         signal = None if port is None else problem.signals.get(port)
@@ -222,7 +224,7 @@ def constraints_of(joints: FlatJoints, problem: Problem) -> Mechanism:
     whole = [heaviest if inertia[5, 5] == 0.0 else inertia for inertia in inertias]  # some metric: frames have no mass
     roots = mass_roots(np.array([i[5, 5] for i in whole]), np.array([i[:3, :3] for i in whole]).reshape(-1, 3, 3))
     names = [link.name for link in links if link.coupling.dim < 6]
-    return Mechanism.between(names, links, poses, roots, _gears(joints))
+    return ConfiguredMechanism.between(names, links, poses, roots, _gears(joints))
 
 
 def _gears(joints: FlatJoints) -> dict[str, dict[str, float]]:
@@ -251,7 +253,7 @@ def check_closed(problem: Problem) -> None:
     """
     d = problem.descriptor
     x = d.pack(problem.initial)
-    once = Record(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
+    once = RunRecord(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
     assert problem.motion is not None
     motion = problem.motion(solution_of(problem, once, {}))
     gap = float(motion.constraint_error()[0])

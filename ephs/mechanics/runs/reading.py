@@ -24,7 +24,7 @@ from ephs.solve.journal import MAGIC, read_journal
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal
 from ephs.solve.result.guard import check_file
-from ephs.solve.result.record import Rows
+from ephs.solve.result.record import RowBlocks
 from ephs.solve.result.solution import Solution
 
 
@@ -100,7 +100,7 @@ def _of_journal(file: File, model: System | Scene | None, homes: tuple[File, ...
     problem = replace(problem, signals={**problem.signals, **unknown})
     if run["form"] == "folded":
         problem = folded_problem(problem)
-    record = found.rows or Rows().whole(problem.descriptor)
+    record = found.rows or RowBlocks().whole(problem.descriptor)
     size, count = problem.descriptor.point_size, len(problem.descriptor.components)
     rows = record.t.size
     if (record.x.shape, record.energies.shape, record.ledgers.shape) != ((rows, size), (rows, count), (rows, 5)):

@@ -10,7 +10,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.motion_law import MotionLaw
-from ephs.solve.probe import Asked
+from ephs.solve.probe import ProbedInput
 from ephs.solve.problem import Problem, Signal, State, States
 from ephs.solve.sampled import Held
 
@@ -111,9 +111,9 @@ def check_mappings(**options: object) -> None:
             raise OptionError(key, found, f"names with values, as in {key}={EXAMPLES[key]}")
 
 
-def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:
+def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[ProbedInput]:
     """The functions among the inputs that a user gave, by time and states of the problem as it is solved."""
-    found: list[Asked] = []
+    found: list[ProbedInput] = []
     for name, given in inputs.items():
         values = given.values() if isinstance(given, Mapping) else [given]
         found += [
@@ -124,16 +124,16 @@ def asked_of(problem: Problem, inputs: Mapping[str, Any]) -> list[Asked]:
     return found
 
 
-def _asked(problem: Problem, name: str, function: Callable[..., Any]) -> Asked:
+def _asked(problem: Problem, name: str, function: Callable[..., Any]) -> ProbedInput:
     seconds, given = problem.seconds, problem.given
     if not takes_state(function):
-        return Asked(name, lambda t, _state: function(t * seconds), False)
+        return ProbedInput(name, lambda t, _state: function(t * seconds), False)
 
     def value(t: float, state: State | None) -> Any:
         assert state is not None
         return function(t * seconds, problem.view(state if given is None else given(state)))
 
-    return Asked(name, value, True)
+    return ProbedInput(name, value, True)
 
 
 def takes_state(function: Callable[..., Any]) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.constraints.holding import Mechanism
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.redundancy import dependences, explain, in_words
 from ephs.mechanics.methods.options import options_of
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, chosen
@@ -365,7 +365,7 @@ def problem_of_scene(
         motion=lambda solution: SceneMotion(scene, solution),
         scene=scene,
         document=lambda: once(scene, "text", lambda: scene_to_text(scene)),
-        constraints=lambda: Mechanism.of(scene),
+        constraints=lambda: ConfiguredMechanism.of(scene),
         dependences=lambda: explain(scene),
         shaky=lambda: is_shaky(scene),
         length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),

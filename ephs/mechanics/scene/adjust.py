@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap, largest_slip
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares, svd, symmetric_eigen
@@ -37,7 +37,9 @@ def _least(values: Array) -> float:
 
 
 @in_one_thread
-def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozenset[str], scale: Scale) -> Array | None:
+def close_loops(
+    links: Sequence[AssemblyJoint], poses: Array, roots: Array, held: frozenset[str], scale: Scale
+) -> Array | None:
     """The nearest poses that satisfy every joint, the joints ``held`` at their coordinates; None where none
     is found."""
     poses = poses.copy()
@@ -56,7 +58,7 @@ def close_loops(links: Sequence[Link], poses: Array, roots: Array, held: frozens
 
 @in_one_thread
 def project_velocities(
-    links: Sequence[Link], poses: Array, twists: Array, roots: Array, held: frozenset[str], scale: Scale
+    links: Sequence[AssemblyJoint], poses: Array, twists: Array, roots: Array, held: frozenset[str], scale: Scale
 ) -> Array | None:
     """The nearest twists that satisfy every joint and every prescribed rate; None where they contradict
     each other.
@@ -83,7 +85,7 @@ def project_velocities(
     return found if largest_slip(kept, found, xs, now) < ASSEMBLY else None
 
 
-def _loose(link: Link, held: frozenset[str]) -> Link:
+def _loose(link: AssemblyJoint, held: frozenset[str]) -> AssemblyJoint:
     """The joint free to take other coordinates, unless it is held."""
     if link.name in held or link.coordinates is None:
         return link
@@ -91,7 +93,7 @@ def _loose(link: Link, held: frozenset[str]) -> Link:
 
 
 def _constraints(
-    links: Sequence[Link], poses: Array, xs: Sequence[Array], roots: Array, held: frozenset[str], scale: Scale
+    links: Sequence[AssemblyJoint], poses: Array, xs: Sequence[Array], roots: Array, held: frozenset[str], scale: Scale
 ) -> tuple[Array, Array]:
     blocks, errors = [], []
     for link, x in zip(links, xs, strict=True):
@@ -101,13 +103,13 @@ def _constraints(
     return np.vstack(blocks), np.concatenate(errors)
 
 
-def across_rows(link: Link, x: Array, roots: Array, scale: Scale) -> tuple[Array, Array]:
+def across_rows(link: AssemblyJoint, x: Array, roots: Array, scale: Scale) -> tuple[Array, Array]:
     """Covectors (6, k) that vanish on what the joint allows, and their rows (k, 6 n) on all bodies' twists by roots."""
     across = _across(link, x, scale)
     return across, _row(link, x, across, roots)
 
 
-def _across(link: Link, x: Array, scale: Scale) -> Array:
+def _across(link: AssemblyJoint, x: Array, scale: Scale) -> Array:
     """(6, 6 − d) covectors that vanish on what the joint allows, orthonormal where lengths count in the scale's."""
     basis = scale.weights @ link.coupling.basis(x)
     if not basis.shape[1]:
@@ -115,7 +117,7 @@ def _across(link: Link, x: Array, scale: Scale) -> Array:
     return scale.weights @ svd(basis)[0][:, basis.shape[1] :]
 
 
-def _row(link: Link, x: Array, forbidden: Array, roots: Array) -> Array:
+def _row(link: AssemblyJoint, x: Array, forbidden: Array, roots: Array) -> Array:
     """The constraint's rows on all bodies, in coordinates where the mass metric is the identity."""
     row = np.zeros((forbidden.shape[1], roots.shape[0], 6))
     for body, matrix in zip((link.body1, link.body2), link.rows(x), strict=True):

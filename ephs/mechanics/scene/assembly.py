@@ -17,7 +17,7 @@ from ephs.mechanics.scene.bodies import BodyDraft
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.joints import Asked
-from ephs.mechanics.scene.kinematics import Link, Scale, at
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, pose_at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
 from ephs.semantics.bundles.bundle import Array
@@ -65,7 +65,7 @@ def assemble(
 
 
 def measure(
-    links: Sequence[Link],
+    links: Sequence[AssemblyJoint],
     xs: Sequence[Array],
     poses: Array,
     slips: Sequence[tuple[Array, Array]],
@@ -115,14 +115,14 @@ def _place(
         x = link.coupling.identity() if link.coordinates is None else link.coupling.element(link.coordinates)
         poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
 
-    _settle(open_bodies, list(links.values()), follow)
+    _place_open(open_bodies, list(links.values()), follow)
     return poses
 
 
 def _move(
     drafts: Sequence[BodyDraft],
     joints: Sequence[Start],
-    links: Sequence[Link],
+    links: Sequence[AssemblyJoint],
     xs: Sequence[Array],
     poses: Array,
     rest: Sequence[Array],
@@ -147,17 +147,17 @@ def _move(
         for (_, asked), link in zip(joints, links, strict=True)
         if asked.in_bodies or (asked.rate is not None and asked.rate.any())
     ]
-    _settle([i for i, d in enumerate(drafts) if d.velocity is None], leading, follow)
+    _place_open([i for i, d in enumerate(drafts) if d.velocity is None], leading, follow)
     return twists
 
 
-def _settle(open_bodies: list[int], links: Sequence[Link], follow: Callable[[int, str], None]) -> None:
+def _place_open(open_bodies: list[int], links: Sequence[AssemblyJoint], follow: Callable[[int, str], None]) -> None:
     """Place each open body by its first link, once the body at the link's other end is settled.
 
     Where all wait for each other, a body follows any of its links whose other end is settled, or stays
     where it is.
     """
-    of: dict[int, list[Link]] = {b: [] for b in open_bodies}
+    of: dict[int, list[AssemblyJoint]] = {b: [] for b in open_bodies}
     for link in links:
         for b in dict.fromkeys((link.body1, link.body2)):
             if b in of:
@@ -180,19 +180,19 @@ def _settle(open_bodies: list[int], links: Sequence[Link], follow: Callable[[int
         ready.extend(b for b in followers.get(body, []) if b in waiting)
 
 
-def _other(link: Link, body: int) -> int:
+def _other(link: AssemblyJoint, body: int) -> int:
     return link.body1 if link.body2 == body else link.body2
 
 
-def _link(start: Start, index: Mapping[str, int], poses: Array) -> Link:
+def _link(start: Start, index: Mapping[str, int], poses: Array) -> AssemblyJoint:
     joint, asked = start
     body1, body2 = index[joint.body1], index[joint.body2]
     frame1, frame2, coordinates = joint.frame1, joint.frame2, asked.coordinates
     if not asked.in_bodies:
-        frame1 = SE3.compose(SE3.inverse(at(poses, body1)), frame1)
-        frame2 = SE3.compose(SE3.inverse(at(poses, body2)), frame2)
+        frame1 = SE3.compose(SE3.inverse(pose_at(poses, body1)), frame1)
+        frame2 = SE3.compose(SE3.inverse(pose_at(poses, body2)), frame2)
         coordinates = np.zeros(joint.dim)
-    return Link(
+    return AssemblyJoint(
         joint.name, body1, body2, frame1, frame2, coupling_of(joint), coordinates, asked.rate, first_rate(joint.motion)
     )  # fmt: skip
 

@@ -24,7 +24,7 @@ from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.joints import Asked, Joint
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
-from ephs.mechanics.scene.resolve_elements import Names
+from ephs.mechanics.scene.resolve_elements import ReferableNames
 from ephs.mechanics.scene.sections import Section, resolve_section
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.thermal import ThermalNode
@@ -59,7 +59,7 @@ class BeamDraft:
     conduction: dict[str, Conduction]
 
 
-def check_beam(table: Checked[Any], names: Names) -> None:
+def check_beam(table: Checked[Any], names: ReferableNames) -> None:
     """Append a fault where a beam's end or heat leads nowhere; ``names`` have the nodes of all beams."""
     entry = table.entry
     if table.sound("heat", "thermal") and entry.thermal is not None and entry.heat != ENVIRONMENT:

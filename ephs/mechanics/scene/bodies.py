@@ -10,13 +10,13 @@ import numpy as np
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, SceneElement, frozen
-from ephs.mechanics.scene.element import Number as Measure
+from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import Fault
 from ephs.mechanics.scene.homogeneous import mass_and_moments
 from ephs.mechanics.scene.inertia import mass_and_inertia
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import (
-    Entry,
+    EntryTable,
     Extents,
     Inertia,
     NonNegative,
@@ -70,7 +70,7 @@ class Body(SceneElement):
     shapes: tuple[Mapping[str, Any], ...] = ()
 
 
-class ShapeEntry(Entry):
+class ShapeEntry(EntryTable):
     """``shape``: one of four, and its pose in the body."""
 
     box: Extents | None = key("edge lengths, m", None)
@@ -82,7 +82,7 @@ class ShapeEntry(Entry):
     rotation: Rotation | None = key("orientation there, [w, x, y, z] or a table", None)
 
 
-class BodyEntry(Entry):
+class BodyEntry(EntryTable):
     """``[bodies.NAME]``"""
 
     mass: NonNegative | None = key("kg; required unless density is given; 0 only with inertia 0", None)

@@ -17,9 +17,9 @@ from ephs.mechanics.elements.beam import thermoelastic
 from ephs.mechanics.elements.motor import armature
 from ephs.mechanics.scene.contacts import contact_points
 from ephs.mechanics.scene.demands import Demands, demands_on_parts
-from ephs.mechanics.scene.made import Made
+from ephs.mechanics.scene.made import SystemCache
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
-from ephs.mechanics.scene.site import INPUTS, Level, built
+from ephs.mechanics.scene.site import INPUTS, SceneLevel, built
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics.bundles.bundle import Array
@@ -37,17 +37,17 @@ def component_path(kind: str, name: str) -> Path:
 
 def wrench_port(body: str) -> Path:
     """The outer port at which a wrench acts on a body."""
-    return _at("momenta", body)
+    return _initial_path("momenta", body)
 
 
 def tension_port(tendon: str) -> Path:
     """The outer port at which a force acts on a tendon's length."""
-    return _at("tensions", tendon)
+    return _initial_path("tensions", tendon)
 
 
 def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
     """The outer ports of a driven joint, and which of its degrees of freedom each of them moves."""
-    at = _at("drives", of.name)
+    at = _initial_path("drives", of.name)
     if of.middle is None:
         return ((at, slice(0, of.dim)),)
     return ((at / "first", slice(0, 1)), (at / "second", slice(1, 2)))
@@ -160,7 +160,7 @@ def _is_driven(j: Joint) -> bool:
     return j.motion is not None or bool(np.any(j.drive))
 
 
-def _at(group: str, name: str) -> Path:
+def _initial_path(group: str, name: str) -> Path:
     return Path([group, *name.split(".")])
 
 
@@ -173,23 +173,23 @@ class _Builder:
     junctions: dict[Path, Any] = field(default_factory=dict)
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
-    made: Made = field(default_factory=Made)
+    made: SystemCache = field(default_factory=SystemCache)
 
     def momentum(self, body: str) -> str:
         """The junction of a body's momentum."""
-        path = _at("momenta", body)
+        path = _initial_path("momenta", body)
         self.junctions[path] = junction(quantity.body_momentum, exposed=body in self.demands.bodies)
         return str(path)
 
     def entropy(self, node: str) -> str:
         """The junction of a thermal node."""
-        path = _at("entropies", node)
+        path = _initial_path("entropies", node)
         self.junctions[path] = junction(quantity.entropy, exposed=node in self.demands.nodes)
         return str(path)
 
     def lengthening(self, node: str) -> str:
         """The junction of the lengthening of what expands with a thermal node."""
-        path = _at("lengthenings", node)
+        path = _initial_path("lengthenings", node)
         self.junctions[path] = junction(quantity.displacement)
         return str(path)
 
@@ -198,7 +198,7 @@ class _Builder:
         self.junctions[path] = junction(of, exposed=name in self.demands.joints)
         return str(path)
 
-    def join(self, own: Level, path: Path) -> None:
+    def join(self, own: SceneLevel, path: Path) -> None:
         """A junction of elements."""
         group, name = path[0], ".".join(path[1:])
         if group in ("momenta", "entropies"):
@@ -206,7 +206,7 @@ class _Builder:
         elif group != "drives":
             self.junctions[path] = own.junctions[path]
 
-    def take(self, own: Level, section: str) -> None:
+    def take(self, own: SceneLevel, section: str) -> None:
         """The boxes of elements of a section, with their junctions: states are in the order of boxes."""
         for path, ports in own.boxes.items():
             if path[0] == section:
@@ -241,7 +241,7 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
                 ports[port] = b.drive(name, path, system.interface[Path.of(port)].quantity)
         b.add(Path(["joints", name]), system, ports)
         if j.armature:
-            at = _at("drives", name)
+            at = _initial_path("drives", name)
             b.add(Path(["armatures", name]), armature(b.junctions[at].quantity, j.armature), {"p": str(at)})
     own = built(scene)
     for section in ("springs", "contacts", "tendons"):
@@ -257,7 +257,7 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
         b.join(own, path)
     b.boxes.update(own.boxes)
     b.fillings.update(own.fillings)
-    if top and _at("momenta", GROUND) in b.junctions:
+    if top and _initial_path("momenta", GROUND) in b.junctions:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
     return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
 

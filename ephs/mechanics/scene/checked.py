@@ -5,10 +5,10 @@ from functools import reduce
 from typing import Generic, TypeVar, final
 
 from ephs.mechanics.scene.errors import Fault, fault, shown
-from ephs.mechanics.scene.schema_numbers import Entry
+from ephs.mechanics.scene.schema_numbers import EntryTable
 
-E = TypeVar("E", bound=Entry, covariant=True)
-F = TypeVar("F", bound=Entry)
+E = TypeVar("E", bound=EntryTable, covariant=True)
+F = TypeVar("F", bound=EntryTable)
 
 
 @final

@@ -14,10 +14,10 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.polytope import MOST_FACES, faces_and_edges
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Pair
-from ephs.mechanics.scene.site import Level, Site, surfaces_of
-from ephs.mechanics.scene.surfaces import SOFT, ContactLaw, Surface, Touching
+from ephs.mechanics.scene.site import SceneLevel, Site, surfaces_of
+from ephs.mechanics.scene.surfaces import SOFT, ContactLaw, Surface, TouchingElement
 from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import PAIRS, Touch, touches
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.systems.kept import once
@@ -34,7 +34,7 @@ OVERLAP = 1e-9
 
 
 @final
-class Contact(Touching, section="contacts", said="pairs of surfaces that can touch"):
+class Contact(TouchingElement, section="contacts", said="pairs of surfaces that can touch"):
     """A contact between two surfaces; a resolved one has all numbers of its law."""
 
     surfaces: Pair = key("names of two surfaces; the other keys of this table replace theirs", names="surface")
@@ -101,14 +101,14 @@ class Contact(Touching, section="contacts", said="pairs of surfaces that can tou
         numbers of elastic contacts, the lesser of hard ones."""
         given = {name: self._given(site, name) for name in ContactLaw.model_fields}
         friction = min(given["friction"], default=0.0)
-        law: Law | Impact
+        law: ConstitutiveLaw | Impact
         if self._is_hard(site):
             law = Impact(min(given["restitution"]), friction, min(given["tangential"], default=None))
         else:
             soft, n = given["stiffness"], next(iter(given["exponent"]), 1.0)
             stiffness = sum(k ** (-1.0 / n) for k in soft) ** -n if len(soft) > 1 else soft[0]
             more = {name: max(given[name]) for name in SOFT[2:] if given[name]}
-            law = Law(float(stiffness), n, friction=friction, **more)
+            law = ConstitutiveLaw(float(stiffness), n, friction=friction, **more)
         rods = dict(site.scene.all_beams())
         sinks = [rods[path].heat for name in self.surfaces if (path := name.rpartition(".")[0]) in rods]
         heat = next((node for node in (*given["heat"], *sinks) if node is not None), ENVIRONMENT)
@@ -128,17 +128,17 @@ class Contact(Touching, section="contacts", said="pairs of surfaces that can tou
 
     def _is_hard(self, site: Site) -> bool:
         """Whether it has restitution, or else a surface of it where none has stiffness."""
-        said: list[Touching] = [self]
+        said: list[TouchingElement] = [self]
         if self.restitution is None and self.stiffness is None:
             said = [*self._pair(site)]
         return all(each.stiffness is None for each in said) and any(each.restitution is not None for each in said)
 
     @property
-    def law(self) -> Law | Impact:
+    def law(self) -> ConstitutiveLaw | Impact:
         """Law of an elastic contact, or of a hard one, where it is resolved."""
         if self.stiffness is None:
             return Impact(self.restitution or 0.0, self.friction or 0.0, self.tangential)
-        return Law(friction=self.friction or 0.0, **{name: getattr(self, name) for name in SOFT})
+        return ConstitutiveLaw(friction=self.friction or 0.0, **{name: getattr(self, name) for name in SOFT})
 
     @classmethod
     def _upgraded(cls, table: Mapping[str, Any]) -> dict[str, Any]:
@@ -229,7 +229,7 @@ def overlaps(scene: "Scene", length: float, faults: list[Fault]) -> list[Fault]:
             faults.append(fault("many faces", key, faceted, most=MOST_FACES))
             continue
         (one, other), points = _points(*(surfaces[each] for each in of.surfaces))
-        site, depth, hard = Site(scene, of, Level()), 0.0, of.stiffness is None
+        site, depth, hard = Site(scene, of, SceneLevel()), 0.0, of.stiffness is None
         for frame1, frame2, gap in points:
             depth = max(depth, -float(gap.distance(site.between(one, frame1, other, frame2))))
         told = f"{' and '.join(of.surfaces)} {depth:.3g} m deep in each other"

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 import numpy as np
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 
-from ephs.mechanics.scene.element import GROUND, OUTSIDE, Number
+from ephs.mechanics.scene.element import GROUND, OUTSIDE, NumberForm
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rules import KeyRule
-from ephs.mechanics.scene.schema_numbers import Entry
+from ephs.mechanics.scene.schema_numbers import EntryTable
 from ephs.mechanics.scene.units import dimension, written
 from ephs.operad import Path as Name
 from ephs.operad import PatternError
@@ -104,7 +104,7 @@ def _hidden(*given: str) -> Any:
     return _Hidden(*given)
 
 
-class Element(Entry):
+class Element(EntryTable):
     """Base of elements of one's own: subclass it with keys, rules and ``build``, and call `register_element`.
 
     The class statement names the section of scene files, and says what stands there:
@@ -123,7 +123,7 @@ class Element(Entry):
     said: ClassVar[str] = ""
     names: ClassVar[Mapping[str, str]] = {}
     """Keys that name elements, and of which kind."""
-    numbers: ClassVar[Mapping[str, Number]] = {}
+    numbers: ClassVar[Mapping[str, NumberForm]] = {}
     """Keys that are numbers, and their dimensions."""
     frames: ClassVar[Mapping[str, str]] = {}
     """Keys that are points, and the keys of their bodies."""
@@ -252,7 +252,7 @@ class Element(Entry):
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         """The same in other units; ``coordinates`` are those of its joints."""
         changes: dict[str, Any] = {}
-        points = dict.fromkeys(type(self).frames, Number(length=1))
+        points = dict.fromkeys(type(self).frames, NumberForm(length=1))
         for name, number in (points | dict(type(self).numbers)).items():
             given = getattr(self, name)
             if given is not None:
@@ -278,7 +278,7 @@ def _extra(given: Any) -> _Hidden:
     return given if isinstance(given, _Hidden) else _Hidden()
 
 
-def _dimension(where: str, unit: str) -> Number:
+def _dimension(where: str, unit: str) -> NumberForm:
     try:
         return dimension(unit)
     except ValueError as error:

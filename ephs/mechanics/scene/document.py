@@ -17,7 +17,7 @@ from ephs.mechanics.scene.motions import law_from
 from ephs.mechanics.scene.registry import elements_from
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 
 
 def scene_to_text(scene: Scene) -> str:
@@ -86,8 +86,8 @@ def _value(cls: Any, data: dict[str, Any]) -> Any:
     return cls(**{key: made(key, value) for key, value in data.items()})
 
 
-def _law(given: dict[str, Any]) -> Law | Impact:
-    return Law(**given) if "stiffness" in given else Impact(**given)
+def _law(given: dict[str, Any]) -> ConstitutiveLaw | Impact:
+    return ConstitutiveLaw(**given) if "stiffness" in given else Impact(**given)
 
 
 _INSIDE: Mapping[str, Callable[[Any], Any]] = {

@@ -48,7 +48,7 @@ def frozen(values: ArrayLike) -> Array:
 
 
 def part_of(annotation: Any, kind: type[T]) -> T | None:
-    """Entry of a kind in an attribute's annotation: its `Number`, its `Named`, or its meaning."""
+    """Entry of a kind in an attribute's annotation: its `NumberForm`, its `Named`, or its meaning."""
     return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, kind)), None)
 
 
@@ -62,7 +62,7 @@ class Named:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Number:
+class NumberForm:
     """Dimension, count and range of a number, or of a row or square of numbers.
 
     Parameters
@@ -114,8 +114,8 @@ class Number:
         return whole * (np.array([length**x for x in powers]) if self.ahead else length**self.length)
 
 
-POSE: Final = Number(length=1, ahead=4, count=7)
-TWIST: Final = Number(time=-1, length=1, ahead=3, count=6)
+POSE: Final = NumberForm(length=1, ahead=4, count=7)
+TWIST: Final = NumberForm(time=-1, length=1, ahead=3, count=6)
 
 
 class Measured(ABC):  # noqa: B024 - what differs are values
@@ -124,16 +124,16 @@ class Measured(ABC):  # noqa: B024 - what differs are values
     Attributes
     ----------
     numbers, names
-        Attributes with a `Number`; attributes that name elements, and of which kind.
+        Attributes with a `NumberForm`; attributes that name elements, and of which kind.
     """
 
     __slots__ = ()
-    numbers: ClassVar[Mapping[str, Number]] = {}
+    numbers: ClassVar[Mapping[str, NumberForm]] = {}
     names: ClassVar[Mapping[str, str]] = {}
 
     def __init_subclass__(cls) -> None:
         given = get_annotations(cls).items()
-        cls.numbers = {key: of for key, annotation in given if (of := part_of(annotation, Number))}
+        cls.numbers = {key: of for key, annotation in given if (of := part_of(annotation, NumberForm))}
         cls.names = {key: of.kind for key, annotation in given if (of := part_of(annotation, Named))}
 
     def values(self, coordinates: int = 0) -> dict[str, tuple[Any, tuple[int, ...]]]:

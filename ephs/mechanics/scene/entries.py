@@ -17,11 +17,11 @@ from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, listing, nea
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import FORMS
 from ephs.mechanics.scene.schema import FILE_KEYS, SECTIONS, AssemblyEntry, WorldEntry
-from ephs.mechanics.scene.schema_numbers import LARGEST, Entry
+from ephs.mechanics.scene.schema_numbers import LARGEST, EntryTable
 from ephs.mechanics.scene.sections import SectionEntry
 
 LONGEST_NAME = 200
-E = TypeVar("E", bound=Entry)
+E = TypeVar("E", bound=EntryTable)
 
 # Neutral values for required keys that are missing or faulty.
 _NEUTRAL: dict[str, Any] = {
@@ -123,14 +123,14 @@ def _check_format(raw: Mapping[str, Any], faults: list[Fault]) -> None:
         faults.append(fault("format", "format", "nothing" if found is None else shown(found)))
 
 
-def _section(of: type[Entry], raw: Any, section: str, faults: list[Fault]) -> dict[str, Checked[Any]]:
+def _section(of: type[EntryTable], raw: Any, section: str, faults: list[Fault]) -> dict[str, Checked[Any]]:
     if not isinstance(raw, Mapping):
         faults.append(fault("table", f"{section}.NAME", shown(raw)))
         return {}
     return {name: validate(of, table, f"{section}.{name}", faults) for name, table in raw.items()}
 
 
-def _translate(model: type[Entry], key: str, item: Any) -> Fault:
+def _translate(model: type[EntryTable], key: str, item: Any) -> Fault:
     """One of pydantic's errors in this project's words."""
     code, location, context = item["type"], item["loc"], item.get("ctx", {})
     path = key + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
@@ -156,18 +156,18 @@ def _translate(model: type[Entry], key: str, item: Any) -> Fault:
     return fault("type", path, found, what=item["msg"])
 
 
-def _misspelled(model: type[Entry], raw: Mapping[str, Any], items: Iterable[Any]) -> set[str]:
+def _misspelled(model: type[EntryTable], raw: Mapping[str, Any], items: Iterable[Any]) -> set[str]:
     """The keys that unknown ones were meant to be: one fault says it, and none that they are missing."""
     unknown = [str(item["loc"][0]) for item in items if item["type"] == "extra_forbidden" and len(item["loc"]) == 1]
     return {near for key in unknown if (near := nearest_name(key, model.model_fields)) is not None and near not in raw}
 
 
-def _nested(model: type[Entry], key: str) -> type[Entry]:
+def _nested(model: type[EntryTable], key: str) -> type[EntryTable]:
     """The table at a key of a table; the table itself if there is none."""
     kinds: list[Any] = [model.model_fields[key].annotation, *model.model_fields[key].metadata]
     while kinds:
         kind = kinds.pop()
-        if isinstance(kind, type) and issubclass(kind, Entry):
+        if isinstance(kind, type) and issubclass(kind, EntryTable):
             return kind
         kinds += [kind.json_schema_input_type] if isinstance(kind, WrapValidator) else get_args(kind)
     return model

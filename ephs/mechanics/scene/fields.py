@@ -37,7 +37,7 @@ def _sound(_scene: Scene, _name: str, _before: Scene) -> list[Fault]:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Field:
+class NumberField:
     """A number, or an array of numbers, of a body, joint, …
 
     Parameters
@@ -81,22 +81,22 @@ def _edited(scene: Scene, kind: str, name: str, change: Callable[[Any], Any]) ->
     return replace(scene, parts={**scene.parts, part: _edited(scene.parts[part], kind, rest, change)})
 
 
-def _thing(scene: Scene, kind: str, name: str) -> Any:
+def _element(scene: Scene, kind: str, name: str) -> Any:
     own = scene.section(kind)
     if name in own:
         return own[name]
     part, _, rest = name.partition(".")
-    return _thing(scene.parts[part], kind, rest)
+    return _element(scene.parts[part], kind, rest)
 
 
-def _attribute(kind: str, key: str, **more: Any) -> Field:
+def _attribute(kind: str, key: str, **more: Any) -> NumberField:
     """A number or an array that is an attribute."""
 
     def get(scene: Scene, name: str) -> Array:
-        value = getattr(_thing(scene, kind, name), key)
+        value = getattr(_element(scene, kind, name), key)
         return np.zeros(0) if value is None else np.asarray(value, dtype=float)
 
-    def put(scene: Scene, name: str, values: Array) -> Scene:
+    def replaced(scene: Scene, name: str, values: Array) -> Scene:
         def edited(thing: Any) -> Any:
             if isinstance(thing, Element):
                 return thing.changed(**{key: values.tolist()})
@@ -104,16 +104,18 @@ def _attribute(kind: str, key: str, **more: Any) -> Field:
 
         return _edited(scene, kind, name, edited)
 
-    return Field(get, put, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
+    return NumberField(get, replaced, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
 
 
-def _world(key: str) -> Field:
+def _world(key: str) -> NumberField:
     """A number of the world, which is the same in all parts."""
 
-    def put(scene: Scene, _: str, values: Array) -> Scene:
+    def replaced(scene: Scene, _: str, values: Array) -> Scene:
         return mapped(scene, {}, replace(scene.world, **{key: frozen(values) if values.ndim else float(values)}))
 
-    return Field(lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), put, World.numbers[key].least)
+    return NumberField(
+        lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), replaced, World.numbers[key].least
+    )
 
 
 # ---- bodies ------------------------------------------------------------------------------------------------------
@@ -122,7 +124,7 @@ _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def _inertia(scene: Scene, name: str) -> Array:
-    return np.array([_thing(scene, "bodies", name).inertia[at] for at in _SIX])
+    return np.array([_element(scene, "bodies", name).inertia[at] for at in _SIX])
 
 
 def _put_inertia(scene: Scene, name: str, values: Array) -> Scene:
@@ -202,14 +204,14 @@ def _pose(scene: Scene, body: str) -> Array:
     return IDENTITY_POSE if body == GROUND else scene.body(body).pose
 
 
-def _at(scene: Scene, name: str) -> Array:
+def _joint_origin(scene: Scene, name: str) -> Array:
     joint = scene.joint(name)
     return SE3.compose(_pose(scene, joint.body1), joint.frame1)[4:]
 
 
 def _put_at(scene: Scene, name: str, values: Array) -> Scene:
     """Another position of the joint in the world: both frames are displaced equally."""
-    joint, by = scene.joint(name), values - _at(scene, name)
+    joint, by = scene.joint(name), values - _joint_origin(scene, name)
     frames: dict[str, Array] = {}
     for key, body in (("frame1", joint.body1), ("frame2", joint.body2)):
         frame = np.array(getattr(joint, key))
@@ -218,12 +220,12 @@ def _put_at(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "joints", name, lambda j: replace(j, **frames))
 
 
-def _frame(key: str) -> Field:
-    def put(scene: Scene, name: str, values: Array) -> Scene:
+def _frame(key: str) -> NumberField:
+    def replaced(scene: Scene, name: str, values: Array) -> Scene:
         frame = np.concatenate([getattr(scene.joint(name), key)[:4], values])
         return _edited(scene, "joints", name, lambda j: replace(j, **{key: frozen(frame)}))
 
-    return Field(lambda scene, name: np.array(getattr(scene.joint(name), key)[4:]), put, moves="frame")
+    return NumberField(lambda scene, name: np.array(getattr(scene.joint(name), key)[4:]), replaced, moves="frame")
 
 
 def _coordinate(scene: Scene, name: str) -> Array:
@@ -236,7 +238,7 @@ def _put_coordinate(scene: Scene, name: str, values: Array) -> Scene:
     return _edited(scene, "joints", name, lambda j: replace(j, coordinate=element))
 
 
-def _law(law: str, key: str, change: Callable[[Joint, str, float], Joint], moves: str = "") -> Field:
+def _law(law: str, key: str, change: Callable[[Joint, str, float], Joint], moves: str = "") -> NumberField:
     """A number of a joint's prescribed motion or dry friction, if there is one."""
 
     def get(scene: Scene, name: str) -> Array:
@@ -244,10 +246,10 @@ def _law(law: str, key: str, change: Callable[[Joint, str, float], Joint], moves
         number = None if of is None else dict(of.numbers).get(key)
         return np.zeros(0) if number is None else np.array([number])
 
-    def put(scene: Scene, name: str, values: Array) -> Scene:
+    def replaced(scene: Scene, name: str, values: Array) -> Scene:
         return _edited(scene, "joints", name, lambda joint: change(joint, key, float(values[0])))
 
-    return Field(get, put, moves=moves)
+    return NumberField(get, replaced, moves=moves)
 
 
 def _led(joint: Joint, key: str, value: float) -> Joint:
@@ -275,32 +277,32 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     return []
 
 
-def _registered(kind: type[Element]) -> dict[str, Field]:
+def _registered(kind: type[Element]) -> dict[str, NumberField]:
     """The numbers of elements that build themselves, with the checks of their tables."""
 
     def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         from ephs.mechanics.scene.resolve_elements import number_faults
 
-        return number_faults(_thing(scene, kind.section, name), f"{kind.section}.{name}")
+        return number_faults(_element(scene, kind.section, name), f"{kind.section}.{name}")
 
     return {key: _attribute(kind.section, key, faults=faults) for key in kind.numbers}
 
 
-def fields_of(kind: str) -> Mapping[str, Field]:
+def fields_of(kind: str) -> Mapping[str, NumberField]:
     """Key of the scene file -> its numbers, of a kind of element; none where there is no such kind."""
     return _registered(REGISTERED[kind]) if kind in REGISTERED else FIELDS.get(kind, {})
 
 
-FIELDS: Mapping[str, Mapping[str, Field]] = {
+FIELDS: Mapping[str, Mapping[str, NumberField]] = {
     "world": {key: _world(key) for key in World.numbers},
     "bodies": {
         "mass": _attribute("bodies", "mass", faults=_body_faults),
-        "inertia": Field(_inertia, _put_inertia, faults=_body_faults),
-        "position": Field(lambda scene, name: np.array(scene.body(name).pose[4:]), _put_position),
-        "angular_velocity": Field(
+        "inertia": NumberField(_inertia, _put_inertia, faults=_body_faults),
+        "position": NumberField(lambda scene, name: np.array(scene.body(name).pose[4:]), _put_position),
+        "angular_velocity": NumberField(
             lambda scene, name: np.array(scene.body(name).twist[:3]), _put_spin, faults=_free_only("angular_velocity")
         ),
-        "velocity": Field(_velocity, _put_velocity, faults=_free_only("velocity")),
+        "velocity": NumberField(_velocity, _put_velocity, faults=_free_only("velocity")),
     },
     "joints": {
         "pitch": _attribute("joints", "pitch", moves="frame"),
@@ -309,10 +311,10 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
         "rest": _attribute("joints", "rest", faults=_stiffness_faults),
         "drive": _attribute("joints", "drive"),
-        "coordinate": Field(_coordinate, _put_coordinate, moves="state"),
+        "coordinate": NumberField(_coordinate, _put_coordinate, moves="state"),
         **{f"motion.{key}": _law("motion", key, _led, "state") for key in ("rate", "amplitude", "frequency", "phase")},
         "rate": _attribute("joints", "rate", moves="state"),
-        "at": Field(_at, _put_at, moves="frame"),
+        "at": NumberField(_joint_origin, _put_at, moves="frame"),
         "frame1.position": _frame("frame1"),
         "frame2.position": _frame("frame2"),
     },

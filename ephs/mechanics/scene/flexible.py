@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, TypeAlias, final
 from pydantic import Field, create_model
 
 from ephs.mechanics.scene.element import Measured, Named, SceneElement
-from ephs.mechanics.scene.element import Number as Measure
-from ephs.mechanics.scene.schema_numbers import Entry, NonNegative, Number, Positive, Text, Vector, key
+from ephs.mechanics.scene.element import NumberForm as Measure
+from ephs.mechanics.scene.schema_numbers import EntryTable, NonNegative, Number, Positive, Text, Vector, key
 from ephs.mechanics.scene.sections import SectionEntry
 from ephs.mechanics.scene.surfaces import ContactLaw
 from ephs.semantics.bundles.bundle import Array
@@ -67,7 +67,7 @@ class Beam(SceneElement):
         return [f"{self.name}-{i}" for i in range(1, self.elements + 1)]
 
 
-class RodHeatEntry(Entry):
+class RodHeatEntry(EntryTable):
     """``thermal`` of a beam: a store of heat for each element, and heat conduction between neighbours."""
 
     capacity: Positive = key("heat capacity per length, J/(m K)")
@@ -118,4 +118,4 @@ _BEAM: dict[str, Any] = {
     "angular_velocity": (_Vector, key("angular velocity of the whole beam, world basis, rad/s", None)),
 }
 # A class cannot have `from` as a name.
-BeamEntry: Any = create_model("BeamEntry", __base__=Entry, __doc__="``[beams.NAME]``", **_BEAM)
+BeamEntry: Any = create_model("BeamEntry", __base__=EntryTable, __doc__="``[beams.NAME]``", **_BEAM)

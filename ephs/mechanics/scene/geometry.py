@@ -29,7 +29,7 @@ ROUND = frozenset({"spherical", "free", "fixed"})
 
 @final
 @dataclass(frozen=True, slots=True)
-class Coupling:
+class JointCoupling:
     """The possible poses I(x) of the joint frame C2 in C1, and the twists B(x) u_r that they allow.
 
     ``pair`` for a lower pair; for a universal joint the revolute pair, and ``middle`` between its two copies.
@@ -100,14 +100,14 @@ class Coupling:
         return found - 2.0 * np.pi * np.round((found - about) / (2.0 * np.pi))
 
 
-def coupling(kind: str, pitch: float = 0.0, middle: Array | None = None) -> Coupling:
+def coupling(kind: str, pitch: float = 0.0, middle: Array | None = None) -> JointCoupling:
     """The coupling of a joint type; ``pitch`` is for screws, ``middle`` for universal joints."""
     if kind == UNIVERSAL:
-        return Coupling(pair("revolute"), np.array(IDENTITY_POSE if middle is None else middle))
-    return Coupling(pair(kind, pitch=pitch) if "pitch" in PAIRS[kind].parameters else pair(kind))
+        return JointCoupling(pair("revolute"), np.array(IDENTITY_POSE if middle is None else middle))
+    return JointCoupling(pair(kind, pitch=pitch) if "pitch" in PAIRS[kind].parameters else pair(kind))
 
 
-def coupling_of(joint: "Joint") -> Coupling:
+def coupling_of(joint: "Joint") -> JointCoupling:
     """The coupling of a joint."""
     return coupling(joint.kind, joint.pitch, joint.middle)
 

@@ -9,14 +9,14 @@ from ephs.mechanics.scene import values
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, NON_NEGATIVE, POSE, Named, SceneElement, frozen
-from ephs.mechanics.scene.element import Number as Measure
+from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import did_you_mean, shown
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.geometry import ROUND, UNIVERSAL, coupling, frame_rotation, joint_types, unit
 from ephs.mechanics.scene.motions import MotionEntry, law_of
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import (
-    Entry,
+    EntryTable,
     Limits,
     Matrix,
     NonNegative,
@@ -30,24 +30,24 @@ from ephs.mechanics.scene.schema_numbers import (
 )  # fmt: skip
 from ephs.mechanics.shapes.dry import Dry
 from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ALIGNED
 from ephs.solve.motion_law import MotionLaw
 
 if TYPE_CHECKING:
-    from ephs.mechanics.scene.resolve_elements import Names
+    from ephs.mechanics.scene.resolve_elements import ReferableNames
 
 
-class FrameEntry(Entry):
+class FrameEntry(EntryTable):
     """A pose in a body's centre-of-mass frame."""
 
     position: Vector = key("origin, m", [0.0, 0.0, 0.0])
     rotation: Rotation = key("orientation, [w, x, y, z] or a table", [1.0, 0.0, 0.0, 0.0])
 
 
-class DryEntry(Entry):
+class DryEntry(EntryTable):
     """Dry friction of a joint with one degree of freedom."""
 
     coulomb: NonNegative = key("friction force while sliding, N m or N")
@@ -56,7 +56,7 @@ class DryEntry(Entry):
     slip: Positive = key("rate below which the friction is viscous, rad/s or m/s", 1e-3)
 
 
-class JointEntry(Entry):
+class JointEntry(EntryTable):
     """``[joints.NAME]``"""
 
     type: Text = key("kind of joint: a lower pair, universal, or a registered kind")
@@ -135,7 +135,7 @@ class Joint(SceneElement):
     rate: Annotated[Array, Measure(time=-1, others=1, each=0)]
     middle: Annotated[Array | None, POSE] = None
     limits: Array | None = None
-    stop: Law | Impact | None = None
+    stop: ConstitutiveLaw | Impact | None = None
     dry: Dry | None = None
     strain: Strain | None = None
     armature: Annotated[float, Measure(energy=1, time=2, first=-2, least=NON_NEGATIVE)] = 0.0
@@ -196,7 +196,7 @@ class Asked:
     in_bodies: bool = True
 
 
-def resolve_joint(table: Checked[JointEntry], names: "Names") -> tuple[Joint, Asked] | None:
+def resolve_joint(table: Checked[JointEntry], names: "ReferableNames") -> tuple[Joint, Asked] | None:
     """A joint with everything checked but its closure, its frames as the file has them, and its start; None where its
     type or place is not usable."""
     entry = table.entry

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.scene.geometry import Coupling
+from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.scene.model import IDENTITY_POSE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -33,7 +33,7 @@ class Scale:
         return np.diag([1.0] * 3 + [1.0 / self.length] * 3)
 
     @staticmethod
-    def of(links: "Sequence[Link]", poses: Array, twists: Array, gyration: float, gravity: Array) -> "Scale":
+    def of(links: "Sequence[AssemblyJoint]", poses: Array, twists: Array, gyration: float, gravity: Array) -> "Scale":
         """Of a configuration; ``gyration`` is the bodies' largest radius of gyration in m, gravity (3,) in m/s².
 
         The length is the radius about the mechanism's centre within which its joints and bodies lie, at least the
@@ -57,7 +57,7 @@ ABSOLUTE = Scale(1.0, 1.0)
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Link:
+class AssemblyJoint:
     """A joint of the assembly: two bodies by index, the joint frame in each, and the permitted twists.
 
     ``coordinates`` (d,) and ``rate`` (d,) are those that the initial state must have, or None; ``motion`` a
@@ -69,7 +69,7 @@ class Link:
     body2: int
     frame1: Array
     frame2: Array
-    coupling: Coupling
+    coupling: JointCoupling
     coordinates: Array | None = None
     rate: Array | None = None
     motion: float | None = None
@@ -77,11 +77,11 @@ class Link:
 
     def first(self, poses: Array) -> Array:
         """The pose of C1 in the world."""
-        return SE3.compose(at(poses, self.body1), self.frame1)
+        return SE3.compose(pose_at(poses, self.body1), self.frame1)
 
     def second(self, poses: Array) -> Array:
         """The pose of C2 in the world."""
-        return SE3.compose(at(poses, self.body2), self.frame2)
+        return SE3.compose(pose_at(poses, self.body2), self.frame2)
 
     def relative(self, poses: Array) -> Array:
         """The pose of C2 in C1."""
@@ -142,7 +142,7 @@ class Link:
         return SE3.normalise(SE3.compose(SE3.compose(frame, between), SE3.inverse(offset)))
 
 
-def at(poses: Array, body: int) -> Array:
+def pose_at(poses: Array, body: int) -> Array:
     """A body's pose; the ground's is the identity."""
     return IDENTITY_POSE if body < 0 else poses[body]
 
@@ -152,25 +152,25 @@ def twist(twists: Array, body: int) -> Array:
     return np.zeros(6) if body < 0 else twists[body]
 
 
-def elements(links: Sequence[Link], poses: Array) -> list[Array]:
+def elements(links: Sequence[AssemblyJoint], poses: Array) -> list[Array]:
     """Every joint's element in a configuration."""
     return [link.element(poses) for link in links]
 
 
-def extent(links: Sequence[Link], poses: Array) -> tuple[Array, float]:
+def extent(links: Sequence[AssemblyJoint], poses: Array) -> tuple[Array, float]:
     """The centre (3,) of the joints and bodies in m, and the radius of their enclosing sphere about it."""
     points = np.array([*(link.second(poses)[4:] for link in links), *poses[:, 4:]]).reshape(-1, 3)
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     return centre, float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
 
 
-def largest_gap(links: Sequence[Link], poses: Array, xs: Sequence[Array], scale: Scale = ABSOLUTE) -> float:
+def largest_gap(links: Sequence[AssemblyJoint], poses: Array, xs: Sequence[Array], scale: Scale = ABSOLUTE) -> float:
     """The largest gap of any joint: a part of the length, or rad."""
     gaps = (link.gap(poses, x) for link, x in zip(links, xs, strict=True))
     return max((max(distance / scale.length, angle) for distance, angle in gaps), default=0.0)
 
 
-def largest_slip(links: Sequence[Link], twists: Array, xs: Sequence[Array], scale: Scale = ABSOLUTE) -> float:
+def largest_slip(links: Sequence[AssemblyJoint], twists: Array, xs: Sequence[Array], scale: Scale = ABSOLUTE) -> float:
     """The largest velocity residual of any joint, a part of the rate; wanted rates count."""
     found = 0.0
     for link, x in zip(links, xs, strict=True):

@@ -32,7 +32,13 @@ from ephs.mechanics.scene.joints import Asked, resolve_joint
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
 from ephs.mechanics.scene.moving import moved
-from ephs.mechanics.scene.resolve_elements import Names, placed_faults, resolve_elements, settled, with_contacts
+from ephs.mechanics.scene.resolve_elements import (
+    ReferableNames,
+    placed_faults,
+    resolve_elements,
+    settled,
+    with_contacts,
+)
 from ephs.mechanics.scene.schema_elements import attributes
 from ephs.mechanics.scene.state import Snapshot, adjusted
 from ephs.mechanics.scene.stops import beyond, with_stops
@@ -55,7 +61,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_NAME}[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Reading:
+class _FileReading:
     """Reading of files, and findings in them: faults, impossible inertias, elements of a model without a counterpart,
     and what is given of joints' states.
 
@@ -108,7 +114,7 @@ def load(
     SceneError
         With all faults.
     """
-    r = _Reading(base, adjust, inertia, Path(path).parent.resolve(), contact)
+    r = _FileReading(base, adjust, inertia, Path(path).parent.resolve(), contact)
     if base not in ("fixed", "free"):
         r.faults.append(fault("base", "base", shown(base)))
     if inertia not in (None, "strict", "warn", "nearest"):
@@ -126,7 +132,7 @@ def load(
     return scene
 
 
-def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading) -> Scene | None:
+def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _FileReading) -> Scene | None:
     """A scene from a file, in a given world if it is a part; None where there were faults."""
     faults = r.faults
     raw = _parse(path, r)
@@ -186,7 +192,7 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _Reading)
     return None if faults else scene
 
 
-def _parse(path: Path, r: _Reading) -> Mapping[str, Any] | None:
+def _parse(path: Path, r: _FileReading) -> Mapping[str, Any] | None:
     faults = r.faults
     if path.suffix in MODELS:
         from ephs.mechanics.imports import read_model
@@ -233,7 +239,7 @@ def _described(world: World) -> str:
 
 
 def _parts(
-    document: Document, path: Path, world: World, stack: tuple[Path, ...], r: _Reading
+    document: Document, path: Path, world: World, stack: tuple[Path, ...], r: _FileReading
 ) -> tuple[dict[str, Scene], set[str]]:
     """The parts, moved to their places, and the names of those that could not be read."""
     faults = r.faults
@@ -290,11 +296,11 @@ def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
-def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> Names:
+def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> ReferableNames:
     bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
     thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
     sections = document.sections
-    return Names(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
+    return ReferableNames(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
 
 
 def _is_name(text: str) -> bool:

@@ -25,7 +25,7 @@ NOT_OF_SYSTEM = frozenset(
 
 @final
 @dataclass(frozen=True, slots=True)
-class Made:
+class SystemCache:
     """Cache of systems, by the data that they depend on."""
 
     systems: dict[Hashable, System] = field(default_factory=dict)

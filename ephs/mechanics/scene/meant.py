@@ -16,7 +16,7 @@ import numpy as np
 
 from ephs.mechanics.scene.adjust import across_rows, project_velocities
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap
 from ephs.mechanics.scene.model import Scene, frozen, mapped
 from ephs.mechanics.scene.state import Snapshot, rebuilt
 from ephs.semantics.bundles.bundle import Array
@@ -86,7 +86,7 @@ def is_shaky(scene: Scene) -> bool:
     )
 
 
-def _comes_away(links: Sequence[Link], poses: Array, way: Array, scale: Scale) -> bool:
+def _comes_away(links: Sequence[AssemblyJoint], poses: Array, way: Array, scale: Scale) -> bool:
     """Whether joints close again near by, after a step along a velocity, elsewhere than before it.
 
     Back to where bars were in line the gap falls by a half from one iteration to the next.
@@ -99,12 +99,12 @@ def _comes_away(links: Sequence[Link], poses: Array, way: Array, scale: Scale) -
     return bool(np.abs(moves).max() > LEFT * STRIDE)
 
 
-def _matrix(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
+def _matrix(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Array:
     """Constraint rows of the joints on all bodies' twists, lengths relative to the mechanism's."""
     return np.vstack([rows for _, rows in _rows(links, poses, scale)])
 
 
-def _rows(links: Sequence[Link], poses: Array, scale: Scale) -> Iterator[tuple[Array, Array]]:
+def _rows(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Iterator[tuple[Array, Array]]:
     """By joint the covectors (6, k) on its relative twist, and their rows on the bodies."""
     unit = np.diag([1.0] * 3 + [scale.length] * 3)
     roots = np.tile(unit, (len(poses), 1, 1))
@@ -112,7 +112,7 @@ def _rows(links: Sequence[Link], poses: Array, scale: Scale) -> Iterator[tuple[A
         yield across_rows(link, x, roots, scale)
 
 
-def _followed(links: Sequence[Link], poses: Array, way: Array, rank: int, scale: Scale) -> list[Array]:
+def _followed(links: Sequence[AssemblyJoint], poses: Array, way: Array, rank: int, scale: Scale) -> list[Array]:
     """Configurations along a motion of which the joints allow nearly all, as close as they can be had.
 
     It ends where the mechanism goes back as its joints close, where they stay open, or where more than ``rank``
@@ -138,13 +138,13 @@ def _followed(links: Sequence[Link], poses: Array, way: Array, rank: int, scale:
     return out
 
 
-def _solved(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
+def _solved(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Array:
     """The change that closes joints best, along all that they clearly forbid."""
     errors = _errors(links, poses, scale)
     return np.asarray(least_squares(_matrix(links, poses, scale), errors, part=EXPLICIT), dtype=np.float64)
 
 
-def _errors(links: Sequence[Link], poses: Array, scale: Scale) -> Array:
+def _errors(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Array:
     xs = elements(links, poses)
     return np.concatenate([
         covectors.T @ link.error(poses, x)
@@ -157,7 +157,9 @@ def _stepped(poses: Array, change: Array, scale: Scale) -> Array:
     return np.array([SE3.normalise(SE3.retract(q, v)) for q, v in zip(poses, steps, strict=True)])
 
 
-def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -> tuple[tuple[Link, ...], Array] | None:
+def _movable(
+    links: Sequence[AssemblyJoint], configurations: list[Array], scale: Scale
+) -> tuple[tuple[AssemblyJoint, ...], Array] | None:
     """Links whose second frames let all these configurations close, and the first of these, closed; None without."""
     n, m = configurations[0].shape[0], len(links)
     unit = np.array([1.0] * 3 + [scale.length] * 3)
@@ -186,7 +188,7 @@ def _movable(links: Sequence[Link], configurations: list[Array], scale: Scale) -
     return tuple(links), configurations[0]
 
 
-def _stiffest(links: Sequence[Link], poses: Array, ways: Array, scale: Scale) -> str:
+def _stiffest(links: Sequence[AssemblyJoint], poses: Array, ways: Array, scale: Scale) -> str:
     """The joint with the largest residual along these motions."""
     opened = [float(np.abs(rows @ ways.T).max(initial=0.0)) for _, rows in _rows(links, poses, scale)]
     return links[int(np.argmax(opened))].name

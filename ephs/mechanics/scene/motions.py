@@ -5,12 +5,12 @@ from typing import Any, Final
 
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.errors import shown
-from ephs.mechanics.scene.schema_numbers import Entry, Number, Series, key
+from ephs.mechanics.scene.schema_numbers import EntryTable, Number, Series, key
 from ephs.solve.errors import OptionError
 from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
 
 
-class MotionEntry(Entry):
+class MotionEntry(EntryTable):
     """A prescribed motion: the change of the coordinate from its initial value, in one of four forms."""
 
     rate: Number | None = key("constant rate of the single degree of freedom, rad/s or m/s", None)

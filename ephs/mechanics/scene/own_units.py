@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.build import drive_ports, element_signals, scene_system, wrench_port
-from ephs.mechanics.scene.element import Number
+from ephs.mechanics.scene.element import NumberForm
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
@@ -27,7 +27,7 @@ from ephs.solve.instant import Mobility
 from ephs.solve.mobility import mobility
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal, State
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 from ephs.solve.watching import Progress
 
 NEAR = 16, 20, 20
@@ -37,7 +37,7 @@ are in these. At half of it, all methods agree with runs in units of one to roun
 
 @final
 @dataclass(frozen=True, slots=True)
-class Units:
+class OwnUnits:
     """A length in m, a mass in kg, a time in s."""
 
     length: float
@@ -45,7 +45,7 @@ class Units:
     time: float
 
     @staticmethod
-    def of(scene: Scene) -> "Units":
+    def of(scene: Scene) -> "OwnUnits":
         """Those of a scene: of its length and rate, and its mass as a whole.
 
         Of one with elements of unknown quantities, those are m, kg and s: only their maker knows other units.
@@ -58,7 +58,7 @@ class Units:
         scale = Snapshot.of(scene).scale(scene.world.gravity)
         mass = sum(body.mass for _, body in scene.all_bodies()) or 1.0
         sizes = scale.length, mass, 1.0 / scale.rate
-        return Units(*(2.0 ** (near * round(np.log2(x) / near)) for x, near in zip(sizes, NEAR, strict=True)))
+        return OwnUnits(*(2.0 ** (near * round(np.log2(x) / near)) for x, near in zip(sizes, NEAR, strict=True)))
 
     @property
     def energy(self) -> float:
@@ -66,7 +66,7 @@ class Units:
         return self.mass * self.length**2 / self.time**2
 
 
-SI = Units(1.0, 1.0, 1.0)
+SI = OwnUnits(1.0, 1.0, 1.0)
 
 
 def in_own_units(problem: Problem) -> Problem:
@@ -75,7 +75,7 @@ def in_own_units(problem: Problem) -> Problem:
     That problem itself where its units are near, or where there is no scene.
     """
     scene: Scene | None = problem.scene
-    if scene is None or (units := once(scene, "units", lambda: Units.of(scene))) == SI:
+    if scene is None or (units := once(scene, "units", lambda: OwnUnits.of(scene))) == SI:
         return problem
     small = once(scene, "own", lambda: rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time))
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
@@ -107,8 +107,8 @@ def in_own_units(problem: Problem) -> Problem:
 
     whole = np.concatenate([factors[slot.path] for slot in descriptor.states])
 
-    def shown(record: Record, stats: Mapping[str, Any]) -> tuple[Problem, Record, dict[str, Any]]:
-        of = Record(
+    def shown(record: RunRecord, stats: Mapping[str, Any]) -> tuple[Problem, RunRecord, dict[str, Any]]:
+        of = RunRecord(
             record.t * units.time, record.x * whole, record.energies * units.energy, record.ledgers * units.energy
         )
         return problem, of, _stats(stats, units, factors)
@@ -152,13 +152,13 @@ def mobility_of(problem: Problem) -> Mobility:
     return once(d, ("mobility", x.tobytes(), own.prescribed), lambda: mobility(d, x, own.prescribed))
 
 
-def _ports(j: Any, units: Units) -> list[tuple[Path, Array]]:
+def _ports(j: Any, units: OwnUnits) -> list[tuple[Path, Array]]:
     """The outer ports of a driven joint, and its forces there in units of one force."""
     of = units.length / freedom_units(coupling_of(j), j.coordinate, units.length)
     return [(port, of[where]) for port, where in drive_ports(j)]
 
 
-def units_of_states(descriptor: Descriptor, units: Units, *, read: bool = False) -> dict[Path, Array]:
+def units_of_states(descriptor: Descriptor, units: OwnUnits, *, read: bool = False) -> dict[Path, Array]:
     """By path, the unit of each number of a state: (size,) as it is stored, or as users read it."""
     return {slot.path: _unit(slot.quantity, units, read=read) for slot in descriptor.states}
 
@@ -168,7 +168,7 @@ def _is_known(of: Quantity) -> bool:
     return of.kind in ("relative_pose", "pose") or of.space.dim == 6 or (of.kind in _SCALARS and plain)
 
 
-def _unit(quantity: Quantity, units: Units, *, read: bool = False) -> Array:
+def _unit(quantity: Quantity, units: OwnUnits, *, read: bool = False) -> Array:
     """(size,) units of a state.
 
     Raises
@@ -192,21 +192,21 @@ def _unit(quantity: Quantity, units: Units, *, read: bool = False) -> Array:
     return np.full(space.size, _SCALARS[kind].unit(units.length, units.mass, units.time, ()))
 
 
-_SCALARS: Mapping[str, Number] = {
-    "entropy": Number(energy=1),
-    "flux_linkage": Number(energy=1, time=1),
-    "charge": Number(),
-    "displacement": Number(length=1),
-    "angle": Number(),
-    "momentum": Number(energy=1, time=1, length=-1),
-    "angular_momentum": Number(energy=1, time=1),
-    "volume": Number(length=3),
-    "liquid": Number(length=3),
+_SCALARS: Mapping[str, NumberForm] = {
+    "entropy": NumberForm(energy=1),
+    "flux_linkage": NumberForm(energy=1, time=1),
+    "charge": NumberForm(),
+    "displacement": NumberForm(length=1),
+    "angle": NumberForm(),
+    "momentum": NumberForm(energy=1, time=1, length=-1),
+    "angular_momentum": NumberForm(energy=1, time=1),
+    "volume": NumberForm(length=3),
+    "liquid": NumberForm(length=3),
 }
 """Kind of a quantity -> dimension of its state: temperatures and charges are the same in all units."""
 
 
-def _stats(stats: Mapping[str, Any], units: Units, factors: Mapping[Path, Array]) -> dict[str, Any]:
+def _stats(stats: Mapping[str, Any], units: OwnUnits, factors: Mapping[Path, Array]) -> dict[str, Any]:
     out = dict(stats)
     for key in ("step", "shortest_step", "longest_step"):
         if out.get(key) is not None:

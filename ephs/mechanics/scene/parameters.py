@@ -18,7 +18,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 
 from ephs.mechanics.scene.errors import Fault, SceneError, did_you_mean, fault, listing
-from ephs.mechanics.scene.fields import FIELDS, Field, fields_of, placed
+from ephs.mechanics.scene.fields import FIELDS, NumberField, fields_of, placed
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.semantics.bundles.bundle import Array
@@ -40,7 +40,7 @@ def read(model: Scene | System, path: str) -> float:
     """
     if isinstance(model, System):
         return _component(model, path)[2]
-    return _Place.of(model, path).read(model)
+    return _ParameterTarget.of(model, path).read(model)
 
 
 def varied(model: Model, values: Mapping[str, float], *, strict: bool = True) -> Model:
@@ -79,24 +79,24 @@ def names(model: Scene | System) -> list[str]:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Place:
+class _ParameterTarget:
     """Target of a parameter path: object, field, and entry of the field."""
 
     path: str
     key: str
     name: str
-    field: Field
+    field: NumberField
     index: tuple[int, ...]
 
     @staticmethod
-    def of(scene: Scene, path: str) -> "_Place":
+    def of(scene: Scene, path: str) -> "_ParameterTarget":
         stem, index = _INDEX.split(path)[:2]
         entries = tuple(int(number) for number in re.findall(r"\d+", index))
         kind, _, rest = stem.partition(".")
         for key, field in fields_of(kind).items():
             name = rest.removesuffix(key).removesuffix(".") if rest.endswith(key) else None
             if name is not None and (not name or rest == f"{name}.{key}") and _has(scene, kind, name):
-                found = _Place(path, key, name, field, entries)
+                found = _ParameterTarget(path, key, name, field, entries)
                 found.entry(field.get(scene, name), scene)
                 return found
         raise _unknown(scene, path)
@@ -135,7 +135,7 @@ class _Place:
 
 
 def _scene(scene: Scene, values: Mapping[str, float], strict: bool) -> Scene:
-    places = [_Place.of(scene, path) for path in values]
+    places = [_ParameterTarget.of(scene, path) for path in values]
     faults: list[Fault] = []
     found, coordinates, rates = scene, dict[str, Array](), dict[str, Array]()
     # The bodies' and joints' own numbers first: coordinates are then reached with them.

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, SceneElement
-from ephs.mechanics.scene.geometry import Coupling, coupling_of
+from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.semantics.bundles.bundle import Array
 
@@ -61,7 +61,7 @@ def _joint(j: Joint, length: float, mass: float, time: float) -> Joint:
     )
 
 
-def freedom_units(of: Coupling, x: Array, length: float) -> Array:
+def freedom_units(of: JointCoupling, x: Array, length: float) -> Array:
     """(d,) the unit of each coordinate of a joint at its element x: 1 for angles, of screws too, else the length."""
     return np.where(np.any(of.basis(x)[:3], axis=0), 1.0, length)
 

@@ -18,7 +18,7 @@ from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, legible, lis
 from ephs.mechanics.scene.model import KINDS, Scene, elements_of, with_sections
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.schema_numbers import LARGEST
-from ephs.mechanics.scene.site import Level, Site, built
+from ephs.mechanics.scene.site import SceneLevel, Site, built
 from ephs.operad import PatternError
 from ephs.semantics.bundles.errors import SemanticsError
 
@@ -27,7 +27,7 @@ _ERRORS = (SemanticsError, PatternError, ValueError, ArithmeticError)
 
 @final
 @dataclass(frozen=True, slots=True)
-class Names:
+class ReferableNames:
     """The names that references may use; ``unknown_parts`` are parts that could not be read, of which
     nothing is known."""
 
@@ -45,7 +45,7 @@ class Names:
 
 
 def resolve_elements(
-    document: Document, parts: Mapping[str, Scene], names: Names, folder: Path, faults: list[Fault]
+    document: Document, parts: Mapping[str, Scene], names: ReferableNames, folder: Path, faults: list[Fault]
 ) -> dict[str, dict[str, Element]]:
     """The elements by section, checked but for what depends on where bodies are."""
     known = {
@@ -79,7 +79,7 @@ def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
     found = given or {each.name: each for each in meeting(scene)}
     for name, each in found.items():
         key = f"contacts.{name}" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
-        faults += islice(broken(Checked(each, key), Site(scene, each, Level())), 1)
+        faults += islice(broken(Checked(each, key), Site(scene, each, SceneLevel())), 1)
     return replace(scene, contacts=found)
 
 
@@ -87,7 +87,7 @@ def settled(scene: Scene) -> Scene:
     """The scene with the values of elements of its level, parts apart, that depend on where bodies are."""
     own: dict[str, dict[str, Element]] = {}
     for each in elements_of(scene):
-        own.setdefault(each.section, {})[each.name] = each.settled(Site(scene, each, Level()))
+        own.setdefault(each.section, {})[each.name] = each.settled(Site(scene, each, SceneLevel()))
     return with_sections(scene, own)
 
 
@@ -96,7 +96,7 @@ def _inside(parts: Mapping[str, Scene], section: str) -> Iterator[str]:
         yield from (f"{part}.{name}" for name, _ in scene.every(section))
 
 
-def check_table(table: Checked[Element], names: Names, known: Mapping[str, Collection[str]]) -> None:
+def check_table(table: Checked[Element], names: ReferableNames, known: Mapping[str, Collection[str]]) -> None:
     """Append the faults of an element's table: sizes of numbers, what it names, and its rules."""
     entry, spoiled = table.entry, set(table.spoiled)
     for name in type(entry).numbers:
@@ -127,7 +127,7 @@ def placed_faults(scene: Scene, *, adjusted: bool = False) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
     own = list(elements_of(scene))
     if adjusted:
-        sites = [(Checked(x, f"{x.section}.{x.name}"), Site(scene, x, Level())) for x in own]
+        sites = [(Checked(x, f"{x.section}.{x.name}"), Site(scene, x, SceneLevel())) for x in own]
         return [each for table, site in sites for each in broken(table, site, adjusted=True)]
     faults = [each for element in own for each in _placed(scene, element)]
     if not faults and any(scene.elements.values()):  # those that users wrote may not be built
@@ -145,12 +145,12 @@ def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
             joint, what = scene.joint(name), "motor joint" if kind == AXIS else "gear freedoms"
             if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
                 table.fault(what, place, f"{name}, {joint.kind}")
-    yield from table.faults or broken(table, Site(scene, element, Level()))
+    yield from table.faults or broken(table, Site(scene, element, SceneLevel()))
 
 
 def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
     try:
-        element.build(Site(scene, element, Level()))
+        element.build(Site(scene, element, SceneLevel()))
     except _ERRORS as error:
         yield fault("not built", f"{element.section}.{element.name}", str(error))
 
@@ -159,7 +159,7 @@ def number_faults(element: Element, key: str) -> list[Fault]:
     """Faults of an element with other numbers: those that its table would have."""
     values: dict[str, Any] = {name: getattr(element, name) for name in type(element).model_fields}
     faults: list[Fault] = []
-    check_table(validate(type(element), values, key, faults), Names(_Everything(), _Everything(), set()), {})
+    check_table(validate(type(element), values, key, faults), ReferableNames(_Everything(), _Everything(), set()), {})
     return faults
 
 

@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from ephs.mechanics.scene.errors import TEXTS, shown
 from ephs.mechanics.scene.rules import Told, rule
-from ephs.mechanics.scene.schema_numbers import Entry, Number, Quaternion, Vector, key
+from ephs.mechanics.scene.schema_numbers import EntryTable, Number, Quaternion, Vector, key
 
 TOLERANCE = 1e-6
 """Most by which the norm of a given quaternion differs from 1."""
@@ -20,7 +20,7 @@ FORMS = "rpy, rpy_deg, or axis with angle or angle_deg"
 _QUATERNION: TypeAdapter[list[float]] = TypeAdapter(Quaternion)
 
 
-class RotationEntry(Entry):
+class RotationEntry(EntryTable):
     """A rotation given by angles instead of a quaternion; one of rpy, rpy_deg, and axis with angle or angle_deg."""
 
     rpy: Vector | None = key("roll, pitch, yaw about the fixed axes x, y, z in turn, rad", None)

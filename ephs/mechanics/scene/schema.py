@@ -16,11 +16,11 @@ from ephs.mechanics.scene.model import ELEMENTS, KINDS
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_elements import table_of
-from ephs.mechanics.scene.schema_numbers import Entry, Flag, Text, Vector, key
+from ephs.mechanics.scene.schema_numbers import EntryTable, Flag, Text, Vector, key
 from ephs.mechanics.scene.thermal import ThermalNode
 
 
-class AssemblyEntry(Entry):
+class AssemblyEntry(EntryTable):
     """``[assembly]``"""
 
     adjust: Flag = key(
@@ -31,7 +31,7 @@ class AssemblyEntry(Entry):
     )
 
 
-class PartEntry(Entry):
+class PartEntry(EntryTable):
     """``[parts.NAME]``"""
 
     use: Text = key("another scene file or model, in the folder of this file, or below")
@@ -40,7 +40,7 @@ class PartEntry(Entry):
 
 
 WorldEntry: Any = table_of(World, "world")
-_TABLES: dict[str, tuple[type[Entry], str]] = {
+_TABLES: dict[str, tuple[type[EntryTable], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
     "beams": (BeamEntry, "rods that bend, twist and stretch"),
@@ -48,7 +48,7 @@ _TABLES: dict[str, tuple[type[Entry], str]] = {
 }
 _SECTIONS = {name: (KINDS[name], KINDS[name].said) if name in KINDS else _TABLES[name] for name in ELEMENTS}
 _SECTIONS["parts"] = PartEntry, "other scene files as subsystems"
-SECTIONS: dict[str, type[Entry]] = {key: table for key, (table, _) in _SECTIONS.items()}
+SECTIONS: dict[str, type[EntryTable]] = {key: table for key, (table, _) in _SECTIONS.items()}
 _Name: TypeAlias = Text | None
 _FILE: dict[str, Any] = {
     "format": (Literal[1], key("version of the file format, always 1")),
@@ -70,7 +70,7 @@ def scene_file() -> Any:
     own: dict[str, Any] = {
         section: (dict[str, of], key(of.said, default_factory=dict)) for section, of in REGISTERED.items()
     }
-    return create_model("SceneFile", __base__=Entry, __doc__="A scene file.", **_FILE, **own)
+    return create_model("SceneFile", __base__=EntryTable, __doc__="A scene file.", **_FILE, **own)
 
 
 def json_schema() -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from ephs.mechanics.scene import schema_numbers as forms
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Measured, Number, frozen, part_of
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Measured, NumberForm, frozen, part_of
 
 _RANGES: Final[Mapping[Any, Any]] = {
     None: forms.Number,
@@ -21,13 +21,13 @@ def table_of(kind: type[Measured], title: str) -> Any:
     """The model of a table with an element's numbers for keys."""
     keys: dict[str, Any] = {}
     for each in fields(kind):  # pyright: ignore[reportArgumentType] - all are dataclasses
-        number, said = part_of(each.type, Number), part_of(each.type, str)
+        number, said = part_of(each.type, NumberForm), part_of(each.type, str)
         if number and said:
             keys[each.name] = _key(each, number, said)
-    return create_model(f"{kind.__name__}Entry", __base__=forms.Entry, __doc__=f"``[{title}]``", **keys)
+    return create_model(f"{kind.__name__}Entry", __base__=forms.EntryTable, __doc__=f"``[{title}]``", **keys)
 
 
-def _key(of: Any, number: Number, said: str) -> tuple[Any, Any]:
+def _key(of: Any, number: NumberForm, said: str) -> tuple[Any, Any]:
     """Form and field of an attribute."""
     default = of.default if of.default_factory is MISSING else of.default_factory().tolist()
     if number.count:

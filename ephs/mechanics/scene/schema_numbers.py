@@ -124,7 +124,7 @@ Inertia = Annotated[
 ]
 
 
-class Entry(BaseModel):
+class EntryTable(BaseModel):
     """Base of all tables: unknown keys are faults."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

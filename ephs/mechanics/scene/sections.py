@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from ephs.mechanics.scene.checked import Checked
-from ephs.mechanics.scene.schema_numbers import Entry, Extents, Number, Positive, Sizes, key
+from ephs.mechanics.scene.schema_numbers import EntryTable, Extents, Number, Positive, Sizes, key
 from ephs.semantics.bundles.bundle import Array
 
 NUMBERS = ("EA", "GA", "GJ", "EI", "rhoA", "rhoI")
@@ -24,7 +24,7 @@ SHAPES = ("circle", "tube", "rectangle")
 MATERIAL = ("E", "nu", "rho")
 
 
-class SectionEntry(Entry):
+class SectionEntry(EntryTable):
     """``section``: numbers, or a shape with E, nu and rho."""
 
     EA: Positive | None = key("axial stiffness, N", None)
@@ -70,7 +70,7 @@ def tube(outer: float, inner: float, E: float, nu: float, rho: float) -> Section
     area, second, m = np.pi * (outer**2 - inner**2), np.pi / 4.0 * (outer**4 - inner**4), inner / outer
     round_ = (1.0 + m * m) ** 2
     shear = 6.0 * (1.0 + nu) * round_ / ((7.0 + 6.0 * nu) * round_ + (20.0 + 12.0 * nu) * m * m)
-    return _of(area, second, second, 2.0 * second, shear, E, nu, rho, (float(outer),))
+    return _section(area, second, second, 2.0 * second, shear, E, nu, rho, (float(outer),))
 
 
 def rectangle(b: float, h: float, E: float, nu: float, rho: float) -> Section:
@@ -79,10 +79,10 @@ def rectangle(b: float, h: float, E: float, nu: float, rho: float) -> Section:
     odd = np.arange(1.0, 40.0, 2.0)
     series = float(np.sum(np.tanh(0.5 * np.pi * odd * long / short) / odd**5))
     torsion = long * short**3 / 3.0 * (1.0 - 192.0 / np.pi**5 * short / long * series)
-    return _of(b * h, h * b**3 / 12.0, b * h**3 / 12.0, torsion, 5.0 / 6.0, E, nu, rho, (float(h), float(b)))
+    return _section(b * h, h * b**3 / 12.0, b * h**3 / 12.0, torsion, 5.0 / 6.0, E, nu, rho, (float(h), float(b)))
 
 
-def _of(
+def _section(
     area: float, about2: float, about3: float, torsion: float, shear: float,
     young: float, nu: float, rho: float, outline: tuple[float, ...],
 ) -> Section:  # fmt: skip

@@ -34,7 +34,7 @@ INPUTS = "inputs"
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Level:
+class SceneLevel:
     """Junctions, boxes and inputs of a level of a scene's system."""
 
     junctions: dict[Path, Any] = field(default_factory=dict)
@@ -59,7 +59,7 @@ class Site:
 
     scene: "Scene"
     element: "Element"
-    _level: Level
+    _level: SceneLevel
 
     @property
     def _origin(self) -> Array:
@@ -219,12 +219,12 @@ def surfaces_of(scene: "Scene") -> "Mapping[str, Surface]":
     return once(scene, "surfaces", lambda: dict(scene.all_surfaces()))
 
 
-def built(scene: "Scene") -> Level:
+def built(scene: "Scene") -> SceneLevel:
     """Junctions, boxes and inputs of the elements of a level; made once and kept with the scene."""
     from ephs.mechanics.scene.model import elements_of
 
-    def made() -> Level:
-        level = Level()
+    def made() -> SceneLevel:
+        level = SceneLevel()
         for of in elements_of(scene):
             of.build(Site(scene, of, level))
         path = Path(["entropies", ENVIRONMENT])

@@ -17,7 +17,7 @@ from ephs.mechanics.scene.following import stretched, tied
 from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.joints import Asked
-from ephs.mechanics.scene.kinematics import Link, Scale, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
@@ -45,7 +45,7 @@ class Snapshot:
     names: tuple[str, ...]
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
-    links: tuple[Link, ...]
+    links: tuple[AssemblyJoint, ...]
     poses: Array
     twists: Array
 
@@ -61,7 +61,7 @@ class Snapshot:
             bodies,
             tuple(joints),
             tuple(
-                Link(
+                AssemblyJoint(
                     j.name,
                     index[j.body1],
                     index[j.body2],
@@ -167,11 +167,11 @@ def adjusted(scene: Scene, asked: Mapping[str, Asked]) -> tuple[Scene, list[Faul
     return replace(rebuilt(scene, now, poses, twists, xs), adjusted=report), []
 
 
-def _asked(link: Link, asked: Asked | None) -> Link:
+def _asked(link: AssemblyJoint, asked: Asked | None) -> AssemblyJoint:
     return link if asked is None else replace(link, coordinates=asked.coordinates, rate=asked.rate)
 
 
-def _nearest(now: Snapshot, links: Sequence[Link], scale: Scale) -> Array | None:
+def _nearest(now: Snapshot, links: Sequence[AssemblyJoint], scale: Scale) -> Array | None:
     """The nearest poses that close all joints, those with coordinates at these; without, where these cannot be."""
     roots, held = now.roots(), frozenset(link.name for link in links if link.coordinates is not None)
     closed = close_loops(links, now.poses, roots, held, scale)
@@ -184,7 +184,7 @@ def _nearest(now: Snapshot, links: Sequence[Link], scale: Scale) -> Array | None
     return closed
 
 
-def _changes(links: Sequence[Link], xs: Sequence[Array], twists: Array, scale: Scale) -> Iterable[Changed]:
+def _changes(links: Sequence[AssemblyJoint], xs: Sequence[Array], twists: Array, scale: Scale) -> Iterable[Changed]:
     for link, x in zip(links, xs, strict=True):
         rate = link.slip(twists, x)[0]
         for what, wanted, found, unit in (
@@ -275,7 +275,7 @@ def _given(now: Snapshot, values: Mapping[str, ArrayLike], what: str, where: str
     return found
 
 
-def _carry(links: Sequence[Link], poses: Array, before: Sequence[Array]) -> tuple[Array, list[Array]]:
+def _carry(links: Sequence[AssemblyJoint], poses: Array, before: Sequence[Array]) -> tuple[Array, list[Array]]:
     """Poses and joint elements when the tree's joints go to their coordinates, or stay where they were."""
     poses = poses.copy()
     named = {link.name for link in links if link.coordinates is not None}
@@ -287,7 +287,7 @@ def _carry(links: Sequence[Link], poses: Array, before: Sequence[Array]) -> tupl
 
 
 def _carry_closed(
-    links: Sequence[Link], now: Snapshot, before: Sequence[Array], scale: Scale
+    links: Sequence[AssemblyJoint], now: Snapshot, before: Sequence[Array], scale: Scale
 ) -> tuple[Array, list[Array]] | None:
     """The same with every loop closed, in small steps so that the mechanism keeps its way of assembly."""
     held = frozenset(link.name for link in links if link.coordinates is not None)

@@ -13,7 +13,7 @@ from ephs.mechanics.scene.joints import Joint, JointEntry
 from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import Snapshot
 from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 
 STIFF = 1e4
 """Stiffness of stops by default, in M (L ω)² of the scene's mass, length and rate: what falls by its length presses a
@@ -40,7 +40,7 @@ def with_stops(document: Document, scene: Scene) -> Scene:
     return replace(scene, joints=found)
 
 
-def _stop(scene: Scene, joint: Joint, table: Checked[JointEntry]) -> Law | Impact | None:
+def _stop(scene: Scene, joint: Joint, table: Checked[JointEntry]) -> ConstitutiveLaw | Impact | None:
     """The law of a joint's stops, or None and a fault."""
     entry = table.entry
     if entry.limit_restitution is not None:
@@ -53,7 +53,7 @@ def _stop(scene: Scene, joint: Joint, table: Checked[JointEntry]) -> Law | Impac
     if not stiffness:
         table.fault("no scale", "limit_stiffness", "nothing")
         return None
-    return Law(stiffness=stiffness, loss=LOSS if entry.limit_loss is None else entry.limit_loss)
+    return ConstitutiveLaw(stiffness=stiffness, loss=LOSS if entry.limit_loss is None else entry.limit_loss)
 
 
 def _stiffness(scene: Scene, joint: Joint) -> float:

@@ -15,7 +15,7 @@ from ephs.mechanics.scene.errors import TEXTS, shown
 from ephs.mechanics.scene.polytope import MOST_VERTICES, corners_of, vertices_of
 from ephs.mechanics.scene.rotations import Rotation, turned
 from ephs.mechanics.scene.rules import Told, rule
-from ephs.mechanics.scene.schema_numbers import Entry, Extents, NonNegative, Number, Positive, Sizes, Text, Vector
+from ephs.mechanics.scene.schema_numbers import EntryTable, Extents, NonNegative, Number, Positive, Sizes, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.scene.text import file_inside
 from ephs.semantics.bundles.bundle import Array
@@ -26,7 +26,7 @@ HARD = ("restitution", "tangential")
 """Keys of elastic surfaces that hard ones do not have, and of hard ones."""
 
 
-class ContactLaw(Entry):
+class ContactLaw(EntryTable):
     """Keys of a contact's law, on a surface or on a contact."""
 
     stiffness: Positive | None = key(
@@ -47,7 +47,7 @@ class ContactLaw(Entry):
     heat: Text | None = key("thermal node that takes up the heat", None, names="node")
 
 
-class Touching(ContactLaw, Element):
+class TouchingElement(ContactLaw, Element):
     """What has a contact's law."""
 
     @rule(
@@ -72,7 +72,7 @@ def _points(value: Any) -> Any:
     return value
 
 
-class SurfaceShape(Entry):
+class SurfaceShape(EntryTable):
     """``shape`` of a surface: one of seven."""
 
     sphere: Positive | None = key("radius", None, unit="m")
@@ -95,7 +95,7 @@ Shape = Annotated[dict[str, Any], WrapValidator(_shape, json_schema_input_type=S
 
 
 @final
-class Surface(Touching, section="surfaces", said="surfaces of bodies for contact"):
+class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for contact"):
     """A surface on a body, or on the ground.
 
     A resolved one has one of ``{"sphere": r}``, ``{"capsule": [r, length]}``, ``{"cylinder": [r, length]}``, ``{"box":

@@ -6,7 +6,7 @@ from typing import Annotated, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import POSITIVE, Number, SceneElement
+from ephs.mechanics.scene.element import POSITIVE, NumberForm, SceneElement
 
 
 @final
@@ -19,10 +19,10 @@ class ThermalNode(SceneElement):
     """
 
     name: str
-    capacity: Annotated[float, Number(energy=1, least=POSITIVE), "heat capacity, J/K"]
-    temperature: Annotated[float, Number(least=POSITIVE), "initial temperature, K"]
-    pull: Annotated[float, Number(energy=1, length=-1)] = 0.0
-    reference: Annotated[float, Number()] = 0.0
+    capacity: Annotated[float, NumberForm(energy=1, least=POSITIVE), "heat capacity, J/K"]
+    temperature: Annotated[float, NumberForm(least=POSITIVE), "initial temperature, K"]
+    pull: Annotated[float, NumberForm(energy=1, length=-1)] = 0.0
+    reference: Annotated[float, NumberForm()] = 0.0
 
     def temperature_of(self, states: Callable[[str], Any]) -> Any:
         """θ = θ₁ exp((s − κ e)/C) in K, of its states by name: numbers or arrays."""

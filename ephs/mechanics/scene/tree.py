@@ -5,7 +5,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.scene.kinematics import Link
+from ephs.mechanics.scene.kinematics import AssemblyJoint
 from ephs.operad.disjoint import DisjointSets
 
 
@@ -21,7 +21,7 @@ class Hop:
     forward: bool
 
 
-def spanning_hops(links: Sequence[Link], count: int, preferred: Container[str]) -> list[Hop]:
+def spanning_hops(links: Sequence[AssemblyJoint], count: int, preferred: Container[str]) -> list[Hop]:
     """The steps that reach each of ``count`` bodies once, each from a body reached before.
 
     Named links come into the tree before others, then those in front. A group of bodies without a way to

@@ -6,7 +6,7 @@ from functools import lru_cache
 from itertools import zip_longest
 from typing import Final
 
-from ephs.mechanics.scene.element import Number
+from ephs.mechanics.scene.element import NumberForm
 
 _SYMBOLS: Final[Mapping[str, tuple[int, ...]]] = {
     "1": (0, 0, 0, 0),
@@ -39,7 +39,7 @@ _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 
 
 @lru_cache(maxsize=256)
-def dimension(unit: str) -> Number:
+def dimension(unit: str) -> NumberForm:
     """The dimension of a unit: symbols with blanks between, powers as ², one solidus before a symbol or a parenthesis.
 
     Raises
@@ -61,7 +61,7 @@ def dimension(unit: str) -> Number:
             power = sign * int((found[2] or "1").translate(_RAISED))
             total = [x + power * y for x, y in zip_longest(total, _SYMBOLS[found[1]], fillvalue=0)]
     length, mass, time, first, others = total
-    return Number(
+    return NumberForm(
         energy=mass,
         length=length - 2 * mass,
         time=time + 2 * mass,

@@ -11,10 +11,10 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
-from ephs.mechanics.sensitivity.family import Family, relation_of
+from ephs.mechanics.sensitivity.family import ParameterFamily, relation_of
 from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL
 from ephs.mechanics.tree.engine.adjoints import StepAdjoint
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.system import System
@@ -93,7 +93,7 @@ def gradient(
         raise OptionError("method", method, "rk54, rk87 or an ephs.Method")
     if not parameters:
         raise OptionError("parameters", parameters, "at least one path")
-    family = Family(model, parameters, initial, inputs, None, joints=True)
+    family = ParameterFamily(model, parameters, initial, inputs, None, joints=True)
     if not family.problem.constant:
         raise OptionError("inputs", "a function", "constants; ephs.sensitivity takes functions of time")
     wanted = np.atleast_1d(np.asarray(times, dtype=float))
@@ -132,7 +132,7 @@ def gradient(
     return Gradient(value, dict(zip(names, found.tolist(), strict=True)), steps.tables)
 
 
-def _seed(eq: Equations, name: str, weights: Array, count: int) -> tuple[Index, bool, Array]:
+def _seed(eq: ReducedEquations, name: str, weights: Array, count: int) -> tuple[Index, bool, Array]:
     """Places of a reading in q or y, which of both, and its weights (n, d)."""
     path, _, key = name.rpartition(".")
     joint = path if path in eq.layout.freedoms else path.removeprefix("joints.")

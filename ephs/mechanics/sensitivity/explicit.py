@@ -14,11 +14,19 @@ import numpy as np
 from ephs.mechanics.methods.explicit import Tableau
 from ephs.mechanics.road.charts import TIE
 from ephs.mechanics.road.cuts import Cut
-from ephs.mechanics.road.records import Link
-from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, Family, Stencil, difference, relation_of, same_shape
+from ephs.mechanics.road.records import LinkConstants
+from ephs.mechanics.sensitivity.family import (
+    CENTRAL,
+    OUTER,
+    ParameterFamily,
+    Stencil,
+    difference,
+    relation_of,
+    same_shape,
+)
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -38,7 +46,7 @@ WEIGHTS: Final = {
 ROUNDING: Final = 8.0 * np.finfo(float).eps
 """Rounding of the difference of two sums of two numbers, relative to all of them."""
 TURNED: Final = {
-    "reals": (Link.real_width, slice(Link.rotation.offset, Link.rotation.offset + 9)),
+    "reals": (LinkConstants.real_width, slice(LinkConstants.rotation.offset, LinkConstants.rotation.offset + 9)),
     "body": (12, slice(9)),
 }
 """Table -> width of its rows, and where these hold rotations: of joints in links, of bodies in links."""
@@ -46,7 +54,7 @@ TURNED: Final = {
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Point:
+class StatePoint:
     """A state and its derivatives by the parameters: (p, coordinates) of elements, (p, size − nv) of rates and totals.
 
     Derivatives of elements are those of their numbers.
@@ -67,21 +75,21 @@ class _Unread(Mapping[Path, Array]):
     """Storage for states without readers."""
 
     def __getitem__(self, path: Path) -> Never:
-        raise _Read
+        raise _StateReadSignal
 
     def __iter__(self) -> Iterator[Path]:
-        raise _Read
+        raise _StateReadSignal
 
     def __len__(self) -> int:
-        raise _Read
+        raise _StateReadSignal
 
 
-def _whole(of: Equations, at: ReducedState) -> Array:
+def _whole(of: ReducedEquations, at: ReducedState) -> Array:
     """All numbers of a state but the increments of a step."""
     return np.concatenate([at.q, of.vector(at)[of.nv :]])
 
 
-class _Read(Exception):
+class _StateReadSignal(Exception):
     """A function of time has read a state."""
 
 
@@ -95,20 +103,20 @@ class ExplicitTangent:
         Numbers of parameters, and steps with derivatives by these, after a start.
     """
 
-    def __init__(self, family: Family, t0: float, method: Tableau) -> None:
+    def __init__(self, family: ParameterFamily, t0: float, method: Tableau) -> None:
         self.family, self.t0, self.method = family, t0, method
-        self.equations = Equations(family.problem, t0)
-        self._others: dict[tuple[int, float], tuple[Problem, Equations, ReducedState]] = {}
+        self.equations = ReducedEquations(family.problem, t0)
+        self._others: dict[tuple[int, float], tuple[Problem, ReducedEquations, ReducedState]] = {}
         self._stencils: dict[int, Stencil] = {}
         self.tangents: list[tuple[slice, StepTangent]] = []
 
     # ---- steps -------------------------------------------------------------------------------------------------
 
-    def start(self) -> Point:
+    def start(self) -> StatePoint:
         """The initial state."""
         return self._closed(self.begin())
 
-    def begin(self) -> Point:
+    def begin(self) -> StatePoint:
         """The initial state, whose derivatives may open its loops."""
         eq, count = self.equations, len(self.family.parameters)
         state = eq.start(self.t0)
@@ -124,7 +132,7 @@ class ExplicitTangent:
                 for j, weight in enumerate(weights)
             ]
         )
-        point = Point(state, slopes[:, : state.q.size], slopes[:, state.q.size :])
+        point = StatePoint(state, slopes[:, : state.q.size], slopes[:, state.q.size :])
         for first in range(0, count, DIRECTIONS):
             which = slice(first, min(first + DIRECTIONS, count))
             relation = partial(relation_of, self.family.problem.descriptor)
@@ -138,12 +146,12 @@ class ExplicitTangent:
             self.tangents.append((which, made))
         return point
 
-    def step(self, point: Point, h: float) -> Point:
+    def step(self, point: StatePoint, h: float) -> StatePoint:
         """One step of h seconds."""
         eq, base = self.equations, point.state
         if eq.held:
             eq.given.place(base.t, {})
-        out = Point(base, np.empty_like(point.q), np.empty_like(point.y))
+        out = StatePoint(base, np.empty_like(point.q), np.empty_like(point.y))
         for which, tangent in self.tangents:
             self._put(tangent, point, which, "base", "start")
             status = tangent.step(h) if eq.constant or eq.held else self._staged(tangent, base.t, h)
@@ -152,8 +160,8 @@ class ExplicitTangent:
             out = replace(out, state=state)
         return out
 
-    def _closed(self, point: Point) -> Point:
-        out = Point(point.state, np.empty_like(point.q), np.empty_like(point.y))
+    def _closed(self, point: StatePoint) -> StatePoint:
+        out = StatePoint(point.state, np.empty_like(point.q), np.empty_like(point.y))
         for which, tangent in self.tangents:
             self._put(tangent, point, which, "q", "y")
             self._refuse(tangent.close())
@@ -191,20 +199,20 @@ class ExplicitTangent:
         try:
             self.equations.given.place(t, _Unread())
         except SolveError as error:
-            if isinstance(error.__cause__, _Read):
+            if isinstance(error.__cause__, _StateReadSignal):
                 raise OptionError(
                     "inputs", "a function that reads the state", "functions of time, or constants"
                 ) from error
             raise
 
-    def _put(self, tangent: StepTangent, point: Point, which: slice, elements: str, others: str) -> None:
+    def _put(self, tangent: StepTangent, point: StatePoint, which: slice, elements: str, others: str) -> None:
         nv, q, y = self.equations.nv, tangent.pairs[elements], tangent.pairs[others]
         used = which.stop - which.start
         q[0][:], y[0][:] = point.state.q, self.equations.vector(point.state)
         q[1][:, :used], y[1][:] = point.q[which].T, 0.0
         y[1][nv:, :used] = point.y[which].T
 
-    def _taken(self, tangent: StepTangent, out: Point, which: slice, t: float) -> ReducedState:
+    def _taken(self, tangent: StepTangent, out: StatePoint, which: slice, t: float) -> ReducedState:
         """The state that a step ended in; its derivatives go to a point."""
         eq, q, y = self.equations, tangent.pairs["q"], tangent.pairs["y"]
         used = which.stop - which.start
@@ -270,10 +278,10 @@ class ExplicitTangent:
                     return False
         return True
 
-    def _other(self, number: int, offset: float) -> tuple[Problem, Equations, ReducedState]:
+    def _other(self, number: int, offset: float) -> tuple[Problem, ReducedEquations, ReducedState]:
         if (number, offset) not in self._others:
             problem = self.family.at(number, offset)
-            found = Equations(problem, self.t0)
+            found = ReducedEquations(problem, self.t0)
             path = self.family.parameters[number].path
             start = found.start(self.t0)
             for one, other in zip(self.equations.engine.arrays(), found.engine.arrays(), strict=False):
@@ -281,7 +289,7 @@ class ExplicitTangent:
             self._others[number, offset] = problem, found, start
         return self._others[number, offset]
 
-    def _numbers(self, of: Equations, name: str) -> Array:
+    def _numbers(self, of: ReducedEquations, name: str) -> Array:
         """The real numbers of a table of a neighbour's engine. Rows that close loops may be any that span the same:
         taken are those that are nearest to this problem's."""
         value = of.engine.tables[name]
@@ -300,15 +308,15 @@ class ExplicitTangent:
 
     # ---- what is kept ------------------------------------------------------------------------------------------
 
-    def size(self, point: Point, number: int) -> float:
+    def size(self, point: StatePoint, number: int) -> float:
         """Change of the state by a unit of a parameter."""
         return float(max(np.abs(point.q[number]).max(initial=0.0), np.abs(point.y[number]).max(initial=0.0)))
 
-    def row(self, point: Point) -> Row:
+    def row(self, point: StatePoint) -> Row:
         """Record of a state."""
         return self.equations.row(point.state)
 
-    def beside(self, number: int, model: float, states: float, points: list[Point]) -> tuple[Problem, list[Row]]:
+    def beside(self, number: int, model: float, states: float, points: list[StatePoint]) -> tuple[Problem, list[Row]]:
         """The same of states along the tangents by an offset, and the problem of a neighbour by one."""
         problem, eq, _ = self._other(number, model)
         found: list[ReducedState] = []

@@ -79,7 +79,7 @@ class Parameter:
 
 
 @final
-class Family:
+class ParameterFamily:
     """A model with its initial state and options, and its variants with other parameters.
 
     Parameters

@@ -113,13 +113,13 @@ def fit(
     """
     from scipy.optimize import least_squares
 
-    record = _Record(model, data, sigma or {})
+    record = _RecordedVector(model, data, sigma or {})
     guess = {
         path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters
     }
     lower, upper = np.array([(bounds or {}).get(path, _bounds(model, path)) for path in parameters], dtype=float).T
     scale = np.array([abs(value) or 1.0 for value in guess.values()])
-    runs = _Runs(model, tuple(parameters), record, run, scale)
+    runs = _FitRuns(model, tuple(parameters), record, run, scale)
     x0 = np.clip(np.array(list(guess.values())), lower, upper) / scale
     if record.size < x0.size:
         raise OptionError("data", f"{record.size} numbers", f"{x0.size} or more, for as many parameters")
@@ -149,7 +149,7 @@ def fit(
 
 
 @final
-class _Record:
+class _RecordedVector:
     """Recorded values as one vector."""
 
     def __init__(self, model: System | Scene, data: Mapping[str, "ArrayLike"], sigma: Mapping[str, float]) -> None:
@@ -188,11 +188,16 @@ class _Record:
 
 
 @final
-class _Runs:
+class _FitRuns:
     """Motions by parameters, the last one kept: its residuals and their derivative are wanted one after the other."""
 
     def __init__(
-        self, model: System | Scene, paths: tuple[str, ...], record: _Record, run: Mapping[str, Any], scale: Array
+        self,
+        model: System | Scene,
+        paths: tuple[str, ...],
+        record: _RecordedVector,
+        run: Mapping[str, Any],
+        scale: Array,
     ) -> None:
         self.model, self.paths, self.record, self.run, self.scale = model, paths, record, dict(run), scale
         self.count = 0

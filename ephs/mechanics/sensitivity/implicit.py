@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from ephs.mechanics.sensitivity.family import Family, difference, relation_of, same_shape
+from ephs.mechanics.sensitivity.family import ParameterFamily, difference, relation_of, same_shape
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible
@@ -21,11 +21,11 @@ from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector
 from ephs.solve.errors import OptionError, SolveError
-from ephs.solve.methods.moves import settle
+from ephs.solve.methods.moves import move_states
 from ephs.solve.methods.natural import Natural, NaturalState
 from ephs.solve.methods.records import Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Evaluation, Model, compile_model
 from ephs.solve.problem import Problem
 from ephs.solve.stepping import Row
@@ -33,7 +33,7 @@ from ephs.solve.stepping import Row
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Point:
+class MethodPoint:
     """A state of the method at a time, and its derivatives by the parameters: (p, point_size), (p, sums)."""
 
     t: float
@@ -73,7 +73,7 @@ def tangent_program() -> Program:
         return fault
 
     def end(on: Evaluator, t: Columns, x: Vector, z: Vector, scal: Vector, m: Scratch) -> None:
-        settle(on, t, x, scal[0], z, m.v)
+        move_states(on, t, x, scal[0], z, m.v)
 
     entries = {"whole": Entry(whole), "end": Entry(end)}
     return Program("natural_along", **{name: entry.tangent(directions=DIRECTIONS) for name, entry in entries.items()})
@@ -132,7 +132,7 @@ def _pair(value: Array) -> tuple[Array, Array]:
 class NaturalTangent:
     """Natural steps with their tangents, for one family."""
 
-    def __init__(self, family: Family, t0: float) -> None:
+    def __init__(self, family: ParameterFamily, t0: float) -> None:
         if not family.problem.constant:
             raise OptionError("inputs", "a function", "constants, with the method natural; or rk54 or rk87, of a scene")
         self.family, self.t0 = family, t0
@@ -144,7 +144,7 @@ class NaturalTangent:
         self._makers = np.array([isinstance(slot.primitive, Irreversible) for slot in d.components], dtype=bool)
         self._along: list[tuple[slice, _Along]] = []
 
-    def start(self) -> Point:
+    def start(self) -> MethodPoint:
         """The initial state."""
         d, count = self.family.problem.descriptor, len(self.family.parameters)
         found = [self._by(j, lambda of: d.pack(of.problem.initial)) for j in range(count)]
@@ -156,9 +156,9 @@ class NaturalTangent:
                     slopes[:, k] = self._by(j, lambda of, name=name: of.numbers(name))
             self._along.append((which, along))
         state = self.natural.init(d.pack(self.family.problem.initial))
-        return Point(self.t0, state, np.array(found), np.zeros((count, state.sums.size)))
+        return MethodPoint(self.t0, state, np.array(found), np.zeros((count, state.sums.size)))
 
-    def step(self, point: Point, h: float) -> Point:
+    def step(self, point: MethodPoint, h: float) -> MethodPoint:
         """One step of h seconds."""
         after = self.natural.step(point.state, h)
         x0, z, model = point.state.x, after.z[0], self.side.model
@@ -177,7 +177,7 @@ class NaturalTangent:
             dsums[which] = point.sums[which] + along.sums[1][:, :used].T
             along.end()
             dx[which] = along.x[1][:, :used].T
-        return Point(point.t + h, after, dx, dsums)
+        return MethodPoint(point.t + h, after, dx, dsums)
 
     def _sound(self, status: int, component: int) -> None:
         if status:
@@ -211,15 +211,15 @@ class NaturalTangent:
 
     # ---- what is kept ------------------------------------------------------------------------------------------
 
-    def size(self, point: Point, number: int) -> float:
+    def size(self, point: MethodPoint, number: int) -> float:
         """Change of the state by a unit of a parameter."""
         return float(np.abs(point.x[number]).max(initial=0.0))
 
-    def row(self, point: Point) -> Row:
+    def row(self, point: MethodPoint) -> Row:
         """Record of a state."""
         return self._row(self.side.model, point.state.x, point.state.sums)
 
-    def beside(self, number: int, model: float, states: float, points: list[Point]) -> tuple[Problem, list[Row]]:
+    def beside(self, number: int, model: float, states: float, points: list[MethodPoint]) -> tuple[Problem, list[Row]]:
         """The same of states along the tangents by an offset, and the problem of a neighbour by one."""
         side = self._other(number, model)
         rows = [
@@ -235,4 +235,4 @@ class NaturalTangent:
         return x
 
     def _row(self, model: Model, x: Array, sums: Array) -> Row:
-        return Row(x, np.where(self._makers, sums[4:], Stored(model).energies(x)), sums[:4])
+        return Row(x, np.where(self._makers, sums[4:], StoredEnergies(model).energies(x)), sums[:4])

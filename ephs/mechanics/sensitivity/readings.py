@@ -29,11 +29,11 @@ def reading_of(model: System | Scene, name: str) -> Reading:
         return whole
     number = int(entry[:-1]) if entry[:-1].isdigit() and entry.endswith("]") else -1
 
-    def one(solution: Solution) -> Array:
+    def column(solution: Solution) -> Array:
         values = whole(solution)
         if not (values.ndim == 2 and 0 <= number < values.shape[1]):
             expected = f"an entry of {values.shape[1]} numbers" if values.ndim == 2 else "no brackets: it is one number"
             raise OptionError("reading", name, expected)
         return values[:, number]
 
-    return one
+    return column

@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.runs.signals import numbers_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.sensitivity.family import CENTRAL, Family, Parameter, difference
+from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamily, difference
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
@@ -140,7 +140,7 @@ def sensitivity(
     """
     name = _method(method, step)
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": name, "inputs": inputs, "reference": reference}
-    family = Family(model, parameters, initial, inputs, reference, joints=name != "natural")
+    family = ParameterFamily(model, parameters, initial, inputs, reference, joints=name != "natural")
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
     times = None if save_at is None else numbers_of(save_at)
     if save_at is not None and times is None:
@@ -167,7 +167,9 @@ def _method(method: str | Method, step: float | None) -> str | Method:
     return found
 
 
-def _along(family: Family, method: str | Method, grid: Array, times: Array | None, *, chosen: bool) -> Sensitivity:
+def _along(
+    family: ParameterFamily, method: str | Method, grid: Array, times: Array | None, *, chosen: bool
+) -> Sensitivity:
     """The tangent along the steps of a grid; kept at its times, or at others, by shortened steps."""
     t0, name = float(grid[0]), method.name if isinstance(method, Method) else method
     if method == "natural":

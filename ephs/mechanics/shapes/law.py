@@ -13,7 +13,7 @@ from ephs.semantics.derive.functions import TINY
 
 @final
 @dataclass(frozen=True, slots=True)
-class Law:
+class ConstitutiveLaw:
     """Constitutive law of a contact.
 
     Parameters
@@ -67,10 +67,10 @@ class Law:
         """Its numbers by name."""
         return tuple((each.name, float(getattr(self, each.name))) for each in fields(self))
 
-    def rescaled(self, length: float, mass: float, time: float) -> "Law":
+    def rescaled(self, length: float, mass: float, time: float) -> "ConstitutiveLaw":
         """The same law in numbers of other units: lengths are multiplied by ``length``, and so on."""
         energy = mass * length**2 / time**2
-        return Law(
+        return ConstitutiveLaw(
             stiffness=self.stiffness * energy / length ** (self.exponent + 1.0),
             exponent=self.exponent,
             loss=self.loss * time / length,

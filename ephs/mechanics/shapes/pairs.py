@@ -26,7 +26,7 @@ from ephs.mechanics.shapes.gap import (
 )
 from ephs.mechanics.shapes.hull import Hull, hull_of, inside_of
 from ephs.mechanics.shapes.selecting import Vector
-from ephs.mechanics.shapes.solids import Body, cylinder, faces, meeting, point, polyhedron, rim, segment, side
+from ephs.mechanics.shapes.solids import ConvexBody, cylinder, faces, meeting, point, polyhedron, rim, segment, side
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.spaces import SE3
@@ -132,7 +132,7 @@ def _boxes(one: Sequence[float], other: Sequence[float]) -> Points:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Rounded:
+class _RoundedSolid:
     """A polyhedron with rounded edges.
 
     Parameters
@@ -145,9 +145,9 @@ class _Rounded:
     radius: float
 
     @staticmethod
-    def of(vertices: Any) -> "_Rounded":
+    def of(vertices: Any) -> "_RoundedSolid":
         """Rounded as a box is, by the largest sphere inside."""
-        return _Rounded(*inside_of(vertices, 2.0 * ROUNDED))
+        return _RoundedSolid(*inside_of(vertices, 2.0 * ROUNDED))
 
     @property
     def frame(self) -> Array:
@@ -155,7 +155,7 @@ class _Rounded:
         return 0.5 * (self.core.corners.min(axis=0) + self.core.corners.max(axis=0))
 
     @property
-    def body(self) -> Body:
+    def body(self) -> ConvexBody:
         """The body that points meet."""
         return polyhedron(self.core, self.frame, self.radius)
 
@@ -176,7 +176,7 @@ def _turned(way: Array) -> Array:
     return turn / np.linalg.norm(turn)
 
 
-def _polyhedra(one: _Rounded, other: _Rounded) -> Points:
+def _polyhedra(one: _RoundedSolid, other: _RoundedSolid) -> Points:
     yield from ((one.frame, at, meeting(point(other.radius), one.body, first=False)) for at in other.core.corners)
     yield from ((at, other.frame, meeting(point(one.radius), other.body, first=True)) for at in one.core.corners)
     for (here, long1), (there, long2) in product(one.edges(), other.edges()):
@@ -186,18 +186,18 @@ def _polyhedra(one: _Rounded, other: _Rounded) -> Points:
 
 
 def _sphere_mesh(radius: float, vertices: Any) -> Points:
-    solid = _Rounded(hull_of(vertices), 0.0)
+    solid = _RoundedSolid(hull_of(vertices), 0.0)
     yield CENTRE, solid.frame, meeting(point(radius), solid.body, first=True)
 
 
 def _capsule_mesh(capsule: Sequence[float], vertices: Any) -> Points:
     radius, length = capsule
-    solid = _Rounded.of(vertices)
+    solid = _RoundedSolid.of(vertices)
     yield from ((at, solid.frame, meeting(point(radius), solid.body, first=True)) for at in _ends(length))
     yield from ((CENTRE, there, segments(0.5 * length, radius, long, solid.radius)) for there, long in solid.edges())
 
 
-def _cylinder(sizes: Sequence[float], domed: float = 0.0) -> tuple[Body, tuple[Array, ...]]:
+def _cylinder(sizes: Sequence[float], domed: float = 0.0) -> tuple[ConvexBody, tuple[Array, ...]]:
     """A cylinder with rounded rims, and the centres of their cores."""
     size, length = sizes
     radius = _rounding(sizes)
@@ -217,7 +217,7 @@ def _capsule_cylinder(capsule: Sequence[float], sizes: Sequence[float]) -> Point
     yield CENTRE, CENTRE, meeting(segment(0.5 * length, radius), body, first=True)
 
 
-def _polyhedron_cylinder(solid: _Rounded, sizes: Sequence[float]) -> Points:
+def _polyhedron_cylinder(solid: _RoundedSolid, sizes: Sequence[float]) -> Points:
     body, rims = _cylinder(sizes)
     circle = rim(body.halves[0], body.radius)
     yield from ((at, CENTRE, meeting(point(solid.radius), body, first=True)) for at in solid.core.corners)
@@ -255,14 +255,14 @@ PAIRS: Final[Mapping[tuple[str, str], Callable[[Any, Any], Points]]] = {
     ("box", "box"): _boxes,
     ("sphere", "mesh"): _sphere_mesh,
     ("capsule", "mesh"): _capsule_mesh,
-    ("box", "mesh"): lambda b, mesh: _polyhedra(_Rounded.of(_hull_of_box(b)), _Rounded.of(mesh)),
-    ("mesh", "mesh"): lambda one, other: _polyhedra(_Rounded.of(one), _Rounded.of(other)),
+    ("box", "mesh"): lambda b, mesh: _polyhedra(_RoundedSolid.of(_hull_of_box(b)), _RoundedSolid.of(mesh)),
+    ("mesh", "mesh"): lambda one, other: _polyhedra(_RoundedSolid.of(one), _RoundedSolid.of(other)),
     ("sphere", "cylinder"): lambda r, c: [
         (CENTRE, CENTRE, meeting(point(r), cylinder(c[0], 0.5 * c[1], 0.0), first=True))
     ],
     ("capsule", "cylinder"): _capsule_cylinder,
-    ("box", "cylinder"): lambda b, c: _polyhedron_cylinder(_Rounded.of(_hull_of_box(b)), c),
-    ("mesh", "cylinder"): lambda mesh, c: _polyhedron_cylinder(_Rounded.of(mesh), c),
+    ("box", "cylinder"): lambda b, c: _polyhedron_cylinder(_RoundedSolid.of(_hull_of_box(b)), c),
+    ("mesh", "cylinder"): lambda mesh, c: _polyhedron_cylinder(_RoundedSolid.of(mesh), c),
     ("cylinder", "cylinder"): _cylinders,
 }
 """Kinds of both shapes -> the gaps, by where they are on both."""

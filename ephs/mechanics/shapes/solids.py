@@ -38,7 +38,7 @@ Spot = tuple[Vector, Any]
 
 @final
 @dataclass(frozen=True, slots=True)
-class Body:
+class ConvexBody:
     """A convex body.
 
     Parameters
@@ -77,14 +77,14 @@ class Feature:
     """
 
     name: str
-    spot: Callable[[Vector, Vector, Body], Spot]
+    spot: Callable[[Vector, Vector, ConvexBody], Spot]
     radius: float
     halves: tuple[float, float, float]
     numbers: tuple[tuple[str, float], ...]
     searched: bool = True
 
 
-def meeting(feature: Feature, body: Body, *, first: bool) -> Gap:
+def meeting(feature: Feature, body: ConvexBody, *, first: bool) -> Gap:
     """Gap between a feature and a body.
 
     Parameters
@@ -143,7 +143,7 @@ def point(radius: float) -> Feature:
 def segment(half: float, radius: float) -> Feature:
     """A capsule about a segment: one point, which moves to an end, or to the edge of the body, where it tilts."""
 
-    def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
+    def spot(centre: Vector, axis: Vector, body: ConvexBody) -> Spot:
         stay, pull = UPRIGHT * (radius + body.radius) / half, body.pull
         assert pull is not None
 
@@ -166,7 +166,7 @@ def rim(size: float, radius: float) -> Feature:
     Its contact with a face is that with a plane (`rounded`); flat on a cap, it is near the axis of the other cylinder.
     """
 
-    def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
+    def spot(centre: Vector, axis: Vector, body: ConvexBody) -> Spot:
         if body.pull is not None:
             return _disc(centre, axis, size, body.pull), 0.0
         normal = body.normal(centre)
@@ -185,7 +185,7 @@ def side(size: float, half: float, radius: float) -> Feature:
     of `UPRIGHT`. Sides that would cross beyond an end touch at rims alone: the gap is larger there.
     """
 
-    def spot(centre: Vector, axis: Vector, body: Body) -> Spot:
+    def spot(centre: Vector, axis: Vector, body: ConvexBody) -> Spot:
         barrel = UPRIGHT * (size + body.halves[0]) / half
         level = axis[0] * axis[0] + axis[1] * axis[1]
         crossing = -(centre[0] * axis[0] + centre[1] * axis[1]) / (level + barrel)
@@ -235,7 +235,7 @@ def _disc(centre: Vector, axis: Vector, size: float, pull: Callable[[Vector], Ve
 # ---- bodies ------------------------------------------------------------------------------------------------------
 
 
-def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> Body:
+def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> ConvexBody:
     """A cylinder about z, of the radius ``size`` and this half length, rounded outwards.
 
     Parameters
@@ -270,10 +270,10 @@ def cylinder(size: float, half: float, radius: float, domed: float = 0.0) -> Bod
 
     sizes = (("size", size), ("half_length", half), ("rounding", radius), *((("domed", domed),) if domed else ()))
     halves, thickness = (size, size, half), 2.0 * min(size, half)
-    return Body("dome" if domed else "cylinder", distance, normal, pull, radius, halves, thickness, sizes)
+    return ConvexBody("dome" if domed else "cylinder", distance, normal, pull, radius, halves, thickness, sizes)
 
 
-def polyhedron(hull: Hull, centre: np.ndarray, radius: float) -> Body:
+def polyhedron(hull: Hull, centre: np.ndarray, radius: float) -> ConvexBody:
     """A convex polyhedron about a centre (3,), rounded outwards. Distances within are those from the nearest face.
 
     A point outside is nearest to an edge, or to a face above which it is: the least of all distances from edges, and of
@@ -324,17 +324,17 @@ def polyhedron(hull: Hull, centre: np.ndarray, radius: float) -> Body:
 
     numbers = _numbers(corners, radius)
     halves = _halves(corners)
-    return Body("polyhedron", distance, normal, None, radius, halves, 2.0 * hull.radius, numbers)
+    return ConvexBody("polyhedron", distance, normal, None, radius, halves, 2.0 * hull.radius, numbers)
 
 
-def faces(hull: Hull, centre: np.ndarray, radius: float) -> list[Body]:
+def faces(hull: Hull, centre: np.ndarray, radius: float) -> list[ConvexBody]:
     """The faces of a convex polyhedron, rounded outwards, each as a body: a point above it is as far as it is high.
 
     Other points are further from it than from the polyhedron.
     """
     corners = hull.corners - centre
     planes = _planes(hull, corners)
-    out: list[Body] = []
+    out: list[ConvexBody] = []
     for k, (normal, _) in enumerate(planes):
         lines, sharp = _sides(hull, corners, k)
 
@@ -348,7 +348,7 @@ def faces(hull: Hull, centre: np.ndarray, radius: float) -> list[Body]:
 
         numbers = (("face", float(k)), *_numbers(corners, radius))
         made = distance, upwards, None, radius, _halves(corners), 2.0 * hull.radius, numbers
-        out.append(Body("face", *made))
+        out.append(ConvexBody("face", *made))
     return out
 
 

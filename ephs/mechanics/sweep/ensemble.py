@@ -19,10 +19,10 @@ from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.images import FAULTS, STARTS, Images, Truths, Unlike
-from ephs.mechanics.sweep.members import Energies, Marches, Stack
+from ephs.mechanics.sweep.members import Marches, MemberEnergies, Stack
 from ephs.mechanics.sweep.outputs import Output
 from ephs.mechanics.sweep.suspicion import INSTANTS, LONGER, resolved, suspicious
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.tables import TREE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import Pair
@@ -123,7 +123,7 @@ class Ensemble:
         h = first_step(control, abs(self.until - self.t0))
         return Span(start, self.t0, self.until, h, control, policy, times, saved)
 
-    def stepper(self, equations: Equations) -> Any:
+    def stepper(self, equations: ReducedEquations) -> Any:
         """The method on these equations.
 
         Raises
@@ -173,7 +173,7 @@ class _Runs:
         self._marches = [Marches(leg(self._made.start), tables, most) for leg in self._legs]
         kept = np.count_nonzero(times != ensemble.until) - ensemble.first  # the end is looked at in any case
         self._chosen = np.unique(np.linspace(0, kept - 1, INSTANTS).astype(int)) if kept else np.zeros(0, dtype=int)
-        self._energies = Energies(eq, tables, most, self._chosen.size + 2)
+        self._energies = MemberEnergies(eq, tables, most, self._chosen.size + 2)
 
     def run(self, members: Array) -> Ran:
         """Some members, `Ensemble.together` of them at most."""
@@ -244,7 +244,7 @@ class _Runs:
         return Ending.PAUSED
 
 
-def _reading(equations: Equations, output: Output) -> Any:
+def _reading(equations: ReducedEquations, output: Output) -> Any:
     """Reader of an output from rows of elements and of rates, entropies and ledgers.
 
     Raises

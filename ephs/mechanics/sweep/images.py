@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.own_units import SI, Units
+from ephs.mechanics.scene.own_units import SI, OwnUnits
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.sweep.axes import Axes
-from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.errors import SolveError
@@ -48,19 +48,21 @@ FAULTS = Unlike, SolveError, SceneError, SemanticsError
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Made:
+class CompiledStart:
     """Compiled equations and their initial state."""
 
-    equations: Equations
+    equations: ReducedEquations
     start: ReducedState
 
     @staticmethod
-    def of(scene: Scene, t0: float) -> "Made":
+    def of(scene: Scene, t0: float) -> "CompiledStart":
         """From a scene."""
-        if Units.of(scene) != SI:
+        if OwnUnits.of(scene) != SI:
             raise Unlike(f"{scene.name} is solved in units of its own")
-        equations = Equations(problem_of_scene(replace(scene)), t0)  # nothing is shared: its tables are overwritten
-        return Made(equations, equations.start(t0))
+        equations = ReducedEquations(
+            problem_of_scene(replace(scene)), t0
+        )  # nothing is shared: its tables are overwritten
+        return CompiledStart(equations, equations.start(t0))
 
     def arrays(self) -> list[Array]:
         """All numbers that a run depends on, the start's last."""
@@ -95,7 +97,7 @@ class Made:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Course:
+class _ValueDependence:
     """Dependence of an image on the value of one path, as α + β·value + γ/value, by three of its values.
 
     Parameters
@@ -124,7 +126,7 @@ class _Course:
         most = (self.middle - self.low) * (self.high - self.middle) / self.middle
         return out + (value - self.low) * (self.high - value) / value / most * self.bend
 
-    def among(self, places: Index) -> "_Course":
+    def among(self, places: Index) -> "_ValueDependence":
         """The same for some numbers of the image."""
         return replace(self, first=self.first[places], slope=self.slope[places], bend=self.bend[places])
 
@@ -146,19 +148,19 @@ class Images:
     def __init__(self, scene: Scene, axes: Axes, t0: float) -> None:
         self._scene, self._axes, self._t0 = scene, axes, t0
         self._middle = [_middle(values) for values in axes.values]
-        self._lock, self._spare = threading.Lock(), list[Made]()
+        self._lock, self._spare = threading.Lock(), list[CompiledStart]()
         self._along: dict[tuple[int, float], Array] = {}
         self.made = self._member(self._middle)
         self.base, self._counts = self.made.image(), self.made.counts()
         self._shapes = [a.shape for a in self.made.arrays()]
-        self._courses: dict[int, _Course] = {}
+        self._courses: dict[int, _ValueDependence] = {}
         self._own: list[Index] = []
         self.columns, self._whole = np.arange(self.base.size), False
         if not self._followed():
             self.columns, self._whole = np.arange(self.base.size), True
         self._spare.append(self.made)
 
-    def anew(self) -> Made:
+    def anew(self) -> CompiledStart:
         """The member of the image ``base``, for one thread, which may overwrite its tables."""
         with self._lock:
             return self._spare.pop() if self._spare else self._member(self._middle)
@@ -188,7 +190,7 @@ class Images:
         return out, good
 
     def parts(self) -> Iterator[tuple[int, Index, Index]]:
-        """Number of each array of `Made.arrays` that may differ; places of these numbers in it, and in `columns`."""
+        """Number of each array of `CompiledStart.arrays` that may differ; their places in it and in `columns`."""
         at = 0
         for number, shape in enumerate(self._shapes):
             size = int(np.prod(shape))
@@ -264,15 +266,19 @@ class Images:
         value = float(values[min(1, values.size - 1)])
         return value, self._one(axis, value)
 
-    def _course(self, axis: int, least: tuple[float, Array], most: tuple[float, Array], touched: Truths) -> _Course:
+    def _course(
+        self, axis: int, least: tuple[float, Array], most: tuple[float, Array], touched: Truths
+    ) -> _ValueDependence:
         (low, first), (high, last), middle = least, most, self._middle[axis]
-        straight = _Course(low, middle, high, first, np.where(touched, last - first, 0.0), np.zeros_like(first))
+        straight = _ValueDependence(
+            low, middle, high, first, np.where(touched, last - first, 0.0), np.zeros_like(first)
+        )
         if low <= 0.0 <= high or not low < middle < high:
             return straight
         on = straight(np.array([middle]))[0]
         return replace(straight, bend=np.where(_apart(self.base, on), self.base - on, 0.0))
 
-    def _follows(self, axis: int, course: _Course) -> bool:
+    def _follows(self, axis: int, course: _ValueDependence) -> bool:
         """Whether some values of a path have the images that are interpolated."""
         found = self._axes.values[axis]
         inner = np.sort(found)[[found.size // 5, found.size // 2, (4 * found.size) // 5]]
@@ -298,8 +304,8 @@ class Images:
             raise Unlike
         return made.image()
 
-    def _member(self, values: list[float]) -> Made:
-        return Made.of(varied(self._scene, dict(zip(self._axes.paths, values, strict=True))), self._t0)
+    def _member(self, values: list[float]) -> CompiledStart:
+        return CompiledStart.of(varied(self._scene, dict(zip(self._axes.paths, values, strict=True))), self._t0)
 
 
 def _middle(values: Array) -> float:

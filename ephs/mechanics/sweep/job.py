@@ -33,7 +33,7 @@ ALIKE = 3
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Batch:
+class MemberBatch:
     """Some members that were run.
 
     Parameters
@@ -89,7 +89,7 @@ class Job:
         """Form in which a job holds a model."""
         return scene_to_text(model) if isinstance(model, Scene) else model
 
-    def run(self, numbers: Index) -> Batch:
+    def run(self, numbers: Index) -> MemberBatch:
         """Some members, one after the other; one that fails does not stop the others."""
         return _prepared(_Key(self)).run(numbers)
 
@@ -133,7 +133,7 @@ class _Prepared:
             except FAULTS:  # members report their own faults
                 self.ensemble = None
 
-    def run(self, numbers: Index) -> Batch:
+    def run(self, numbers: Index) -> MemberBatch:
         members, count = self.members[numbers], len(numbers)
         status, steps, rejected = [DONE] * count, *np.zeros((2, count), dtype=np.int64)
         values: list[Array] = []
@@ -147,7 +147,7 @@ class _Prepared:
                 values = [np.full((count, *row.shape), np.nan) for row in read]
             for i, column in enumerate(values):
                 column[k] = np.nan if read is None else read[i]
-        return Batch(numbers, tuple(values), tuple(status), steps, rejected)
+        return MemberBatch(numbers, tuple(values), tuple(status), steps, rejected)
 
     def _alone(self, values: Array) -> tuple[list[Array] | None, str, int, int]:
         """By `simulate`, which reports failures with time and path; the audit's findings become a member's status."""

@@ -11,10 +11,10 @@ import numpy as np
 
 from ephs.mechanics.methods.marching import March
 from ephs.mechanics.sweep.images import Truths
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.repeating import Repeated
-from ephs.solve.march import Account, Control, Ending
+from ephs.solve.march import Ending, MarchControl, RunAccount
 from ephs.solve.sparse import Index
 
 Stack = tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]
@@ -76,26 +76,26 @@ class Marches:
     @property
     def steps(self) -> Index:
         """(members,) accepted steps."""
-        return self._counts[:, Control.steps.offset]
+        return self._counts[:, MarchControl.steps.offset]
 
     @property
     def rejected(self) -> Index:
         """(members,) rejected steps."""
-        return self._counts[:, Control.rejected.offset]
+        return self._counts[:, MarchControl.rejected.offset]
 
     @property
     def least(self) -> Array:
         """(members,) the least entropy in J/K that a component made in a step."""
-        return self._reals[:, Control.least.offset]
+        return self._reals[:, MarchControl.least.offset]
 
     @property
     def put(self) -> Array:
         """(members, instants + 1) energies in J that corrections had put in, at last those at the end."""
-        return np.column_stack([self.rows_t[:, :, 2], self._account[:, Account.put.offset]])
+        return np.column_stack([self.rows_t[:, :, 2], self._account[:, RunAccount.put.offset]])
 
 
 @final
-class Energies:
+class MemberEnergies:
     """All states of a system, and their energies, at some instants of every member.
 
     Parameters
@@ -106,7 +106,7 @@ class Energies:
         Number of a member's instants.
     """
 
-    def __init__(self, equations: Equations, tables: Sequence[Stack], most: int, instants: int) -> None:
+    def __init__(self, equations: ReducedEquations, tables: Sequence[Stack], most: int, instants: int) -> None:
         self._equations, paper = equations, equations.booking.paper
         q, r = np.zeros((instants, equations.reduced.coordinates)), np.zeros((instants, equations.n))
         stored, x = paper.stored(r, np.zeros((instants, equations.ns))), np.tile(paper.rest, (instants, 1))

@@ -13,7 +13,7 @@ from ephs.mechanics.runs.signals import times_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sweep.axes import Axes
-from ephs.mechanics.sweep.job import DONE, Batch, Job
+from ephs.mechanics.sweep.job import DONE, Job, MemberBatch
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.semantics.bundles.errors import listed
 from ephs.solve.errors import OptionError, number_of
@@ -127,7 +127,7 @@ def sweep(
     kept = outputs_of(model, outputs)
     job = Job(Job.document(model), axes, start, end, times, dict(options), kept, uuid.uuid4().hex, _own(model))
     count = len(axes.members)
-    batches: list[Batch] = []
+    batches: list[MemberBatch] = []
     begin = time.perf_counter()
     run = _on_threads(job, count, workers) if client is None else _on_cluster(job, count, client)
     try:
@@ -148,11 +148,11 @@ def _parts(count: int, workers: int) -> list[Index]:
     return [np.arange(at, min(at + size, count)) for at in range(0, count, size)]
 
 
-def _on_threads(job: Job, count: int, workers: int | None) -> Generator[Batch, None, None]:
+def _on_threads(job: Job, count: int, workers: int | None) -> Generator[MemberBatch, None, None]:
     threads = workers or os.cpu_count() or 1
     job.prepare()
     with ThreadPoolExecutor(threads) as pool:
-        waiting: set[Future[Batch]] = {pool.submit(job.run, part) for part in _parts(count, threads)}
+        waiting: set[Future[MemberBatch]] = {pool.submit(job.run, part) for part in _parts(count, threads)}
         try:
             while waiting:
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
@@ -162,7 +162,7 @@ def _on_threads(job: Job, count: int, workers: int | None) -> Generator[Batch, N
                 future.cancel()
 
 
-def _on_cluster(job: Job, count: int, client: Any) -> Generator[Batch, None, None]:
+def _on_cluster(job: Job, count: int, client: Any) -> Generator[MemberBatch, None, None]:
     """Run on a Dask cluster, which reassigns the batches of a lost worker.
 
     Where what all batches share is lost with it, and results that nobody had fetched, these are asked for again.
@@ -191,11 +191,11 @@ def _on_cluster(job: Job, count: int, client: Any) -> Generator[Batch, None, Non
             return
 
 
-def _batch(job: Job, numbers: Index) -> Batch:
+def _batch(job: Job, numbers: Index) -> MemberBatch:
     return job.run(numbers)
 
 
-def _table(job: Job, batches: Sequence[Batch], model: "System | Scene", seconds: float) -> "xr.Dataset":
+def _table(job: Job, batches: Sequence[MemberBatch], model: "System | Scene", seconds: float) -> "xr.Dataset":
     """All batches as one dataset."""
     import xarray as xr
 

@@ -15,7 +15,7 @@ from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning import LinearRelation, glued
 from ephs.semantics.meaning.fields import Rational
 from ephs.semantics.meaning.functor import Theory
-from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.meaning.variables import ONE, RelationVariable
 
 Unit: TypeAlias = Mapping[str, int | Fraction]
 """Exponents of base units, such as ``{"kg": 1, "m": 1, "s": -1}``."""
@@ -43,7 +43,7 @@ class Units:
     """
 
     interface: Interface
-    equations: tuple[tuple[tuple[Variable, Fraction], ...], ...]
+    equations: tuple[tuple[tuple[RelationVariable, Fraction], ...], ...]
 
     @staticmethod
     def of(
@@ -62,18 +62,18 @@ class Units:
         >>> Units.of(tank, [({"l": 1, "v": -1}, {"m": -2})]).unit("l")
         'm'
         """
-        rows: list[dict[Variable, int | Fraction]] = []
+        rows: list[dict[RelationVariable, int | Fraction]] = []
         for port, of in interface.items():
             unit = _unit(of.quantity)
             if unit is not None:
-                rows.append({_at(port): 1} | _constants(unit))
+                rows.append({_unit_of(port): 1} | _constants(unit))
         own = {str(v.port) for row in rows for v in row if v.role == "own"}
         words = (*BASE, *sorted(own.difference(BASE)))
         for powers, unit in equations:
             unknown = sorted(unit.keys() - set(words))
             if unknown:
                 raise SemanticsError("units", unknown[0], found=unknown[0], expected=", ".join(words))
-            rows.append({_at(Path.of(port)): power for port, power in powers.items()} | _constants(unit))
+            rows.append({_unit_of(Path.of(port)): power for port, power in powers.items()} | _constants(unit))
         return _made(interface, LinearRelation.among(RATIONAL, map(RATIONAL.exact, rows)))
 
     @property
@@ -93,7 +93,7 @@ class Units:
             raise SemanticsError("units", port, found="equations that contradict each other", expected="units")
         for row in self.equations:
             (first, _), *rest = row
-            if first == _at(Path.of(port)) and all(v.role == "own" for v, _ in rest):
+            if first == _unit_of(Path.of(port)) and all(v.role == "own" for v, _ in rest):
                 return _text({str(v.port): -value for v, value in rest})
         return None
 
@@ -106,12 +106,12 @@ def _unit(quantity: Quantity) -> Unit | None:
     return dict(dimension(quantity.unit)) if quantity.unit else None
 
 
-def _at(port: Path) -> Variable:
-    return Variable("outer", "unit", ROOT, port, 0)
+def _unit_of(port: Path) -> RelationVariable:
+    return RelationVariable("outer", "unit", ROOT, port, 0)
 
 
-def _constants(unit: Unit) -> dict[Variable, int | Fraction]:
-    return {Variable("own", "unit", ROOT, Path((name,)), 0): -power for name, power in unit.items()}
+def _constants(unit: Unit) -> dict[RelationVariable, int | Fraction]:
+    return {RelationVariable("own", "unit", ROOT, Path((name,)), 0): -power for name, power in unit.items()}
 
 
 def _made(interface: Interface, relation: LinearRelation) -> Units:

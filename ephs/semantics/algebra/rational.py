@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias, final
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Path, Pattern
 from ephs.semantics.meaning import LinearRelation, glued, variables
 from ephs.semantics.meaning.fields import Rational
-from ephs.semantics.meaning.variables import Variable, own
+from ephs.semantics.meaning.variables import RelationVariable, own
 
 Number: TypeAlias = int | Fraction
 Kind: TypeAlias = Literal["effort", "flow", "one", "rate", "state", "before", "after"]
@@ -75,11 +75,11 @@ class ExactRelation:
         return "\n".join(map(_text, self.equations)) or "(no equation)"
 
 
-def _variable(key: Coordinate) -> Variable:
+def _variable(key: Coordinate) -> RelationVariable:
     kind, path, i = key
     if key == ONE:
         return variables.ONE
-    return Variable("outer" if kind in ("flow", "effort") else "own", kind, ROOT, path, i)
+    return RelationVariable("outer" if kind in ("flow", "effort") else "own", kind, ROOT, path, i)
 
 
 def _made(interface: Interface, inner: Mapping[Path, int], relation: LinearRelation) -> ExactRelation:
@@ -139,8 +139,8 @@ def midpoint(h: Number) -> AlgebraMap[ExactRelation, ExactRelation]:
     step = Fraction(h)
 
     def discretised(element: ExactRelation) -> ExactRelation:
-        rows: list[dict[Variable, Fraction]] = []
-        instant: list[Variable] = []
+        rows: list[dict[RelationVariable, Fraction]] = []
+        instant: list[RelationVariable] = []
         for path, dim in element.inner:
             kinds = [own(kind, path, dim) for kind in ("state", "rate", "before", "after")]
             for state, rate, before, after in zip(*kinds, strict=True):

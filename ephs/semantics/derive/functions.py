@@ -24,7 +24,7 @@ Value = Callable[[Evaluator, Real], Real]
 
 @final
 @dataclass(frozen=True, slots=True)
-class Rule:
+class SlopeRule:
     """A function of one number and its slope between two."""
 
     value: Value
@@ -174,7 +174,7 @@ _TURN_CURVE = tuple(z / 4.0 ** (k + 1) for k, z in enumerate(_COTANGENT))
 _TURN_CURVE_SLOPE = tuple(k * c for k, c in enumerate(_TURN_CURVE) if k)
 
 
-def series(coefficients: Sequence[float]) -> Rule:
+def series(coefficients: Sequence[float]) -> SlopeRule:
     """Polynomial c₀ + c₁ x + …, and its slope Σ c_k (b^k − a^k)/(b − a) by the same scheme."""
 
     def slope(_: Evaluator, a: Real, b: Real) -> Real:
@@ -185,25 +185,25 @@ def series(coefficients: Sequence[float]) -> Rule:
             value = value * a + coefficient
         return found
 
-    return Rule(lambda _, x: polynomial(coefficients, x), slope)
+    return SlopeRule(lambda _, x: polynomial(coefficients, x), slope)
 
 
-FUNCTIONS: Final[Mapping[str, Rule]] = MappingProxyType(
+FUNCTIONS: Final[Mapping[str, SlopeRule]] = MappingProxyType(
     {
-        "sqrt": Rule(lambda on, x: on.sqrt(x), lambda on, a, b: 1.0 / (on.sqrt(a) + on.sqrt(b))),
-        "absolute": Rule(lambda on, x: on.absolute(x), _of_absolute),
-        "sin": Rule(lambda on, x: on.sin(x), lambda on, a, b: on.cos(0.5 * (a + b)) * sinc(on, 0.5 * (b - a))),
-        "cos": Rule(lambda on, x: on.cos(x), lambda on, a, b: -(on.sin(0.5 * (a + b)) * sinc(on, 0.5 * (b - a)))),
-        "exp": Rule(lambda on, x: on.exp(x), lambda on, a, b: on.exp(0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
-        "log": Rule(lambda on, x: on.log(x), _of_logarithm),
-        "sinh": Rule(sinh, lambda on, a, b: cosh(on, 0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
-        "cosh": Rule(cosh, lambda on, a, b: sinh(on, 0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
-        "tanh": Rule(tanh, _of_tanh),
-        "expm1": Rule(expm1, lambda on, a, b: on.exp(0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
-        "log1p": Rule(log1p, lambda on, a, b: _of_logarithm(on, 1.0 + a, 1.0 + b)),
-        "atan": Rule(atan, _of_angle),
-        "asinh": Rule(asinh, _of_asinh),
-        "atanh": Rule(atanh, _of_atanh),
+        "sqrt": SlopeRule(lambda on, x: on.sqrt(x), lambda on, a, b: 1.0 / (on.sqrt(a) + on.sqrt(b))),
+        "absolute": SlopeRule(lambda on, x: on.absolute(x), _of_absolute),
+        "sin": SlopeRule(lambda on, x: on.sin(x), lambda on, a, b: on.cos(0.5 * (a + b)) * sinc(on, 0.5 * (b - a))),
+        "cos": SlopeRule(lambda on, x: on.cos(x), lambda on, a, b: -(on.sin(0.5 * (a + b)) * sinc(on, 0.5 * (b - a)))),
+        "exp": SlopeRule(lambda on, x: on.exp(x), lambda on, a, b: on.exp(0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "log": SlopeRule(lambda on, x: on.log(x), _of_logarithm),
+        "sinh": SlopeRule(sinh, lambda on, a, b: cosh(on, 0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "cosh": SlopeRule(cosh, lambda on, a, b: sinh(on, 0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "tanh": SlopeRule(tanh, _of_tanh),
+        "expm1": SlopeRule(expm1, lambda on, a, b: on.exp(0.5 * (a + b)) * sinhc(on, 0.5 * (b - a))),
+        "log1p": SlopeRule(log1p, lambda on, a, b: _of_logarithm(on, 1.0 + a, 1.0 + b)),
+        "atan": SlopeRule(atan, _of_angle),
+        "asinh": SlopeRule(asinh, _of_asinh),
+        "atanh": SlopeRule(atanh, _of_atanh),
         "turn_ratio": series(_TURN_RATIO),
         "turn_curve": series(_TURN_CURVE),
         "turn_curve_slope": series(_TURN_CURVE_SLOPE),

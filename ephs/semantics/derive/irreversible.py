@@ -12,7 +12,7 @@ from ephs.semantics.derive.relating import (
     OK,
     TEMPERATURE,
     Bounds,
-    Port,
+    StatePort,
     Through,
     given,
     inside,
@@ -27,7 +27,7 @@ from ephs.semantics.stage.numbers import Integer, Real, Truth
 
 @final
 @dataclass(frozen=True, slots=True)
-class Irreversible:
+class IrreversibleStep:
     """Flows f = M(x, eᴱ) e/θ₀ at the middle of the step; between temperatures alone by their differences.
 
     Parameters
@@ -48,7 +48,7 @@ class Irreversible:
 
     matrix: Tape
     takes: tuple[tuple[bool, int], ...]
-    ports: tuple[Port, ...]
+    ports: tuple[StatePort, ...]
     reference: tuple[tuple[float, float], ...]
     hot: tuple[int, ...] = ()
     potentials: tuple[int, ...] = ()
@@ -96,7 +96,7 @@ class Irreversible:
                 good = on.both(good, on.absolute(value) <= HUGE)
         return on.select(there.cold, TEMPERATURE, on.select(good, OK, DOMAIN))
 
-    def _at(self, on: Duals, a: Arguments) -> "_Point":
+    def _at(self, on: Duals, a: Arguments) -> "_OnsagerPoint":
         """M at the middle of the step."""
         p, x, e, _ = given(on, self, a)
         through = Through(self.maps, p[self._own :])
@@ -116,12 +116,12 @@ class Irreversible:
             inside(on.base, self.domain, [on.dual(each).value for each in x]),
             inside(on.base, self.between, [on.dual(each).value for each in energy]),
         )
-        return _Point(e, energy, rows, through, cold, within)
+        return _OnsagerPoint(e, energy, rows, through, cold, within)
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Point:
+class _OnsagerPoint:
     """M of an irreversible element at a point: efforts, energy efforts, rows, and what the point says."""
 
     efforts: list[Real]

@@ -80,10 +80,10 @@ def constant_structure(
     width, below = n + k + m, n * n
 
     def fill(count: Integer, at: Integer, entry: Callable[[Integer], Real]) -> None:
-        def put(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             jac[at + j] = entry(j)
 
-        on.loop(count, put)
+        on.loop(count, each_entry)
 
     def flow(i: Integer) -> None:
         f[i] = _dot(on, n, lambda j: p[i * n + j] * e[j]) + _dot(on, k, lambda j: p[below + j * n + i] * lam[j])

@@ -23,7 +23,7 @@ Bounds: TypeAlias = tuple[tuple[int, float, float], ...]
 
 @final
 @dataclass(frozen=True, slots=True)
-class Port:
+class StatePort:
     """A port whose state is read.
 
     Parameters
@@ -44,7 +44,7 @@ class Related(Protocol):
     """A relation at the middle of a step, by its sizes."""
 
     @property
-    def ports(self) -> tuple[Port, ...]:
+    def ports(self) -> tuple[StatePort, ...]:
         """Those that are read."""
         ...
 

@@ -13,7 +13,7 @@ from ephs.semantics.derive.arguments import Arguments
 from ephs.semantics.derive.charts import over
 from ephs.semantics.derive.closing import Closing
 from ephs.semantics.derive.holonomic import Holonomic
-from ephs.semantics.derive.irreversible import Irreversible
+from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.linear import Linear
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relating import (
@@ -23,7 +23,7 @@ from ephs.semantics.derive.relating import (
     TEMPERATURE,
     Bounds,
     Numbers,
-    Port,
+    StatePort,
     Through,
     finite,
     given,
@@ -36,14 +36,14 @@ from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.kinds import pointer
-from ephs.semantics.stage.memory import Held, Vector
+from ephs.semantics.stage.memory import HeldCells, Vector
 from ephs.semantics.stage.numbers import Integer, Real, Truth
 from ephs.semantics.stage.programs import Call, Entry, Program
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class Storage:
+class StorageStep:
     """The effort of a storage over a step: the slope of its energy, less the effort of the environment.
 
     Parameters
@@ -61,7 +61,7 @@ class Storage:
     """
 
     energy: Tape
-    ports: tuple[Port, ...]
+    ports: tuple[StatePort, ...]
     reference: tuple[tuple[float, float], ...]
     hot: tuple[int, ...] = ()
     potentials: tuple[int, ...] = ()
@@ -128,7 +128,7 @@ class Storage:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Reversible:
+class ReversibleStep:
     """Flows f = L(x) e + C(x)ᵀ λ and conditions C(x) e at the middle of the step.
 
     Parameters
@@ -138,13 +138,13 @@ class Reversible:
     ports
         Those that are read.
     domain
-        As of a `Storage`, at the middle of the step.
+        As of a `StorageStep`, at the middle of the step.
     maps
         Of the efforts: the relation is that of T e and Tᵀ f.
     """
 
     structure: Tape
-    ports: tuple[Port, ...]
+    ports: tuple[StatePort, ...]
     domain: Bounds = ()
     maps: Maps | None = None
 
@@ -180,13 +180,13 @@ class Reversible:
         return on.select(good, OK, DOMAIN)
 
 
-Relation: TypeAlias = Storage | Reversible | Irreversible | Holonomic | Closing
+Relation: TypeAlias = StorageStep | ReversibleStep | IrreversibleStep | Holonomic | Closing
 
 
 def sizes(relation: Relation) -> dict[str, int]:
     """Number of coordinates of each argument after the first."""
     n, k, m, size = relation.dimensions
-    stores = isinstance(relation, Storage)
+    stores = isinstance(relation, StorageStep)
     f, c, jac = (n * n, 1, 0) if stores else (n, k, (n + k) * (n + k + m))
     p = relation.numbers
     return {"scal": 3, "p": p, "x0": size, "v": m, "e": n, "lam": k, "f": f, "c": c, "jac": jac, "work": 0}
@@ -211,7 +211,7 @@ def at_rest(relation: Relation) -> Program:
 
 
 @cache
-def onsager(relation: Irreversible) -> Program:
+def onsager(relation: IrreversibleStep) -> Program:
     """The program that writes M/θ₀ (n, n) of an irreversible element at rest in place of derivatives."""
 
     def write(_: Relation, on: Evaluator, a: Arguments) -> Integer:
@@ -228,7 +228,7 @@ def _program(
     def value(on: Evaluator, dims: Any, scal: Any, p: Any, x0: Any, v: Any, e: Any, lam: Any, f: Any, c: Any,
               jac: Any, work: Any) -> Integer:  # fmt: skip
         if rest:
-            v = Vector(Held([0.0] * size["v"]), 0, size["v"])
+            v = Vector(HeldCells([0.0] * size["v"]), 0, size["v"])
         return write(relation, on, Arguments(scal, p, x0, v, e, lam, f, c, jac, work))
 
     kinds = {name: pointer("reals", count) for name, count in size.items()}

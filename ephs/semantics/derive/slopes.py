@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any, Final, final
 
 from ephs.semantics.derive.errors import DeriveError
-from ephs.semantics.derive.functions import FUNCTIONS, Rule, angle_ratio, squared_turn_slope, turn
+from ephs.semantics.derive.functions import FUNCTIONS, SlopeRule, angle_ratio, squared_turn_slope, turn
 from ephs.semantics.stage.evaluator import Evaluator, Function, Interpreted
-from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
 
 Entries = Mapping[int, Real]
 """Place of an increment -> the slope along it; none where there is no dependence."""
@@ -103,7 +103,7 @@ class Slopes(Interpreted):
     def __init__(self, base: Evaluator) -> None:
         self.base: Evaluator = base
 
-    def along(self, x: Slope, rule: Rule) -> Slope:
+    def along(self, x: Slope, rule: SlopeRule) -> Slope:
         """A function of one number, by its value and its slope between two arguments."""
         start = rule.value(self.base, x.start)
         if not x.slopes:
@@ -143,19 +143,19 @@ class Slopes(Interpreted):
         slope = squared_turn_slope(on, one, other)
         return Slope(one * one, other * other, {i: slope * s for i, s in scalar.slopes.items()})
 
-    def _known(self, truth: Condition, what: str) -> bool:
+    def _known(self, truth: StagedCondition, what: str) -> bool:
         raise DeriveError("compared", order=what)
 
     def _same(self, one: Integer, other: Integer) -> Truth:
         return self.base.same(one, other)
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         raise DeriveError("compared", order="a condition")
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         raise DeriveError("compared", order="a condition")
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         raise DeriveError("compared", order="a condition")
 
     def real(self, integer: Integer) -> Real:

@@ -16,7 +16,7 @@ from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.descriptor.numbering import Index, Numbering, bearing_junctions, number_flat, starts
-from ephs.semantics.primitives.behaviour import Continuous, Natural, Relating, Storing
+from ephs.semantics.primitives.behaviour import ContinuousBehaviour, NaturalBehaviour, Relating, Storing
 from ephs.semantics.primitives.primitives import Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import Pair, manifold
 from ephs.semantics.systems.kept import Kept
@@ -246,7 +246,9 @@ class Descriptor:
                 raise AssemblyError("input", path, found=given[path].value, expected=f"{dim} numbers")
         return given
 
-    def residual(self, behaviour: Continuous | Natural, x: Array, inputs: Mapping[Path, Input], z: Array) -> Array:
+    def residual(
+        self, behaviour: ContinuousBehaviour | NaturalBehaviour, x: Array, inputs: Mapping[Path, Input], z: Array
+    ) -> Array:
         """All equations at the unknowns z = (rates, efforts, multipliers, outer flows).
 
         The slow, obvious evaluation: every compiled path is held against it.

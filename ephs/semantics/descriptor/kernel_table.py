@@ -15,7 +15,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.derive.relations import compiled
-from ephs.semantics.primitives.behaviour import Natural, Storing
+from ephs.semantics.primitives.behaviour import NaturalBehaviour, Storing
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import DIFFERENCE
@@ -130,12 +130,12 @@ def _storage(storage: Storage, potentials: Mapping[str, float]) -> _Evaluate:
         v, effort, _, slope, energy, _ = views
         reference = Reference(float(scal[1]), float(scal[2]), potentials)
 
-        def at(step: Array) -> Array:
+        def outputs_at(step: Array) -> Array:
             return storage.discrete_effort(point, step, reference)
 
         step = v.copy()
-        effort[:] = at(step)
-        slope[:] = _differenced(at, step).ravel()
+        effort[:] = outputs_at(step)
+        slope[:] = _differenced(outputs_at, step).ravel()
         energy[0] = storage.energy(storage.retract(point, step))
 
     return evaluate
@@ -149,19 +149,19 @@ def _relation(primitive: Primitive, potentials: Mapping[str, float]) -> _Evaluat
         v, e, lam, flow, condition, jacobian = views
         # h = 0 selects the continuous relation, whose increments v are zero.
         h = float(scal[0]) or 1.0
-        local = Natural(Reference(float(scal[1]), float(scal[2]), potentials), h).behaviour(primitive, point)
+        local = NaturalBehaviour(Reference(float(scal[1]), float(scal[2]), potentials), h).behaviour(primitive, point)
         if isinstance(local, Storing):
             raise TypeError("a storage is not a relation")
 
-        def at(z: Array) -> Array:
+        def outputs_at(z: Array) -> Array:
             rates = np.split(z[n + k :] / h, np.cumsum(dims)[:-1]) if dims else []
             read = dict(zip(primitive.reads, rates, strict=True))
             return np.concatenate(local.relate(z[:n], z[n : n + k], read))
 
         z = np.concatenate([e, lam, v])
-        out = at(z)
+        out = outputs_at(z)
         flow[:], condition[:] = out[:n], out[n:]
-        jacobian[:] = _differenced(at, z).ravel()
+        jacobian[:] = _differenced(outputs_at, z).ravel()
 
     return evaluate
 

@@ -16,7 +16,7 @@ from ephs.semantics.primitives.primitives import Formula, Primitive
 
 @final
 @dataclass(frozen=True, slots=True)
-class Part:
+class LibraryPart:
     """A kind of library part.
 
     Parameters
@@ -34,19 +34,19 @@ class Part:
     make: Callable[[Interface, Mapping[str, Any]], Primitive]
 
 
-def find_part(word: str) -> Part | None:
+def find_part(word: str) -> LibraryPart | None:
     """The part of this name, or None."""
     return _scalar().get(word) or _mechanical().get(word)
 
 
-def part_of(primitive: Primitive) -> Part | None:
+def part_of(primitive: Primitive) -> LibraryPart | None:
     """The part that makes this very primitive again: of the same code and the same numbers. None if there is none."""
     return _maker(primitive, _scalar().values()) or _maker(primitive, _mechanical().values())
 
 
 @cache
-def _scalar() -> Mapping[str, Part]:
-    return {word: Part(word, word, _from_parameters(getattr(library, word))) for word in library.__all__}
+def _scalar() -> Mapping[str, LibraryPart]:
+    return {word: LibraryPart(word, word, _from_parameters(getattr(library, word))) for word in library.__all__}
 
 
 def _from_parameters(make: Callable[..., Primitive]) -> Callable[[Interface, Mapping[str, Any]], Primitive]:
@@ -54,12 +54,12 @@ def _from_parameters(make: Callable[..., Primitive]) -> Callable[[Interface, Map
 
 
 @cache
-def _mechanical() -> Mapping[str, Part]:
-    parts: tuple[Part, ...] = import_module("ephs.mechanics.elements.catalogue").PARTS
+def _mechanical() -> Mapping[str, LibraryPart]:
+    parts: tuple[LibraryPart, ...] = import_module("ephs.mechanics.elements.catalogue").PARTS
     return {part.word: part for part in parts}
 
 
-def _maker(primitive: Primitive, parts: Iterable[Part]) -> Part | None:
+def _maker(primitive: Primitive, parts: Iterable[LibraryPart]) -> LibraryPart | None:
     for part in parts:
         if part.name != primitive.name:
             continue

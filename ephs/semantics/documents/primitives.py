@@ -23,7 +23,16 @@ from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import constructors, structures
 from ephs.semantics.primitives.forms import stacked
 from ephs.semantics.primitives.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
-from ephs.semantics.symbols.terms import Matrix, Structure, Term, Written, record, recorded, simple, term_from
+from ephs.semantics.symbols.terms import (
+    StructureFunction,
+    Term,
+    TermMatrix,
+    WrittenFunction,
+    record,
+    recorded,
+    simple,
+    term_from,
+)
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.semantics.verdicts.proving import proof_of, replay
 
@@ -177,7 +186,7 @@ def _storage(reader: Reader, where: str, name: str, ports: Interface, found: Ent
     function = reader.text(f"{where}.function", found.get("function", "energy"))
     names = {str(port): kind.quantity.space.size for port, kind in ports.items()}
     term = term_from(reader, f"{where}.energy", found["energy"], names)
-    return lambda: constructors.storage(_named(ports), Written(term, function), domain=domain, name=name)
+    return lambda: constructors.storage(_named(ports), WrittenFunction(term, function), domain=domain, name=name)
 
 
 def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry, domain: Bounds) -> Make:
@@ -200,7 +209,7 @@ def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: 
     def make() -> Primitive:
         if not domain and all(part is None or part.numbers for part in (skew, constraint)):
             return structures.constant_structure(name, ports, *structure({}), external_field=external_field)
-        formula = Formula(Structure(skew, constraint))
+        formula = Formula(StructureFunction(skew, constraint))
         return constructors.reversible(name, ports, structure, formula, k, domain, external_field)
 
     return make
@@ -219,14 +228,14 @@ def _bounds(reader: Reader, where: str, value: object) -> Bounds:
     return {port: domain_from(f"{where}.{port}", ends) for port, ends in reader.mapping(where, value)}
 
 
-def _matrix(reader: Reader, where: str, value: object, names: Mapping[str, int], columns: int) -> Matrix:
+def _matrix(reader: Reader, where: str, value: object, names: Mapping[str, int], columns: int) -> TermMatrix:
     rows: list[tuple[Term, ...]] = []
     for i, row in enumerate(reader.list(where, value)):
         entries = reader.list(f"{where}[{i}]", row)
         if len(entries) != columns:
             reader.refuse(f"{where}[{i}]", f"{len(entries)} entries", f"{columns}")
         rows.append(tuple(term_from(reader, f"{where}[{i}][{j}]", each, names) for j, each in enumerate(entries)))
-    return Matrix(tuple(rows))
+    return TermMatrix(tuple(rows))
 
 
 def _reads(ports: Interface) -> tuple[Path, ...]:
@@ -285,14 +294,14 @@ def _formula(primitive: Primitive) -> dict[str, Any]:
     given = {name: numbers[name] for name in primitive.formula.parameters}
     match primitive:
         case Storage():
-            if isinstance(function, Written):
+            if isinstance(function, WrittenFunction):
                 return {"energy": record(function.term), "function": function.name}
             names = dict.fromkeys(map(str, primitive.interface), True)
             (energy,) = _terms(primitive, function, given, names)
             return {"energy": record(energy), "function": str(getattr(function, "__name__", type(function).__name__))}
         case Reversible():
             names = {str(port): True for port in primitive.reads}
-            if isinstance(function, Structure):
+            if isinstance(function, StructureFunction):
                 parts = {"L": function.skew, "C": function.constraint}
                 return {key: _rows(part.rows) for key, part in parts.items() if part is not None}
             n, k = primitive.bundle.size, primitive.multipliers
@@ -300,7 +309,7 @@ def _formula(primitive: Primitive) -> dict[str, Any]:
             rows = [both[i : i + n] for i in range(0, len(both), n)]
             return {"L": _rows(rows[:n])} | ({"C": _rows(rows[n:])} if k else {})
         case Irreversible():
-            if isinstance(function, Matrix):
+            if isinstance(function, TermMatrix):
                 return {"M": _rows(function.rows)}
             names = {str(port): not kind.power for port, kind in primitive.interface.items()}
             n = primitive.bundle.size
@@ -332,11 +341,11 @@ def _agree(one: Primitive, two: Primitive) -> bool:
     return all(
         bool(np.allclose(a, b, rtol=AGREEMENT, atol=AGREEMENT * float(np.abs(a).max(initial=0.0)), equal_nan=True))
         for seed in range(3)
-        for a, b in zip(_said(one, seed), _said(two, seed), strict=True)
+        for a, b in zip(_evaluations(one, seed), _evaluations(two, seed), strict=True)
     )
 
 
-def _said(primitive: Primitive, seed: int) -> tuple[Array, ...]:
+def _evaluations(primitive: Primitive, seed: int) -> tuple[Array, ...]:
     rng, bundle = np.random.default_rng(seed), primitive.bundle
     x, e = random_point(bundle, primitive.reads, rng), random_efforts(bundle, rng)
     efforts, intensive = bundle.split(e), bundle.split(bundle.intensive(Reference()))  # views of e

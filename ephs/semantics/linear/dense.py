@@ -6,19 +6,19 @@ from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Tru
 def clear(on: Evaluator, x: Vector) -> None:
     """Put zeros into a vector."""
 
-    def one(i: Integer) -> None:
+    def each_entry(i: Integer) -> None:
         x[i] = 0.0
 
-    on.loop(x.size, one)
+    on.loop(x.size, each_entry)
 
 
 def copy(on: Evaluator, source: Vector, out: Vector) -> None:
     """Copy a vector."""
 
-    def one(i: Integer) -> None:
+    def each_entry(i: Integer) -> None:
         out[i] = source[i]
 
-    on.loop(source.size, one)
+    on.loop(source.size, each_entry)
 
 
 def dot(on: Evaluator, x: Vector, y: Vector) -> Real:
@@ -40,10 +40,10 @@ def norm(on: Evaluator, x: Vector) -> Real:
 def subtract(on: Evaluator, factor: Real, y: Vector, x: Vector) -> None:
     """x ← x − factor y."""
 
-    def one(i: Integer) -> None:
+    def each_entry(i: Integer) -> None:
         x[i] = x[i] - factor * y[i]
 
-    on.loop(x.size, one)
+    on.loop(x.size, each_entry)
 
 
 def cholesky(on: Evaluator, a: Matrix, factor: Matrix, first: Integers | None = None) -> Integer:

@@ -30,10 +30,10 @@ def envelope_lu(on: Evaluator, a: Sequence[Matrix], pivots: Integers, ends: Inte
     def width(i: Integer) -> None:
         ends[i] = i + 1
 
-        def look(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             ends[i] = on.select(size(i, j) > 0.0, j + 1, ends[i])
 
-        on.loop(n, look, start=i + 1)
+        on.loop(n, each_entry, start=i + 1)
 
     def column(k: Integer) -> None:
         best.value, largest.value = k, size(k, k)

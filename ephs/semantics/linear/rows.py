@@ -57,10 +57,10 @@ class Rows:
 
 
 def _scale(on: Evaluator, x: Vector, divisor: Real) -> None:
-    def one(i: Integer) -> None:
+    def each_entry(i: Integer) -> None:
         x[i] = x[i] / divisor
 
-    on.loop(x.size, one)
+    on.loop(x.size, each_entry)
 
 
 @staged
@@ -68,7 +68,7 @@ def _remainder(on: Evaluator, rows: Rows, count: Integer, taken: Integer) -> Rea
     """Largest remainder of the rows not taken yet, once those taken are out, beside the largest row: without masses."""
     size, largest = on.variable(0.0), on.variable(0.0)
 
-    def one(c: Integer) -> None:
+    def each_entry(c: Integer) -> None:
         number = rows.chosen[c]
         plain = rows.plain.row(number)
         copy(on, rows.row.row(number), plain)
@@ -92,7 +92,7 @@ def _remainder(on: Evaluator, rows: Rows, count: Integer, taken: Integer) -> Rea
 
         on.when(c < taken, normalise, measure)
 
-    on.loop(count, one)
+    on.loop(count, each_entry)
     return on.select(size.value > 0.0, largest.value / size.value, 0.0)
 
 
@@ -157,11 +157,11 @@ def orthonormalise(on: Evaluator, rows: Rows, count: Integer) -> Integer:
         on.loop(count, search, start=rank.value)
         stop.value = on.select(on.either(best.value < 0, most.value <= REGULAR * largest.value), 1, 0)
 
-        def look() -> None:
+        def compare_rows() -> None:
             repeats = _remainder(on, rows, count, rank.value) <= EXPLICIT
             stop.value = on.select(repeats, 1, 0)
 
-        on.when(on.both(on.same(stop.value, 0), most.value <= EXPLICIT * largest.value), look)
+        on.when(on.both(on.same(stop.value, 0), most.value <= EXPLICIT * largest.value), compare_rows)
         on.when(on.same(stop.value, 0), take)
         return on.either(on.same(stop.value, 1), rank.value >= count)
 
@@ -179,7 +179,7 @@ def correct(on: Evaluator, rows: Rows, rank: Integer, target: Vector, step: Vect
 
     on.loop(n, clear)
 
-    def one(j: Integer) -> None:
+    def each_row(j: Integer) -> None:
         number = rows.chosen[j]
         rest.value = target[number]
 
@@ -194,7 +194,7 @@ def correct(on: Evaluator, rows: Rows, rank: Integer, target: Vector, step: Vect
 
         on.loop(n, add)
 
-    on.loop(rank, one)
+    on.loop(rank, each_row)
     backward(on, rows.factor, out)
 
 
@@ -202,7 +202,7 @@ def multipliers(on: Evaluator, rows: Rows, count: Integer, rank: Integer, step: 
     """Multipliers (m,) with Jᵀ out = M x of the change that `correct` found; zero of rows that depend on others."""
     rest = on.variable(0.0)
 
-    def one(j: Integer) -> None:
+    def each_row(j: Integer) -> None:
         number = rows.chosen[j]
         rest.value = step[j]
 
@@ -216,7 +216,7 @@ def multipliers(on: Evaluator, rows: Rows, count: Integer, rank: Integer, step: 
     def free(j: Integer) -> None:
         out[rows.chosen[j]] = 0.0
 
-    on.loop(rank, one, down=True)
+    on.loop(rank, each_row, down=True)
     on.loop(count, free, start=rank)
 
 

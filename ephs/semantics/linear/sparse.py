@@ -78,11 +78,11 @@ def factorise(
                 factor = entry * value[pivot]
                 row[k] = factor
 
-                def one(q: Integer) -> None:
+                def each_entry(q: Integer) -> None:
                     c = column[q]
                     row[c] = row[c] - factor * value[q]
 
-                on.loop(start[k + 1], one, start=pivot + 1)
+                on.loop(start[k + 1], each_entry, start=pivot + 1)
 
             on.when(on.negate(on.absolute(entry) <= 0.0), subtract)
 
@@ -185,7 +185,7 @@ def fill(
 
     on.loop(n, clear)
 
-    def one(i: Integer) -> None:
+    def fill_row(i: Integer) -> None:
         # The row as a linked list in ascending order, n at its end; its members are marked.
         head, last = column[first[i]], first[i + 1] - 1
 
@@ -242,7 +242,7 @@ def fill(
         start[i + 1] = count.value
 
     def row(i: Integer) -> None:
-        on.when(count.value <= out.size, lambda: one(i))
+        on.when(count.value <= out.size, lambda: fill_row(i))
 
     on.loop(n, row)
     return on.select(count.value <= out.size, count.value, -1)

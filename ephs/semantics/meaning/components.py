@@ -13,14 +13,14 @@ from ephs.semantics.bundles.given import defined
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
-from ephs.semantics.meaning.variables import ONE, Variable, at_port, own
+from ephs.semantics.meaning.variables import ONE, RelationVariable, at_port, own
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 
 TURNING = {"se(3)": 3, "so(3)xr3": 3, "free": 3, "cylindrical": 1, "planar": 1}
 """Number of angular coordinates, which come first, by lower-case name of the space; the others are lengths."""
 
 
-def at_ports(kind: str, bundle: Bundle) -> list[Variable]:
+def at_ports(kind: str, bundle: Bundle) -> list[RelationVariable]:
     """The variables of the power ports in the order of the fibre."""
     return [variable for port, _, quantity in bundle.items() for variable in at_port("outer", kind, port, quantity)]
 
@@ -70,13 +70,13 @@ def _storage(storage: Storage, path: Path, point: BasePoint) -> LinearRelation:
     return LinearRelation.of(field, [*rates, *flows, *efforts, ONE], rows)
 
 
-def rates_of(storage: Storage, path: Path, names: Mapping[Path, Path]) -> list[Variable]:
+def rates_of(storage: Storage, path: Path, names: Mapping[Path, Path]) -> list[RelationVariable]:
     """Rates of the states of the storage at this path, by the names of states: storages of one state share its rate."""
     items = storage.bundle.items()
     return [v for port, _, quantity in items for v in own("rate", names[path / port], quantity.space.dim)]
 
 
-def efforts_of(primitive: Primitive, path: Path) -> list[Variable]:
+def efforts_of(primitive: Primitive, path: Path) -> list[RelationVariable]:
     """Efforts of the component at this path, named for good."""
     return [v for port, _, quantity in primitive.bundle.items() for v in own("effort", path / port, quantity.space.dim)]
 
@@ -84,7 +84,7 @@ def efforts_of(primitive: Primitive, path: Path) -> list[Variable]:
 def process(field: Field[Any], bundle: Bundle, dynamic: Array, constraint: Array) -> LinearRelation:
     """f = A e + Cᵀ λ, 0 = C e; numbers are rounded beside the largest of the same units."""
     flows, efforts = at_ports("flow", bundle), at_ports("effort", bundle)
-    multipliers = [Variable("met", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]
+    multipliers = [RelationVariable("met", "multiplier", ROOT, ROOT, i) for i in range(constraint.shape[0])]
     sizes, beside = largest(bundle, largest(bundle, dynamic).T).T, largest(bundle, constraint.T).T
     rows: list[Row[Any]] = []
     transposed, around = constraint.T.tolist(), beside.T.tolist()
@@ -102,7 +102,7 @@ def constant_relation(field: Field[Any], bundle: Bundle, dynamic: Array, constra
     return found.onto(variable for variable in found.variables if variable.role == "outer")
 
 
-def _rounded(field: Field[Any], names: list[Variable], entries: list[float], sizes: list[float]) -> Row[Any]:
+def _rounded(field: Field[Any], names: list[RelationVariable], entries: list[float], sizes: list[float]) -> Row[Any]:
     return field.rounded(dict(zip(names, entries, strict=True)), dict(zip(names, sizes, strict=True)))
 
 

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias, final
 from ephs.operad import Path, Pattern, PortType
 from ephs.semantics.meaning.fields import Field, Row
 from ephs.semantics.meaning.linear import LinearRelation
-from ephs.semantics.meaning.variables import Role, Variable, at_port, into
+from ephs.semantics.meaning.variables import RelationVariable, Role, at_port, into
 
 _Port: TypeAlias = tuple[float, Path | None, Path, PortType]
 """Sign of its flow in the balance, box or None at the interface, port and what it is."""
@@ -66,14 +66,14 @@ def relation_of_pattern(
         if theory.states or power:
             place = min(pattern.state_class(junction)) if theory.states else junction
             together.setdefault(place, []).append(port)
-    variables: list[Variable] = []
+    variables: list[RelationVariable] = []
     rows: list[Row[Any]] = []
     for group in together.values():
         signs = [sign for sign, *_ in group]
         for kind in (*theory.balanced, *theory.shared):
             balanced = kind in theory.balanced
             # by places of the vector
-            for each in zip(*(_at(inside, kind, where) for where in group), strict=True):
+            for each in zip(*(_variables_at(inside, kind, where) for where in group), strict=True):
                 variables += each
                 if balanced:
                     rows.append(field.exact(dict(zip(each, signs, strict=True))))
@@ -82,7 +82,7 @@ def relation_of_pattern(
     return LinearRelation.of(field, variables, rows)
 
 
-def _at(inside: Role, kind: str, where: _Port) -> list[Variable]:
+def _variables_at(inside: Role, kind: str, where: _Port) -> list[RelationVariable]:
     _, box, port, described = where
     if box is None:
         return at_port("outer", kind, port, described.quantity)
@@ -110,7 +110,7 @@ def glued(
     return _composed(relation_of_pattern(field, pattern, "met", theory), parts)
 
 
-def power(relation: LinearRelation) -> dict[Variable, tuple[Variable, int]]:
+def power(relation: LinearRelation) -> dict[RelationVariable, tuple[RelationVariable, int]]:
     """The form Σ e f over inner ports less outer ports: each variable's partner and sign."""
     other = {"flow": "effort", "effort": "flow"}
     return {v: (v._replace(kind=other[v.kind]), -1 if v.role == "outer" else 1) for v in relation.variables}

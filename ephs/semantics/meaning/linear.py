@@ -13,7 +13,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.meaning.elimination import echelon, eliminated, reduced
 from ephs.semantics.meaning.fields import Field, Row
-from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.meaning.variables import ONE, RelationVariable
 
 
 @final
@@ -28,11 +28,13 @@ class LinearRelation:
     """
 
     field: Field[Any]
-    variables: frozenset[Variable]
+    variables: frozenset[RelationVariable]
     equations: tuple[Row[Any], ...]
 
     @staticmethod
-    def of(field: Field[Any], variables: Iterable[Variable], equations: Iterable[Row[Any]] = ()) -> "LinearRelation":
+    def of(
+        field: Field[Any], variables: Iterable[RelationVariable], equations: Iterable[Row[Any]] = ()
+    ) -> "LinearRelation":
         """The relation of some equations; without any it is everything."""
         return LinearRelation(field, frozenset(variables), tuple(row for row in equations if field.support(row)))
 
@@ -47,17 +49,17 @@ class LinearRelation:
         variables = self.variables.union(*(each.variables for each in others))
         return LinearRelation(self.field, variables, sum((each.equations for each in others), self.equations))
 
-    def without(self, forgotten: Iterable[Variable]) -> "LinearRelation":
+    def without(self, forgotten: Iterable[RelationVariable]) -> "LinearRelation":
         """Some values of the forgotten variables exist."""
         gone = frozenset(forgotten)
         rows = eliminated(self.field, self.equations, gone.__contains__)
         return LinearRelation(self.field, self.variables - gone, tuple(rows))
 
-    def onto(self, kept: Iterable[Variable]) -> "LinearRelation":
+    def onto(self, kept: Iterable[RelationVariable]) -> "LinearRelation":
         """The projection on some variables."""
         return self.without(self.variables.difference(kept))
 
-    def renamed(self, name: Callable[[Variable], Variable]) -> "LinearRelation":
+    def renamed(self, name: Callable[[RelationVariable], RelationVariable]) -> "LinearRelation":
         """The same with other names, which differ from each other."""
         new = {variable: name(variable) for variable in self.variables}
         rows = tuple({new[variable]: number for variable, number in row.items()} for row in self.equations)
@@ -99,9 +101,9 @@ class LinearRelation:
             return False
         return (self.within(other) and other.within(self)) or (self.empty and other.empty)
 
-    def solved(self, last: Iterable[Variable] = ()) -> dict[Variable, Row[Any]]:
+    def solved(self, last: Iterable[RelationVariable] = ()) -> dict[RelationVariable, Row[Any]]:
         """Each variable as a combination of free ones; the ``last`` ones are left free where they can be."""
-        field, late, out = self.field, frozenset(last), dict[Variable, Row[Any]]()
+        field, late, out = self.field, frozenset(last), dict[RelationVariable, Row[Any]]()
         for variable, row in reversed(echelon(field, self.equations, lambda key: key not in late)):
             combination: Row[Any] = {}
             for key, number in row.items():
@@ -111,25 +113,25 @@ class LinearRelation:
             out[variable] = {key: number for key, number in combination.items() if field.certain(number)}
         return out | {variable: {variable: field.one} for variable in self.variables - out.keys()}
 
-    def determined(self, given: Iterable[Variable] = ()) -> dict[Variable, Row[Any]]:
+    def determined(self, given: Iterable[RelationVariable] = ()) -> dict[RelationVariable, Row[Any]]:
         """The variables that the constant and the given ones determine, with how."""
         known = {ONE, *given}
         return {variable: row for variable, row in self.solved(last=known).items() if row.keys() <= known}
 
-    def values(self) -> dict[Variable, float]:
+    def values(self) -> dict[RelationVariable, float]:
         """The values of the variables that are determined."""
         found = self.determined().items()
         return {variable: self.field.value(row[ONE]) if row else 0.0 for variable, row in found}
 
     def basis(self) -> list[Row[Any]]:
         """Vectors that span it, one for each free variable."""
-        vectors: dict[Variable, Row[Any]] = {}
+        vectors: dict[RelationVariable, Row[Any]] = {}
         for variable, combination in self.solved().items():
             for free, number in combination.items():
                 vectors.setdefault(free, {})[variable] = number
         return list(vectors.values())
 
-    def orthogonal(self, partner: Mapping[Variable, tuple[Variable, int]]) -> "LinearRelation":
+    def orthogonal(self, partner: Mapping[RelationVariable, tuple[RelationVariable, int]]) -> "LinearRelation":
         """{y : Σ ± y(partner v) x(v) = 0 for all x}, of the form that pairs variables with their partners."""
         rows: list[Row[Any]] = []
         for vector in self.basis():
@@ -140,7 +142,7 @@ class LinearRelation:
             rows.append(row)
         return LinearRelation.of(self.field, self.variables, rows)
 
-    def remainder(self, values: Mapping[Variable, float], *, unit: bool = True) -> float:
+    def remainder(self, values: Mapping[RelationVariable, float], *, unit: bool = True) -> float:
         """The largest remainder of an equation at values of the variables, zero where missing.
 
         Parameters
@@ -152,7 +154,7 @@ class LinearRelation:
         at = np.array([1.0 if variable == ONE else values.get(variable, 0.0) for variable in order])
         return float(np.abs(self.matrix(order, unit=unit) @ at).max(initial=0.0))
 
-    def matrix(self, order: Sequence[Variable], *, unit: bool = True) -> Array:
+    def matrix(self, order: Sequence[RelationVariable], *, unit: bool = True) -> Array:
         """The equations (m, n) as rows, of length one where ``unit``, in an order of the n variables."""
         place = {variable: i for i, variable in enumerate(order)}
         out = np.zeros((len(self.equations), len(place)))
@@ -161,7 +163,7 @@ class LinearRelation:
                 row[place[variable]] = self.field.value(number)
         return out / np.linalg.norm(out, axis=1, keepdims=True) if unit else out
 
-    def projector(self, order: Sequence[Variable]) -> Array:
+    def projector(self, order: Sequence[RelationVariable]) -> Array:
         """The orthogonal projector (n, n) on it, in an order of the n variables."""
         place = {variable: i for i, variable in enumerate(order)}
         span = np.zeros((len(place), self.dimension))
@@ -172,5 +174,5 @@ class LinearRelation:
         return orthonormal @ orthonormal.T
 
 
-def _one_last(variable: Variable) -> tuple[bool, Variable]:
+def _one_last(variable: RelationVariable) -> tuple[bool, RelationVariable]:
     return variable == ONE, variable

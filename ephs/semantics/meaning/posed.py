@@ -22,7 +22,7 @@ from ephs.semantics.meaning.components import efforts_of, largest, rates_of
 from ephs.semantics.meaning.elimination import eliminated
 from ephs.semantics.meaning.fields import ROUNDED, Row
 from ephs.semantics.meaning.linear import LinearRelation
-from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.meaning.variables import ONE, RelationVariable
 from ephs.semantics.primitives.differences import slope
 from ephs.semantics.primitives.primitives import Point, Primitive, Storage
 from ephs.semantics.spaces.rank import DIFFERENCE
@@ -39,7 +39,7 @@ WORDS: Mapping[str, str] = {
 }
 
 
-class _Fibre(Protocol):
+class _PosedFibre(Protocol):
     def leaves(self) -> Iterator[tuple[Path, Primitive]]: ...
     def at(self, path: Path, point: BasePoint) -> LinearRelation: ...
     def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]: ...
@@ -60,7 +60,7 @@ class Answer:
         return ("yes" if self.holds else "no") + "".join(f"; {reason}" for reason in self.because)
 
 
-def possible(fibre: _Fibre, point: BasePoint) -> Answer:
+def possible(fibre: _PosedFibre, point: BasePoint) -> Answer:
     """Whether the relation over a point is empty, with the equations whose weighted sum is 1 = 0."""
     free = replace(point, processes=False)
     if not fibre.at(Path(), free).empty:
@@ -68,12 +68,12 @@ def possible(fibre: _Fibre, point: BasePoint) -> Answer:
     return Answer(True, _certificate(fibre, free))
 
 
-def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
+def _certificate(fibre: _PosedFibre, point: BasePoint) -> tuple[str, ...]:
     """Labels of equations that add up to 1 = 0, each with its weight; each equation has a variable for its label."""
-    field, labels = point.field, dict[Variable, str]()
+    field, labels = point.field, dict[RelationVariable, str]()
     rows: list[Row[Any]] = []
     for number, (kind, path, row) in enumerate(fibre.labelled(Path(), point)):
-        label = Variable("own", "label", path, path, number)
+        label = RelationVariable("own", "label", path, path, number)
         labels[label] = f"{WORDS[kind]} {path}"
         rows.append(row | {label: field.one})
     left = eliminated(field, rows, lambda variable: variable not in labels and variable != ONE)
@@ -88,13 +88,13 @@ def _certificate(fibre: _Fibre, point: BasePoint) -> tuple[str, ...]:
     return tuple(f"{words} × {weight:.6g}" for words, weight in sorted(weights.items()))
 
 
-def hidden(fibre: _Fibre, point: BasePoint) -> LinearRelation:
+def hidden(fibre: _PosedFibre, point: BasePoint) -> LinearRelation:
     """What every motion satisfies: equations between the efforts of storages alone."""
     found = fibre.at(Path(), replace(point, storages=False, processes=False))
     return found.onto(v for v in found.variables if v.role == "own" and v.kind == "effort")
 
 
-def determined(fibre: _Fibre, point: BasePoint) -> Answer:
+def determined(fibre: _PosedFibre, point: BasePoint) -> Answer:
     """Whether outer flows, or outer efforts, determine all rates: two motions of the same ones differ by nothing.
 
     Differences satisfy the equations without their constants, and H″ of them those of the hidden equations, which last.
@@ -103,7 +103,7 @@ def determined(fibre: _Fibre, point: BasePoint) -> Answer:
     return flows if flows or not _determined(fibre, point, "effort") else Answer(True)
 
 
-def _determined(fibre: _Fibre, point: BasePoint, given: str) -> Answer:
+def _determined(fibre: _PosedFibre, point: BasePoint, given: str) -> Answer:
     """The same where one kind of variables is given at all outer ports."""
     found = fibre.at(Path(), replace(point, storages=False))
     zero = {v for v in found.variables if (v.kind, v.role) in (("effort", "own"), (given, "outer"))}
@@ -119,11 +119,11 @@ def _determined(fibre: _Fibre, point: BasePoint, given: str) -> Answer:
     return Answer(False, tuple(reasons))
 
 
-def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
+def _lasting(fibre: _PosedFibre, point: BasePoint) -> LinearRelation:
     """Hidden equations a·e = 0 last: two rates that both keep them differ by v with a·H″ v = 0."""
     equations = hidden(fibre, point).equations
     asked = {effort for equation in equations for effort in equation}
-    slopes: dict[Variable, Row[Any]] = {}
+    slopes: dict[RelationVariable, Row[Any]] = {}
     for path, storage in fibre.leaves() if asked else ():
         if isinstance(storage, Storage) and not asked.isdisjoint(efforts_of(storage, path)):
             slopes |= _slopes(storage, path, point)
@@ -136,7 +136,7 @@ def _lasting(fibre: _Fibre, point: BasePoint) -> LinearRelation:
     return LinearRelation.among(point.field, rows)
 
 
-def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[Variable, Row[Any]]:
+def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[RelationVariable, Row[Any]]:
     """H″ by rows: of each effort at a storage's ports, minus its change with the rates of the states."""
     rates, efforts = rates_of(storage, path, point.names), efforts_of(storage, path)
     hessian, error = curvature(storage, point.read(path, storage))
@@ -157,7 +157,7 @@ def curvature(storage: Storage, x: Point) -> tuple[Array, float]:
     Exact derivatives of the recorded energy; else differences of the efforts.
     """
     kernel, n = storage.kernel, storage.bundle.size
-    if kernel is not None and isinstance(kernel.relation, relations.Storage):
+    if kernel is not None and isinstance(kernel.relation, relations.StorageStep):
         tape, parameters = kernel.relation.energy, kernel.parameters[len(kernel.potentials) :]
         first = Duals(PLAIN, n)
         second = Duals(first, n)

@@ -24,7 +24,7 @@ from ephs.semantics.meaning.fields import ROUNDED, Field, Rational, Rounded
 from ephs.semantics.meaning.functor import glued, relation_of_pattern
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
-from ephs.semantics.meaning.variables import ONE, Variable, into, own
+from ephs.semantics.meaning.variables import ONE, RelationVariable, into, own
 from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.systems.system import Filling, as_system, fold, require_fillings
 
@@ -202,7 +202,7 @@ class Instant:
         return tuple(sorted((port, q.space.dim) for port, _, q in Bundle.of(self.relation.interface).items()))
 
     @property
-    def order(self) -> list[Variable]:
+    def order(self) -> list[RelationVariable]:
         """All variables: rates by the names of states, flows, then efforts by port, the constant last."""
         out = [variable for name, dim in self.rates for variable in own("rate", name, dim)]
         bundle = Bundle.of(self.relation.interface)

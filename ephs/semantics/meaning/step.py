@@ -22,8 +22,8 @@ from ephs.semantics.meaning.fields import ROUNDED, Rounded, Row
 from ephs.semantics.meaning.functor import glued
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.relation import relation_of
-from ephs.semantics.meaning.variables import ONE, Variable, at_port, into, own
-from ephs.semantics.primitives.behaviour import Continuous, Natural, Storing
+from ephs.semantics.meaning.variables import ONE, RelationVariable, at_port, into, own
+from ephs.semantics.primitives.behaviour import ContinuousBehaviour, NaturalBehaviour, Storing
 from ephs.semantics.primitives.differences import slope
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
@@ -39,7 +39,7 @@ SOLVED = 1e-12
 """Residual accepted when iterations stagnate: rounding, with Jacobians by differences."""
 FAST = 0.1
 """Part of the remainder that an iteration leaves, below which slopes are kept."""
-Guess = Mapping[Variable, float]
+Guess = Mapping[RelationVariable, float]
 """Values at which relations are touched; zero where missing."""
 
 
@@ -73,7 +73,7 @@ class Solved:
 def solved(
     system: Filling,
     state: Values,
-    behaviour: Continuous | Natural,
+    behaviour: ContinuousBehaviour | NaturalBehaviour,
     inputs: Mapping[Path, Input] | None = None,
     ports: Values | None = None,
 ) -> Solved:
@@ -120,7 +120,7 @@ def _open(primitive: Primitive) -> LinearRelation:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class LocalRelation:
     """Local relation of a component over a step or at an instant, at fixed states.
 
     Parameters
@@ -136,9 +136,9 @@ class Part:
         In how many of the first arguments the function is linear; then it takes many of them as columns, too.
     """
 
-    same: list[tuple[Variable, Variable]]
-    arguments: list[Variable]
-    results: list[Variable | None]
+    same: list[tuple[RelationVariable, RelationVariable]]
+    arguments: list[RelationVariable]
+    results: list[RelationVariable | None]
     function: Callable[[Array, Array], Array]
     linear: int = 0
 
@@ -158,8 +158,8 @@ def part_of(
     path: Path,
     states: Mapping[Path, Array],
     names: Mapping[Path, Path],
-    behaviour: Continuous | Natural,
-) -> Part:
+    behaviour: ContinuousBehaviour | NaturalBehaviour,
+) -> LocalRelation:
     """Local relation of the component at a path."""
     bundle = primitive.bundle
     local = behaviour.behaviour(primitive, {port: states[path / port] for port in primitive.reads})
@@ -168,10 +168,14 @@ def part_of(
     sizes = {port: primitive.interface[port].quantity.space.dim for port in primitive.reads}
     rates = [variable for port in moving for variable in own("rate", names[path / port], sizes[port])]
     if isinstance(local, Storing):
-        return Part(list(zip(flows, rates, strict=True)), rates, [*efforts], lambda _, rate: local.effort(rate))
+        return LocalRelation(
+            list(zip(flows, rates, strict=True)), rates, [*efforts], lambda _, rate: local.effort(rate)
+        )
     here = efforts_of(primitive, path)
     count = primitive.multipliers if isinstance(primitive, Reversible) else 0
-    linear = isinstance(primitive, Reversible) and (primitive.discrete is None or isinstance(behaviour, Continuous))
+    linear = isinstance(primitive, Reversible) and (
+        primitive.discrete is None or isinstance(behaviour, ContinuousBehaviour)
+    )
     still = {port: np.zeros(sizes[port]) for port in primitive.reads}
 
     def evaluate(first: Array, rest: Array) -> Array:
@@ -184,10 +188,10 @@ def part_of(
     cuts = [len(here)] if linear else [len(here), len(here) + count]
     arguments = [*here, *own("multiplier", path, count), *rates]
     same = list(zip(efforts, here, strict=True))
-    return Part(same, arguments, [*flows, *[None] * count], evaluate, len(here) + count if linear else 0)
+    return LocalRelation(same, arguments, [*flows, *[None] * count], evaluate, len(here) + count if linear else 0)
 
 
-def touching(primitive: Primitive, path: Path, part: Part, guess: Guess) -> LinearRelation:
+def touching(primitive: Primitive, path: Path, part: LocalRelation, guess: Guess) -> LinearRelation:
     """The affine relation that touches a component's own one at a guess: y = f(z⁰) + f′(z − z⁰)."""
     field, at = Rounded(), np.array([guess.get(v, 0.0) for v in part.arguments])
     rows = [field.exact({port: 1.0, argument: -1.0}) for port, argument in part.same]
@@ -210,7 +214,7 @@ class Tangents:
     Equations of the pattern are eliminated once, by its own nesting; those of components are inserted at each guess.
     """
 
-    def __init__(self, junctions: LinearRelation, parts: Mapping[Path, Part]) -> None:
+    def __init__(self, junctions: LinearRelation, parts: Mapping[Path, LocalRelation]) -> None:
         ports = sorted(v for v in junctions.variables if v.role == "inner")
         outer = {v for v in junctions.variables if v.role == "outer"}
         self.unknown = sorted(outer.union(*(part.arguments for part in parts.values())))
@@ -220,14 +224,14 @@ class Tangents:
         row = {v: i for i, v in enumerate(ports)}
         count = sum(part.results.count(None) for part in parts.values())
         self._same = np.zeros((len(ports) + count, n + 1))
-        self._parts: list[tuple[Part, list[int], list[int]]] = []
+        self._parts: list[tuple[LocalRelation, list[int], list[int]]] = []
         used = len(ports)
         for path, part in parts.items():
             for port, argument in part.same:
-                self._same[row[_at(path, port)], column[argument]] = 1.0
+                self._same[row[_inner_variable(path, port)], column[argument]] = 1.0
             rows: list[int] = []
             for result in part.results:
-                rows.append(used if result is None else row[_at(path, result)])
+                rows.append(used if result is None else row[_inner_variable(path, result)])
                 used += result is None
             self._parts.append((part, rows, [column[v] for v in part.arguments]))
         self._slopes: list[Array] = []
@@ -253,7 +257,7 @@ class Tangents:
         return found / np.where(sizes > 0.0, sizes, 1.0)
 
 
-def _at(path: Path, port: Variable) -> Variable:
+def _inner_variable(path: Path, port: RelationVariable) -> RelationVariable:
     return into(path, port)._replace(role="inner")
 
 
@@ -340,7 +344,7 @@ def _solution(
     guess: Guess,
     residual: float,
 ) -> Solved:
-    def vector(variables: list[Variable]) -> Array:
+    def vector(variables: list[RelationVariable]) -> Array:
         return np.array([guess.get(v, 0.0) for v in variables])
 
     rates: dict[Path, Array] = {}
@@ -370,7 +374,7 @@ def step(
     inputs: Mapping[Path, Input] | None = None,
 ) -> tuple[dict[Path, Array], Solved]:
     """One natural step of h seconds: the new state, and what solved it (midpoint values)."""
-    found = solved(system, state, Natural(reference, h), inputs)
+    found = solved(system, state, NaturalBehaviour(reference, h), inputs)
     new = {
         path: manifold(quantity.space).retract(state[path], h * found.rates[path])
         for path, quantity in system.states.items()

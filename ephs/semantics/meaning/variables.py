@@ -10,7 +10,7 @@ from ephs.operad import ROOT, Path, Quantity
 Role: TypeAlias = Literal["outer", "inner", "met", "own", "one"]
 
 
-class Variable(NamedTuple):
+class RelationVariable(NamedTuple):
     """A number of a relation.
 
     Parameters
@@ -44,22 +44,22 @@ class Variable(NamedTuple):
         return "1" if self.role == "one" else f"{self.kind} {self.path}" + (f"[{self.place}]" if self.place else "")
 
 
-ONE = Variable("one", "one", ROOT, ROOT, 0)
+ONE = RelationVariable("one", "one", ROOT, ROOT, 0)
 
 
-def at_port(role: Role, kind: str, port: Path, quantity: Quantity, box: Path = ROOT) -> list[Variable]:
+def at_port(role: Role, kind: str, port: Path, quantity: Quantity, box: Path = ROOT) -> list[RelationVariable]:
     """The variables of a vector at a port, in the port's order."""
-    return [Variable(role, kind, box, port, i) for i in range(quantity.space.dim)]
+    return [RelationVariable(role, kind, box, port, i) for i in range(quantity.space.dim)]
 
 
-def own(kind: str, path: Path, size: int) -> list[Variable]:
+def own(kind: str, path: Path, size: int) -> list[RelationVariable]:
     """The variables of a vector inside, named for good by a full path."""
-    return [Variable("own", kind, ROOT, path, i) for i in range(size)]
+    return [RelationVariable("own", kind, ROOT, path, i) for i in range(size)]
 
 
-def into(box: Path, variable: Variable) -> Variable:
+def into(box: Path, variable: RelationVariable) -> RelationVariable:
     """The name that a variable of what fills a box has in the whole: its interface meets that of the box."""
     role, kind, inside, port, place = variable
     if role == "outer":
-        return Variable("met", kind, box, port, place)
-    return Variable(role, kind, box / inside, port, place) if role in ("inner", "met") else variable
+        return RelationVariable("met", kind, box, port, place)
+    return RelationVariable(role, kind, box / inside, port, place) if role in ("inner", "met") else variable

@@ -36,7 +36,7 @@ Behaviour = Storing | Relating
 
 @final
 @dataclass(frozen=True, slots=True)
-class Continuous:
+class ContinuousBehaviour:
     """Primitives at an instant: f = ξ̇, e = dH(ξ), (f, e) ∈ D(x), f = M(x, e) e / θ₀."""
 
     reference: Reference
@@ -84,7 +84,7 @@ GRADIENTS: Mapping[str, Gradient] = {
 
 @final
 @dataclass(frozen=True, slots=True)
-class Natural:
+class NaturalBehaviour:
     """Primitives over a step h, each discretised on its own: x¹ = x⁰·exp(h f), discrete gradients, D_h, M_h.
 
     This is the discrete functor: the pattern glues what it gives by the same formula as the continuous relations.

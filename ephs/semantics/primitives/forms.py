@@ -11,7 +11,7 @@ from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundles.bundle import Array, Bundle, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.recording import Untraceable, record
-from ephs.semantics.derive.relating import Port
+from ephs.semantics.derive.relating import StatePort
 from ephs.semantics.derive.tape import Tape, evaluate
 from ephs.semantics.primitives.primitives import (
     Domain,
@@ -166,11 +166,11 @@ def recorded_structure(kernel: Kernel, n: int, reads: tuple[Path, ...]) -> Calla
 def tape_of(kernel: Kernel) -> Tape | None:
     """The record of a formula, of a kernel that has one."""
     match kernel.relation:
-        case relations.Storage():
+        case relations.StorageStep():
             return kernel.relation.energy
-        case relations.Reversible():
+        case relations.ReversibleStep():
             return kernel.relation.structure
-        case relations.Irreversible():
+        case relations.IrreversibleStep():
             return kernel.relation.matrix
         case _:
             return None
@@ -179,7 +179,7 @@ def tape_of(kernel: Kernel) -> Tape | None:
 def own_tape(kernel: Kernel) -> Tape | None:
     """The same of a kernel that is not seen through maps: its tape gives the component's own matrix."""
     of = kernel.relation
-    seen = isinstance(of, relations.Reversible | relations.Irreversible) and of.maps is not None
+    seen = isinstance(of, relations.ReversibleStep | relations.IrreversibleStep) and of.maps is not None
     return None if seen else tape_of(kernel)
 
 
@@ -232,7 +232,9 @@ def storage_form(
     carried = _carried(bundle)
     bounds = _numbers(interface, ports, domain)
     hot = tuple(int(i) for i in np.flatnonzero(bundle.indicator(ENTROPY) > 0.0))
-    relation = relations.Storage(found.tape, _ports(interface, ports), _reference(bundle), hot, tuple(carried), bounds)
+    relation = relations.StorageStep(
+        found.tape, _ports(interface, ports), _reference(bundle), hot, tuple(carried), bounds
+    )
 
     def discrete(x: Point, v: Array) -> Array:
         numbers = _numbers_of(x, ports)
@@ -268,7 +270,7 @@ def reversible_kernel(
     n = Bundle.of(interface).size
     found = record(stacked(formula, n, multipliers), _arguments(interface, reads))
     _limited(found.tape.inputs + n + multipliers)
-    relation = relations.Reversible(found.tape, _ports(interface, reads), _numbers(interface, reads, domain))
+    relation = relations.ReversibleStep(found.tape, _ports(interface, reads), _numbers(interface, reads, domain))
     return _kernel(label, relation, {}, found.parameters)
 
 
@@ -299,7 +301,7 @@ def irreversible_kernel(
     bounds = tuple(
         (i, low, high) for port, low, high in mine for i in range(spans[str(port)].start, spans[str(port)].stop)
     )
-    relation = relations.Irreversible(
+    relation = relations.IrreversibleStep(
         found.tape, tuple(takes), _ports(interface, reads), _reference(bundle), hot, tuple(carried),
         _numbers(interface, reads, domain), bounds,
     )  # fmt: skip
@@ -356,11 +358,11 @@ def _arguments(interface: Interface, ports: Sequence[Path]) -> dict[str, int | N
     return {port: _vector(size) for port, size in sizes.items()}
 
 
-def _ports(interface: Interface, ports: Sequence[Path]) -> tuple[Port, ...]:
-    out: list[Port] = []
+def _ports(interface: Interface, ports: Sequence[Path]) -> tuple[StatePort, ...]:
+    out: list[StatePort] = []
     for port in ports:
         space = manifold(interface[port].quantity.space)
-        out.append(Port(space.code, space.size, space.dim, bool(interface[port].quantity.positive)))
+        out.append(StatePort(space.code, space.size, space.dim, bool(interface[port].quantity.positive)))
     return tuple(out)
 
 

@@ -34,15 +34,15 @@ def differentials() -> Program:
 
 def dexp_left(code: int, v: Array) -> Array:
     """D, (dim, dim), with x⁻¹dx = D dv for x = x0·exp(v) in the group of a code."""
-    return _found("dexp_left", code, v)
+    return _differential("dexp_left", code, v)
 
 
 def dexp_left_inv(code: int, v: Array) -> Array:
     """Inverse of `dexp_left`: the change of log(x0⁻¹x) = v that a left-trivialised dx makes."""
-    return _found("dexp_left_inv", code, v)
+    return _differential("dexp_left_inv", code, v)
 
 
-def _found(name: str, code: int, v: Array) -> Array:
+def _differential(name: str, code: int, v: Array) -> Array:
     out = np.eye(v.size)
     if code != codes.VECTOR:
         differentials().compiled()[f"{name}_{code}"](np.ascontiguousarray(v), out)

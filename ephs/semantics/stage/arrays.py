@@ -13,7 +13,6 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.memory import Cells
 from ephs.semantics.stage.numbers import (
-    Condition,
     Count,
     Integer,
     IntegerOperation,
@@ -21,6 +20,7 @@ from ephs.semantics.stage.numbers import (
     Operation,
     Order,
     Real,
+    StagedCondition,
     Truth,
 )
 
@@ -52,10 +52,10 @@ class Batch(Number):
     values: NDArray[np.float64]
 
     def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
-        return Batch(_OPERATIONS[operation](_of(left), _of(right)))
+        return Batch(_OPERATIONS[operation](_member_values(left), _member_values(right)))
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
-        return Mask(_OPERATIONS[order](_of(left), _of(right)))
+        return Mask(_OPERATIONS[order](_member_values(left), _member_values(right)))
 
     def _negative(self) -> Real:
         return Batch(-self.values)
@@ -69,15 +69,15 @@ class BatchCount(Count):
     values: NDArray[np.int64]
 
     def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
-        return BatchCount(_OPERATIONS[operation](_of(left), _of(right)))
+        return BatchCount(_OPERATIONS[operation](_member_values(left), _member_values(right)))
 
     def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
-        return Mask(_OPERATIONS[order](_of(left), _of(right)))
+        return Mask(_OPERATIONS[order](_member_values(left), _member_values(right)))
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Mask(Condition):
+class Mask(StagedCondition):
     """A truth value of each member."""
 
     values: NDArray[np.bool]
@@ -96,10 +96,10 @@ class BatchCells(Cells[Real]):
 
     def store(self, index: Integer, value: Real) -> None:
         """Keep numbers at an index."""
-        self.array[cast("int", index)] = _of(value)
+        self.array[cast("int", index)] = _member_values(value)
 
 
-def _of(value: object) -> Any:
+def _member_values(value: object) -> Any:
     return value.values if isinstance(value, Batch | BatchCount | Mask) else value
 
 
@@ -110,24 +110,24 @@ class Arrays(Interpreted):
     def _function(self, name: Function, *arguments: Real) -> Real:
         if name in COMPOSED:
             return COMPOSED[name](self, *arguments)
-        return Batch(_EXACT[name](*map(_of, arguments)))
+        return Batch(_EXACT[name](*map(_member_values, arguments)))
 
-    def _known(self, truth: Condition, what: str) -> bool:
+    def _known(self, truth: StagedCondition, what: str) -> bool:
         raise StageError("undecided", what=what, found="for all members")
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
-        values = cast("Any", np.where(_of(truth), _of(one), _of(other)))
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
+        values = cast("Any", np.where(_member_values(truth), _member_values(one), _member_values(other)))
         kinds: dict[str, Callable[[Any], Any]] = {"f": Batch, "i": BatchCount, "b": Mask}
         return kinds[values.dtype.kind](values)
 
     def _both(self, one: Truth, other: Truth) -> Truth:
-        return Mask(np.logical_and(_of(one), _of(other)))
+        return Mask(np.logical_and(_member_values(one), _member_values(other)))
 
-    def _negate(self, truth: Condition) -> Truth:
-        return Mask(np.logical_not(_of(truth)))
+    def _negate(self, truth: StagedCondition) -> Truth:
+        return Mask(np.logical_not(_member_values(truth)))
 
     def _same(self, one: Integer, other: Integer) -> Truth:
-        return Mask(np.equal(_of(one), _of(other)))
+        return Mask(np.equal(_member_values(one), _member_values(other)))
 
     def real(self, integer: Integer) -> Real:
         if isinstance(integer, BatchCount):
@@ -135,13 +135,13 @@ class Arrays(Interpreted):
         return np.float64(cast("int", integer))
 
     def integer(self, real: Real) -> Integer:
-        values = np.trunc(np.nan_to_num(_of(real), posinf=np.inf, neginf=-np.inf))
+        values = np.trunc(np.nan_to_num(_member_values(real), posinf=np.inf, neginf=-np.inf))
         large = np.abs(values) >= 2.0**63
         edges = np.where(values > 0.0, np.int64(2**63 - 1), np.int64(-(2**63)))
         return BatchCount(np.where(large, edges, np.where(large, 0.0, values).astype(np.int64)))
 
     def scale(self, real: Real, power: Integer) -> Real:
-        return Batch(_of(real) * np.ldexp(1.0, _of(power)))
+        return Batch(_member_values(real) * np.ldexp(1.0, _member_values(power)))
 
 
 ARRAYS: Final = Arrays()

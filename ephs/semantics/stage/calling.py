@@ -80,7 +80,7 @@ class Bound:
         if first is not None:
             self.block[:known], spans = first.block, [*first.spans, *spans]
         _distinct(call.entry, spans)
-        _put(self.block, range(known, self.block.size), passed, call.scalars)
+        _write_block(self.block, range(known, self.block.size), passed, call.scalars)
         self.parts = parts if first is None else (*first.parts, *parts)
         self._at = int(self.block.ctypes.data)
 
@@ -94,7 +94,7 @@ class Bound:
         if numbers and len(numbers) != len(places):
             expected = f"{len(places)} numbers"
             raise StageError("parameters", where=self.call.entry.name, expected=expected, found=len(numbers))
-        _put(block, places[: len(numbers)], numbers, self.call.scalars)
+        _write_block(block, places[: len(numbers)], numbers, self.call.scalars)
 
 
 @final
@@ -153,7 +153,7 @@ class Call:
         parts = tuple(self.entry.split(arguments, self.trail, 0, count))
         passed, spans = _addresses(self.entry.atoms[: len(parts)], parts)
         block = np.zeros(len(parts), dtype=np.int64)
-        _put(block, range(len(parts)), passed, self.scalars)
+        _write_block(block, range(len(parts)), passed, self.scalars)
         return First(tuple(self.entry.kinds.values())[:count], parts, block, spans)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -181,7 +181,7 @@ def packed(symbol: str, result: str, kinds: Sequence[str]) -> str:
     return "\n".join([f"define {result} @{packed_name(symbol)}(ptr %block) {{", "entry:", *lines, *last, "}"])
 
 
-def _put(
+def _write_block(
     block: "np.ndarray[Any, np.dtype[np.int64]]", places: Sequence[int], values: Sequence[Any], scalars: Sequence[str]
 ) -> None:
     """Write addresses and numbers to their places of a block, as the kinds of all places say."""

@@ -7,7 +7,7 @@ from typing import Any, Final, TypeAlias, final
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
-from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
 
 Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
@@ -16,7 +16,7 @@ Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Dual(Number):
+class StagedDual(Number):
     """A value, and its derivative along each direction.
 
     Attributes
@@ -31,10 +31,10 @@ class Dual(Number):
 
     def __post_init__(self) -> None:
         if not self.level:
-            object.__setattr__(self, "level", 1 + (self.value.level if isinstance(self.value, Dual) else 0))
+            object.__setattr__(self, "level", 1 + (self.value.level if isinstance(self.value, StagedDual) else 0))
 
     def _split(self, number: Real) -> tuple[Real, tuple[Real, ...]]:
-        if isinstance(number, Dual) and number.level == self.level:
+        if isinstance(number, StagedDual) and number.level == self.level:
             return number.value, number.slopes
         return number, (0.0,) * len(self.slopes)
 
@@ -43,30 +43,30 @@ class Dual(Number):
         pairs = list(zip(da, db, strict=True))
         match operation:
             case "+":
-                return Dual(a + b, tuple(_plus(x, y) for x, y in pairs), level)
+                return StagedDual(a + b, tuple(_plus(x, y) for x, y in pairs), level)
             case "-":
-                return Dual(a - b, tuple(_plus(x, -y) for x, y in pairs), level)
+                return StagedDual(a - b, tuple(_plus(x, -y) for x, y in pairs), level)
             case "*":
-                return Dual(a * b, tuple(_plus(_times(x, b), _times(y, a)) for x, y in pairs), level)
+                return StagedDual(a * b, tuple(_plus(_times(x, b), _times(y, a)) for x, y in pairs), level)
             case "/":
                 quotient = a / b
-                return Dual(quotient, tuple(_over(_plus(x, -_times(y, quotient)), b) for x, y in pairs), level)
+                return StagedDual(quotient, tuple(_over(_plus(x, -_times(y, quotient)), b) for x, y in pairs), level)
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
         (a, _), (b, _) = _pair(left, right)
         return _ORDERS[order](a, b)
 
     def _negative(self) -> Real:
-        return Dual(-self.value, tuple(-slope for slope in self.slopes), self.level)
+        return StagedDual(-self.value, tuple(-slope for slope in self.slopes), self.level)
 
 
 def _level(left: Real, right: Real) -> int:
-    return max(number.level for number in (left, right) if isinstance(number, Dual))
+    return max(number.level for number in (left, right) if isinstance(number, StagedDual))
 
 
 def _pair(left: Real, right: Real) -> tuple[Ruled, Ruled]:
     """Both numbers as ones of the higher level."""
-    top = max((number for number in (left, right) if isinstance(number, Dual)), key=lambda number: number.level)
+    top = max((number for number in (left, right) if isinstance(number, StagedDual)), key=lambda number: number.level)
     return top._split(left), top._split(right)  # pyright: ignore[reportPrivateUsage]
 
 
@@ -121,14 +121,14 @@ class DualCells(Cells[Real]):
         """Return the number at an index."""
         value, slopes = self.values.load(index), self.slopes
         if slopes is None:
-            return Dual(value, (0.0,) * self.directions, self.level)
+            return StagedDual(value, (0.0,) * self.directions, self.level)
         first = index * self.directions
-        return Dual(value, tuple(slopes.load(first + k) for k in range(self.directions)), self.level)
+        return StagedDual(value, tuple(slopes.load(first + k) for k in range(self.directions)), self.level)
 
     def store(self, index: Integer, value: Real) -> None:
         """Keep a number at an index."""
         slopes: tuple[Real, ...] = (0.0,) * self.directions
-        if isinstance(value, Dual) and value.level == self.level:
+        if isinstance(value, StagedDual) and value.level == self.level:
             value, slopes = value.value, value.slopes
         self.values.store(index, value)
         for k, slope in enumerate(slopes):
@@ -159,21 +159,21 @@ class Duals(Evaluator):
         """Level of the numbers: 1, or one more than that of the numbers below."""
         return 1 + (self.base.level if isinstance(self.base, Duals) else 0)
 
-    def dual(self, number: Real, slopes: tuple[Real, ...] | None = None) -> Dual:
+    def dual(self, number: Real, slopes: tuple[Real, ...] | None = None) -> StagedDual:
         """Return a number of the base with slopes as a dual one; a constant has none, and a dual number its own."""
-        if slopes is None and isinstance(number, Dual) and number.level == self.level:
+        if slopes is None and isinstance(number, StagedDual) and number.level == self.level:
             return number
-        return Dual(number, (0.0,) * self.directions if slopes is None else slopes, self.level)
+        return StagedDual(number, (0.0,) * self.directions if slopes is None else slopes, self.level)
 
     def bare(self, number: Real) -> Real:
         """Return the base's number of one."""
-        return number.value if isinstance(number, Dual) and number.level == self.level else number
+        return number.value if isinstance(number, StagedDual) and number.level == self.level else number
 
     def constant(self, number: Real) -> Real:
         """Return a number of the base as a constant."""
         return self.dual(number)
 
-    def along(self, value: Real, direction: int, slope: float = 1.0) -> Dual:
+    def along(self, value: Real, direction: int, slope: float = 1.0) -> StagedDual:
         """Return a number that changes with one direction."""
         return self.dual(value, tuple(slope if k == direction else 0.0 for k in range(self.directions)))
 
@@ -193,7 +193,7 @@ class Duals(Evaluator):
         x = self.dual(real)
         return self.dual(self.base.scale(x.value, power), tuple(self.base.scale(slope, power) for slope in x.slopes))
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         if not isinstance(one, float | Number) and not isinstance(other, float | Number):
             return self.base.select(truth, one, other)
         a, b = self.dual(one), self.dual(other)
@@ -202,7 +202,7 @@ class Duals(Evaluator):
     def _both(self, one: Truth, other: Truth) -> Truth:
         return self.base.both(one, other)
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return self.base.negate(truth)
 
     def _same(self, one: Integer, other: Integer) -> Truth:

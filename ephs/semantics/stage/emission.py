@@ -10,7 +10,6 @@ from typing import Final, final
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import IntegerCells, RealCells
 from ephs.semantics.stage.numbers import (
-    Condition,
     Count,
     Integer,
     IntegerOperation,
@@ -18,6 +17,7 @@ from ephs.semantics.stage.numbers import (
     Operation,
     Order,
     Real,
+    StagedCondition,
     Truth,
 )
 
@@ -29,7 +29,7 @@ _WHOLE: Final[dict[IntegerOperation, str]] = {"+": "add", "-": "sub", "*": "mul"
 
 
 @final
-class Writer:
+class FunctionWriter:
     """The text of one LLVM function while it is written.
 
     Parameters
@@ -105,7 +105,7 @@ class Writer:
         lines, slots, self.block = place
         del self.lines[lines:], self.slots[slots:]
 
-    def own(self, writer: "Writer") -> None:
+    def own(self, writer: "FunctionWriter") -> None:
         """Refuse numbers of another function."""
         if writer is not self:
             raise StageError("stranger", found=writer.name, expected=self.name)
@@ -164,7 +164,7 @@ def _hexadecimal(value: float) -> str:
 class Symbol(Number):
     """A real number in machine code, or one for each member."""
 
-    writer: Writer
+    writer: FunctionWriter
     name: str
 
     def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
@@ -187,7 +187,7 @@ class Symbol(Number):
 class WholeSymbol(Count):
     """An integer in machine code; `wide`: one for each member."""
 
-    writer: Writer
+    writer: FunctionWriter
     name: str
     wide: bool = False
 
@@ -223,10 +223,10 @@ class WholeSymbol(Count):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class TruthSymbol(Condition):
+class TruthSymbol(StagedCondition):
     """A truth value in machine code; `wide`: one for each member."""
 
-    writer: Writer
+    writer: FunctionWriter
     name: str
     wide: bool = False
 
@@ -236,7 +236,7 @@ class TruthSymbol(Condition):
 class RealPointer(RealCells):
     """Real numbers in the memory of the machine: those of all members side by side, or shared by them."""
 
-    writer: Writer
+    writer: FunctionWriter
     name: str
     shared: bool = False
 
@@ -264,7 +264,7 @@ class RealPointer(RealCells):
 class IntegerPointer(IntegerCells):
     """Integers in the memory of the machine."""
 
-    writer: Writer
+    writer: FunctionWriter
     name: str
 
     def _at(self, index: Integer) -> str:

@@ -13,7 +13,7 @@ from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.kinds import Kind, described, dual, kind_of, of_field, pointer, signature_of, taped
 from ephs.semantics.stage.reaching import Atom, Signature
 from ephs.semantics.stage.records import IntegerField, RealField
-from ephs.semantics.stage.taped import Tape, Taped
+from ephs.semantics.stage.taped import SlopeTape, Taped
 from ephs.semantics.stage.unrolled import Unrolled
 
 
@@ -153,7 +153,7 @@ class Entry:
 
         def run(on: Evaluator, *arguments: Any) -> Any:
             *own, counters, places, slopes = arguments
-            taping = Taped(on, Tape(counters.cells, places.cells, slopes.cells))
+            taping = Taped(on, SlopeTape(counters.cells, places.cells, slopes.cells))
             return self.function(taping, *[_resolved(argument, taping) for argument in own])
 
         kinds = {name: taped(kind) for name, kind in self.kinds.items()} | TAPE

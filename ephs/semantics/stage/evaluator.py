@@ -6,8 +6,8 @@ from functools import wraps
 from typing import Any, Concatenate, Final, Literal, ParamSpec, TypeAlias, TypeVar, cast, final
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.memory import Cells, Held, IntegerCells, RealCells, Variable, Vector
-from ephs.semantics.stage.numbers import Condition, Count, Integer, Number, Real, Truth
+from ephs.semantics.stage.memory import Cells, HeldCells, IntegerCells, RealCells, Variable, Vector
+from ephs.semantics.stage.numbers import Count, Integer, Number, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Argument, Part, Reached, called, parts_of
 
 Function: TypeAlias = Literal["sqrt", "absolute", "floor", "sin", "cos", "exp", "log", "atan2", "copysign"]
@@ -35,7 +35,7 @@ class Evaluator(ABC):
         """Evaluate a function of the table `FUNCTIONS`."""
 
     @abstractmethod
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         """Choose between two reals, two integers or two truths."""
 
     @abstractmethod
@@ -43,7 +43,7 @@ class Evaluator(ABC):
         """Return the conjunction; at least one is a condition."""
 
     @abstractmethod
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         """Return the negation."""
 
     @abstractmethod
@@ -178,7 +178,7 @@ class Evaluator(ABC):
     @final
     def select(self, truth: Truth, one: Value, other: Value) -> Value:
         """Choose one of two values, also entry by entry of lists; both have been evaluated."""
-        if not isinstance(truth, Condition):
+        if not isinstance(truth, StagedCondition):
             return one if truth else other
         if isinstance(one, list | tuple) and isinstance(other, list | tuple):
             entries: list[Any] = [
@@ -190,9 +190,9 @@ class Evaluator(ABC):
     @final
     def both(self, one: Truth, other: Truth) -> Truth:
         """Logical and; both have been evaluated."""
-        if not isinstance(one, Condition):
+        if not isinstance(one, StagedCondition):
             return other if one else False
-        if not isinstance(other, Condition):
+        if not isinstance(other, StagedCondition):
             return one if other else False
         return self._both(one, other)
 
@@ -204,7 +204,7 @@ class Evaluator(ABC):
     @final
     def negate(self, truth: Truth) -> Truth:
         """Logical not."""
-        return self._negate(truth) if isinstance(truth, Condition) else not truth
+        return self._negate(truth) if isinstance(truth, StagedCondition) else not truth
 
     @final
     def same(self, one: Integer, other: Integer) -> Truth:
@@ -249,7 +249,7 @@ class Interpreted(Evaluator):
     """Control by Python: conditions are known, or refuse."""
 
     @abstractmethod
-    def _known(self, truth: Condition, what: str) -> bool:
+    def _known(self, truth: StagedCondition, what: str) -> bool:
         """Return the one answer of a condition, or raise."""
 
     @final
@@ -261,7 +261,7 @@ class Interpreted(Evaluator):
 
     @final
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
-        if self._known(truth, "on.when") if isinstance(truth, Condition) else truth:
+        if self._known(truth, "on.when") if isinstance(truth, StagedCondition) else truth:
             yes()
         elif no is not None:
             no()
@@ -270,22 +270,22 @@ class Interpreted(Evaluator):
     def repeat(self, body: Callable[[], Truth]) -> None:
         while True:
             truth = body()
-            if self._known(truth, "on.repeat") if isinstance(truth, Condition) else truth:
+            if self._known(truth, "on.repeat") if isinstance(truth, StagedCondition) else truth:
                 return
 
     @final
     def _reals(self, size: int) -> RealCells:
         entries: list[Real] = [0.0] * size
-        return Held(entries)
+        return HeldCells(entries)
 
     @final
     def _wholes(self, size: int) -> IntegerCells:
         entries: list[Integer] = [0] * size
-        return Held(entries)
+        return HeldCells(entries)
 
     @final
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
-        return Held(values)
+        return HeldCells(values)
 
     @final
     def _rehearse(self, body: Callable[[], None]) -> None:

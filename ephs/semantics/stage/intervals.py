@@ -12,7 +12,7 @@ from typing import Any, Final, final
 
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
-from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
 
 NEAR = 1e-9
 """Angle in rad by which extrema are taken to lie within an interval: more than turns round by."""
@@ -32,7 +32,7 @@ class Interval(Number):
     high: float
 
     def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
-        (a, b), (c, d) = _of(left), _of(right)
+        (a, b), (c, d) = _ends(left), _ends(right)
         match operation:
             case "+":
                 return _out((a + c, b + d))
@@ -46,7 +46,7 @@ class Interval(Number):
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
         if order in (">", ">="):
             left, right = right, left
-        (a, b), (c, d) = _of(left), _of(right)
+        (a, b), (c, d) = _ends(left), _ends(right)
         if _BOUNDLESS in ((a, b), (c, d)):
             return Undecided()
         if order in ("<", ">"):
@@ -59,11 +59,11 @@ class Interval(Number):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Undecided(Condition):
+class Undecided(StagedCondition):
     """A condition that is true at some points of the box and false at others."""
 
 
-def _of(number: Real) -> tuple[float, float]:
+def _ends(number: Real) -> tuple[float, float]:
     if isinstance(number, Interval):
         return number.low, number.high
     assert isinstance(number, float | int)
@@ -163,26 +163,26 @@ class Intervals(Interpreted):
     """Evaluation with intervals; a condition that is not decided chooses both."""
 
     def _function(self, name: Function, *arguments: Real) -> Real:
-        ends = [_of(argument) for argument in arguments]
+        ends = [_ends(argument) for argument in arguments]
         if _BOUNDLESS in ends:
             return _WHOLE
         return _ONE[name](*ends[0]) if name in _ONE else _TWO[name](ends[0], ends[1])
 
-    def _known(self, truth: Condition, what: str) -> bool:
+    def _known(self, truth: StagedCondition, what: str) -> bool:
         raise StageError("undecided", what=what, found="on the box")
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
-        if isinstance(one, bool | Condition):
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
+        if isinstance(one, bool | StagedCondition):
             return Undecided()
         if not isinstance(one, Number) and not isinstance(other, Number) and isinstance(one, int):
             raise StageError("undecided", what="an integer", found="on the box")
-        (a, b), (c, d) = _of(one), _of(other)
+        (a, b), (c, d) = _ends(one), _ends(other)
         return Interval(min(a, c), max(b, d))
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return Undecided()
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return Undecided()
 
     def _same(self, one: Integer, other: Integer) -> Truth:
@@ -192,13 +192,13 @@ class Intervals(Interpreted):
         return float(integer)
 
     def integer(self, real: Real) -> Integer:
-        low, high = _of(real)
+        low, high = _ends(real)
         if not (math.isfinite(low) and math.isfinite(high)) or int(low) != int(high):
             raise StageError("undecided", what="on.integer", found="on the box")
         return int(low)
 
     def scale(self, real: Real, power: Integer) -> Real:
-        low, high = _of(real)
+        low, high = _ends(real)
         return _out((low * 2.0 ** int(power), high * 2.0 ** int(power)))
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, TypeAlias, cast, final, get_args, get_
 
 import numpy as np
 
-from ephs.semantics.stage.duals import Dual, DualCells
+from ephs.semantics.stage.duals import DualCells, StagedDual
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Integers, Matrix, RealCells, Vector
 from ephs.semantics.stage.numbers import Integer, Real
@@ -243,7 +243,7 @@ def dual(kind: Kind, directions: int, active: bool) -> Kind:
                 made.append(DualCells(part, slopes, directions))
             elif atom == "real":
                 rates = tuple(0.0 if slopes is None else slopes.load(k) for k in range(directions))
-                made.append(Dual(part, rates))
+                made.append(StagedDual(part, rates))
             else:
                 made.append(part)
         return kind.join(made)

@@ -8,11 +8,11 @@ from typing import Any, Final, cast, final
 import numpy as np
 
 from ephs.semantics.stage.elementary import COMPOSED
-from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
+from ephs.semantics.stage.emission import FunctionWriter, IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function, known
 from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, Matrix, RealCells, Variable, Vector
-from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Real, StagedCondition, Truth
 from ephs.semantics.stage.plain import elementary
 from ephs.semantics.stage.reaching import Part, Reached
 from ephs.semantics.stage.records import Record, Table
@@ -50,7 +50,7 @@ class Machine(Evaluator):
         self._declared: dict[str, None] = {}
         self._emitted: dict[object, _Emitted | None] = {}
         self._tables: dict[str, str] = {}
-        self._writers: list[Writer] = []
+        self._writers: list[FunctionWriter] = []
 
     @property
     def text(self) -> str:
@@ -59,13 +59,13 @@ class Machine(Evaluator):
         return "\n\n".join([*tables, *self._declared, *self._functions]) + "\n"
 
     @property
-    def to(self) -> Writer:
+    def to(self) -> FunctionWriter:
         """The function that is being written."""
         return self._writers[-1]
 
     @contextmanager
-    def _writing(self, name: str) -> Generator[Writer]:
-        writer = Writer(name, self.width)
+    def _writing(self, name: str) -> Generator[FunctionWriter]:
+        writer = FunctionWriter(name, self.width)
         self._writers.append(writer)
         try:
             yield writer
@@ -73,7 +73,7 @@ class Machine(Evaluator):
             self._writers.pop()
 
     def define(
-        self, name: str, parameters: list[str], body: Callable[[Writer], object], linkage: str = ""
+        self, name: str, parameters: list[str], body: Callable[[FunctionWriter], object], linkage: str = ""
     ) -> tuple[str, Any]:
         """Write a function and return the type and the form of its result."""
         with self._writing(name) as to:
@@ -135,10 +135,10 @@ class Machine(Evaluator):
 
     # Conditions
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         to = self.to
         chosen, wide = self._truth(truth)
-        if isinstance(one, bool | Condition):
+        if isinstance(one, bool | StagedCondition):
             spread = wide or any(isinstance(side, TruthSymbol) and side.wide for side in (one, other))
             a, b = (self._of_truth(side, spread) for side in (one, other))
             kind = to.typed("i1") if spread else "i1"
@@ -176,7 +176,7 @@ class Machine(Evaluator):
         a, b = self._of_truth(one, wide), self._of_truth(other, wide)
         return TruthSymbol(to, to.let(f"and {to.typed('i1') if wide else 'i1'} {a}, {b}"), wide)
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         to, (name, wide) = self.to, self._truth(truth)
         return TruthSymbol(
             to, to.let(f"xor {to.typed('i1') if wide else 'i1'} {name}, {self._of_truth(True, wide)}"), wide
@@ -219,7 +219,7 @@ class Machine(Evaluator):
         to.begin(out)
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
-        if not isinstance(truth, Condition):
+        if not isinstance(truth, StagedCondition):
             if truth:
                 yes()
             elif no is not None:
@@ -316,7 +316,7 @@ class Machine(Evaluator):
         name = f"{function.__name__}.{len(self._emitted)}"
         names = [f"%a{place}" for place in range(len(kinds))]
 
-        def body(to: Writer) -> object:
+        def body(to: FunctionWriter) -> object:
             return function(on, *_shaped(to, form, iter(names)))
 
         parameters = [f"{kind} {name}" for kind, name in zip(kinds, names, strict=True)]
@@ -328,7 +328,7 @@ _PASSED: Final[dict[type, str]] = {Vector: "start", Integers: "start", Matrix: "
 """Integers that are handed over also where they are known: one function then serves all windows of memory."""
 
 
-def _counted(to: Writer, value: Integer, leaf: Callable[[str, str], None]) -> Any:
+def _counted(to: FunctionWriter, value: Integer, leaf: Callable[[str, str], None]) -> Any:
     """Hand over an integer, known or not."""
     if isinstance(value, int):
         leaf("i64", to.of_integer(value))
@@ -336,7 +336,7 @@ def _counted(to: Writer, value: Integer, leaf: Callable[[str, str], None]) -> An
     return _flat(to, value, leaf)
 
 
-def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
+def _flat(to: FunctionWriter, value: Any, leaf: Callable[[str, str], None]) -> Any:
     """Hand over the operands in a value, and return its form: a hashable picture with holes for them."""
     match value:
         case Symbol():
@@ -372,7 +372,7 @@ def _flat(to: Writer, value: Any, leaf: Callable[[str, str], None]) -> Any:
             return (None, type(value), value)
 
 
-def _shaped(to: Writer, form: Any, leaves: Iterator[str]) -> Any:
+def _shaped(to: FunctionWriter, form: Any, leaves: Iterator[str]) -> Any:
     """Return the value of a form, its holes filled."""
     kind, *rest = form
     if kind is Symbol:

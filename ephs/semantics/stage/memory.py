@@ -37,7 +37,7 @@ IntegerCells: TypeAlias = Cells[Integer]
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Held(Cells[Value]):
+class HeldCells(Cells[Value]):
     """Cells in a Python list; floats divide by zero as in IEEE 754."""
 
     entries: list[Value]

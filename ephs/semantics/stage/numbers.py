@@ -17,7 +17,7 @@ Real: TypeAlias = Union[float, "Number"]
 """A real number, known or not."""
 Integer: TypeAlias = Union[int, "Count"]
 """An integer, known or not."""
-Truth: TypeAlias = Union[bool, "Condition"]
+Truth: TypeAlias = Union[bool, "StagedCondition"]
 """A truth value, known or not."""
 Operation: TypeAlias = Literal["+", "-", "*", "/"]
 IntegerOperation: TypeAlias = Literal["+", "-", "*", "//", "%"]
@@ -28,7 +28,7 @@ _ZERO: Final = np.float64(0.0)
 """A zero that follows IEEE where it divides a known number; Python's own raises."""
 
 
-class Condition:
+class StagedCondition:
     """A truth value that is not known while staging."""
 
     __slots__ = ()

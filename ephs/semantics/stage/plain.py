@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.semantics.stage.elementary import COMPOSED
 from ephs.semantics.stage.evaluator import Function, Interpreted
-from ephs.semantics.stage.numbers import Condition, Integer, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Real, StagedCondition, Truth
 
 _EXACT: Final[dict[Function, Callable[..., float]]] = {
     "sqrt": np.sqrt,
@@ -33,16 +33,16 @@ class Plain(Interpreted):
     def _function(self, name: Function, *arguments: Real) -> Real:
         return elementary(name, *cast("tuple[float, ...]", arguments))
 
-    def _known(self, truth: Condition, what: str) -> bool:
+    def _known(self, truth: StagedCondition, what: str) -> bool:
         return bool(truth)
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         return one if truth else other
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return bool(one) and bool(other)
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return not truth
 
     def _same(self, one: Integer, other: Integer) -> Truth:

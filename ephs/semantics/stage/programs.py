@@ -10,7 +10,7 @@ import numpy as np
 
 from ephs.semantics.stage.arrays import ARRAYS, Batch, BatchCells
 from ephs.semantics.stage.calling import Call, apart, packed
-from ephs.semantics.stage.emission import IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol, Writer
+from ephs.semantics.stage.emission import FunctionWriter, IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol
 from ephs.semantics.stage.entries import Entry
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.known import known
@@ -204,7 +204,9 @@ def _emitted(program: Program, members: int, shared: tuple[str, ...]) -> tuple[s
             for argument, atom in entry.atoms
         ]
 
-        def body(to: Writer, entry: Entry = entry, parameters: list[tuple[str, Atom, bool]] = parameters) -> object:
+        def body(
+            to: FunctionWriter, entry: Entry = entry, parameters: list[tuple[str, Atom, bool]] = parameters
+        ) -> object:
             made = (_symbol(to, atom, f"%a{k}", wide) for k, (_, atom, wide) in enumerate(parameters))
             return _result(on, entry, entry.run(on, made))
 
@@ -238,7 +240,7 @@ def _parameter(atom: Atom, wide: bool) -> str:
     return "double" if atom == "real" and not wide else "ptr noalias"
 
 
-def _symbol(to: Writer, atom: Atom, name: str, wide: bool) -> Any:
+def _symbol(to: FunctionWriter, atom: Atom, name: str, wide: bool) -> Any:
     match atom:
         case "reals":
             return RealPointer(to, name, not wide)

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, TypeAlias, cast, final
 import numpy as np
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Cells, Held, Integers, Matrix, Vector
+from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Cells, HeldCells, Integers, Matrix, Vector
 from ephs.semantics.stage.numbers import Integer, Number, Real
 
 Atom: TypeAlias = Literal["reals", "integers", "real", "integer"]
@@ -100,7 +100,7 @@ def called(function: Reached, parts: Sequence[Part]) -> int:
     StageError
         An argument is not made of floats, or the address of integers.
     """
-    copies: dict[int, tuple[Held[Any], np.ndarray[Any, Any]]] = {}
+    copies: dict[int, tuple[HeldCells[Any], np.ndarray[Any, Any]]] = {}
 
     def passed(atom: Atom, value: Any) -> Any:
         if atom in ("real", "integer"):
@@ -108,7 +108,7 @@ def called(function: Reached, parts: Sequence[Part]) -> int:
         cells, start = cast("tuple[Cells[Any], Any]", value)
         if isinstance(cells, ArrayReals | ArrayIntegers):
             array: np.ndarray[Any, Any] = cells.array
-        elif isinstance(cells, Held):
+        elif isinstance(cells, HeldCells):
             array = copies.setdefault(id(cells), (cells, _copied(cells, atom)))[1]
         else:
             raise StageError("unreached", what=type(cells).__name__)
@@ -128,6 +128,6 @@ def _known(value: Any) -> Any:
     return value
 
 
-def _copied(cells: Held[Any], atom: Atom) -> "np.ndarray[Any, Any]":
+def _copied(cells: HeldCells[Any], atom: Atom) -> "np.ndarray[Any, Any]":
     entries = [_known(entry) for entry in cells.entries]
     return np.array(entries, dtype=np.float64 if atom == "reals" else np.int64)

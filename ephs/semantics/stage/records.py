@@ -14,7 +14,7 @@ from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.reaching import Reached, Signature
 
 
-class _Field:
+class _RecordField:
     """A named place in a record, its offset fixed when the class is made."""
 
     __slots__ = ("name", "offset", "shape")
@@ -52,7 +52,7 @@ class _Field:
 
 
 @final
-class RealField(_Field):
+class RealField(_RecordField):
     """One real number of a record."""
 
     @overload
@@ -67,7 +67,7 @@ class RealField(_Field):
 
 
 @final
-class IntegerField(_Field):
+class IntegerField(_RecordField):
     """One integer of a record."""
 
     @overload
@@ -82,7 +82,7 @@ class IntegerField(_Field):
 
 
 @final
-class FunctionField(_Field):
+class FunctionField(_RecordField):
     """A function of a record: its address, an integer, with a signature that is known while staging."""
 
     __slots__ = ("signature",)
@@ -103,7 +103,7 @@ class FunctionField(_Field):
 
 
 @final
-class IntegersField(_Field):
+class IntegersField(_RecordField):
     """Integers of a record."""
 
     @overload
@@ -119,7 +119,7 @@ class IntegersField(_Field):
 
 
 @final
-class VectorField(_Field):
+class VectorField(_RecordField):
     """Real numbers of a record, as a list."""
 
     @overload
@@ -135,7 +135,7 @@ class VectorField(_Field):
 
 
 @final
-class MatrixField(_Field):
+class MatrixField(_RecordField):
     """Real numbers of a record, as a list of rows."""
 
     @overload
@@ -198,7 +198,7 @@ class Record:
 
     def __init_subclass__(cls) -> None:
         cls.integer_width = cls.real_width = 0
-        for field in (field for field in vars(cls).values() if isinstance(field, _Field)):
+        for field in (field for field in vars(cls).values() if isinstance(field, _RecordField)):
             if isinstance(field, IntegerField | IntegersField | FunctionField):
                 field.offset, cls.integer_width = cls.integer_width, cls.integer_width + prod(field.shape)
             else:
@@ -214,14 +214,14 @@ class Record:
     @final
     def __setattr__(self, name: str, value: object) -> None:
         field = getattr(type(self), name, None)
-        if not isinstance(field, _Field):
-            fields = [key for key, field in vars(type(self)).items() if isinstance(field, _Field)]
+        if not isinstance(field, _RecordField):
+            fields = [key for key, field in vars(type(self)).items() if isinstance(field, _RecordField)]
             raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
         object.__setattr__(self, name, value)
 
     @final
     def __getattr__(self, name: str) -> Any:
-        fields = [key for key, field in vars(type(self)).items() if isinstance(field, _Field)]
+        fields = [key for key, field in vars(type(self)).items() if isinstance(field, _RecordField)]
         raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
 
     @final

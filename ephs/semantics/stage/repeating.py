@@ -29,31 +29,31 @@ class _Silent(Record):
 
 
 def _shift(on: Evaluator, block: Integers, strides: Integers) -> None:
-    def one(k: Integer) -> None:
+    def each_entry(k: Integer) -> None:
         block[k] = block[k] + strides[k]
 
-    on.loop(block.size, one)
+    on.loop(block.size, each_entry)
 
 
 def _ask(
     on: Evaluator, called: Table[_Asking], block: Integers, strides: Integers, results: Integers, count: Integer
 ) -> None:
-    def one(k: Integer) -> None:
+    def each_entry(k: Integer) -> None:
         results[k] = on.reach(called[0].call, block)
         _shift(on, block, strides)
 
-    on.loop(count, one)
+    on.loop(count, each_entry)
 
 
 def _run(
     on: Evaluator, called: Table[_Silent], block: Integers, strides: Integers, results: Integers, count: Integer
 ) -> None:
-    def one(k: Integer) -> None:
+    def each_entry(k: Integer) -> None:
         on.reach(called[0].call, block)
         results[k] = 0
         _shift(on, block, strides)
 
-    on.loop(count, one)
+    on.loop(count, each_entry)
 
 
 _MEMBERS: Final[dict[str, Any]] = {

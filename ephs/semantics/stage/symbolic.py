@@ -7,7 +7,7 @@ from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
-from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
 
 sp: Any = import_module("sympy")
 Expr: TypeAlias = Any
@@ -49,7 +49,7 @@ class Expression(Number):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Proposition(Condition):
+class Proposition(StagedCondition):
     """A condition as an expression of SymPy."""
 
     value: Expr
@@ -79,19 +79,19 @@ class Symbolic(Interpreted):
             return Expression(sp.Abs(x) * sp.Piecewise((-1, sign < 0), (1, True)))
         return Expression(_FUNCTIONS[name](*values))
 
-    def _known(self, truth: Condition, what: str) -> bool:
+    def _known(self, truth: StagedCondition, what: str) -> bool:
         raise StageError("undecided", what=what, found=f"({expression(truth)})")
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         condition = expression(truth)
-        if isinstance(one, bool | Condition):
+        if isinstance(one, bool | StagedCondition):
             return _truth(sp.ITE(condition, expression(one), expression(other)))
         return Expression(sp.Piecewise((expression(one), condition), (expression(other), True), evaluate=False))
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return _truth(sp.And(expression(one), expression(other)))
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return _truth(sp.Not(expression(truth)))
 
     def _same(self, one: Integer, other: Integer) -> Truth:

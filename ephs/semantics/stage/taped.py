@@ -14,7 +14,7 @@ from ephs.semantics.stage.duals import RULES
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells, Variable, Vector
-from ephs.semantics.stage.numbers import Condition, Integer, Number, Operation, Order, Real, Truth
+from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
 from ephs.semantics.stage.records import Record
 
@@ -30,7 +30,7 @@ Terms: TypeAlias = tuple[tuple[Integer, Real], ...]
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Tape:
+class SlopeTape:
     """Rows of entries, each the index of an earlier row and a slope; the number of a row's entries follows them."""
 
     counters: IntegerCells
@@ -126,7 +126,7 @@ class Taped(Evaluator):
     """Evaluation that writes a tape, with another evaluator's numbers."""
 
     base: Evaluator
-    tape: Tape
+    tape: SlopeTape
 
     def constant(self, value: Real) -> Real:
         """Return a number of the base as a constant."""
@@ -171,7 +171,7 @@ class Taped(Evaluator):
         scaled = tuple((place, self.base.scale(slope, power)) for place, slope in terms)
         return self.traced(self.base.scale(value, power), scaled)
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         if not isinstance(one, float | Number) and not isinstance(other, float | Number):
             return self.base.select(truth, one, other)
         (a, left), (b, right) = _split(one), _split(other)
@@ -181,7 +181,7 @@ class Taped(Evaluator):
     def _both(self, one: Truth, other: Truth) -> Truth:
         return self.base.both(one, other)
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return self.base.negate(truth)
 
     def _same(self, one: Integer, other: Integer) -> Truth:
@@ -294,7 +294,7 @@ def _writing(function: Callable[..., Any]) -> Callable[..., Any]:
     """A staged function as one that takes the tape that it writes to: emitted once, as the function itself is."""
 
     @wraps(function)
-    def run(base: Evaluator, tape: Tape, arguments: tuple[Any, ...]) -> Any:
+    def run(base: Evaluator, tape: SlopeTape, arguments: tuple[Any, ...]) -> Any:
         on = Taped(base, tape)
         return _swapped(function(on, *_swapped(arguments, on.taken)), on.passed)
 
@@ -351,7 +351,7 @@ def back(on: Evaluator, counters: Integers, places: Integers, slopes: Vector, ba
     """
     position, row = on.counter(counters[POSITION]), on.counter(counters[ROWS] - 1)
 
-    def one() -> Truth:
+    def once() -> Truth:
         count = places[position.value - 1]
         first, share = position.value - 1 - count, bars[row.value]
 
@@ -365,4 +365,4 @@ def back(on: Evaluator, counters: Integers, places: Integers, slopes: Vector, ba
         position.value, row.value = first, row.value - 1
         return first <= 0
 
-    on.when(position.value > 0, lambda: on.repeat(one))
+    on.when(position.value > 0, lambda: on.repeat(once))

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
-from ephs.semantics.stage.numbers import Condition, Count, Integer, Real, Truth
+from ephs.semantics.stage.numbers import Count, Integer, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Part, Reached
 
 ROUNDS: Final = 100_000
@@ -95,7 +95,7 @@ class Unrolled(Evaluator):
         self._settle(slots)
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
-        if not isinstance(truth, Condition):
+        if not isinstance(truth, StagedCondition):
             chosen = yes if truth else no
             if chosen is not None:
                 chosen()
@@ -108,7 +108,7 @@ class Unrolled(Evaluator):
         for _ in range(ROUNDS):
             found: list[Truth] = []
             places = self._changed(lambda found=found: found.append(body()))
-            if isinstance(found[0], Condition):
+            if isinstance(found[0], StagedCondition):
                 slots = self._slots(places)
                 self.base.repeat(lambda slots=slots: self._through(slots, body))
                 self._settle(slots)
@@ -214,13 +214,13 @@ class Unrolled(Evaluator):
     def _function(self, name: Function, *arguments: Real) -> Real:
         return self.base._function(name, *arguments)
 
-    def _choose(self, truth: Condition, one: Any, other: Any) -> Any:
+    def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         return self.base.select(truth, one, other)
 
     def _both(self, one: Truth, other: Truth) -> Truth:
         return self.base.both(one, other)
 
-    def _negate(self, truth: Condition) -> Truth:
+    def _negate(self, truth: StagedCondition) -> Truth:
         return self.base.negate(truth)
 
     def _same(self, one: Integer, other: Integer) -> Truth:

@@ -18,7 +18,7 @@ from ephs.semantics.symbols.algebra import Expr, sp, text_of
 from ephs.semantics.symbols.elimination import coefficient_of, eliminate, settled, tidy
 from ephs.semantics.symbols.voices import say
 from ephs.semantics.symbols.words import curved, escaped, operator
-from ephs.semantics.symbols.writer import Junction, Parts, Writer, parts_of
+from ephs.semantics.symbols.writer import SquareForm, SymbolicJunction, Writer, parts_of
 from ephs.semantics.systems.system import System
 
 Form = Literal["relation", "descriptor", "reduced"]
@@ -26,7 +26,7 @@ Form = Literal["relation", "descriptor", "reduced"]
 
 @final
 @dataclass(frozen=True, slots=True)
-class Equation:
+class SymbolicEquation:
     """The equation left = right between SymPy expressions, and its origin."""
 
     left: Expr
@@ -48,11 +48,11 @@ class Equations:
     """
 
     form: Form
-    rows: tuple[Equation, ...]
+    rows: tuple[SymbolicEquation, ...]
     names: Mapping[Expr, str]
     doubt: str = ""
 
-    def __iter__(self) -> Iterator[Equation]:
+    def __iter__(self) -> Iterator[SymbolicEquation]:
         return iter(self.rows)
 
     def __len__(self) -> int:
@@ -115,7 +115,7 @@ def equations_of(system: System, form: Form) -> Equations:
     ValueError
         There is no such form.
     """
-    writers: dict[str, Callable[[Writer], Iterator[Equation]]] = {
+    writers: dict[str, Callable[[Writer], Iterator[SymbolicEquation]]] = {
         "relation": _relation,
         "descriptor": _descriptor,
         "reduced": _reduced,
@@ -143,7 +143,7 @@ def _moving(writer: Writer, junction: Path, quantity: Quantity, flow: Expr) -> E
 # ---- the relation ----------------------------------------------------------------------------------------------
 
 
-def _relation(writer: Writer) -> Iterator[Equation]:
+def _relation(writer: Writer) -> Iterator[SymbolicEquation]:
     pattern, words = writer.flat.pattern, writer.words
     for path, junction in pattern.junctions.items():
         about = f"junction {path}"
@@ -157,17 +157,17 @@ def _relation(writer: Writer) -> Iterator[Equation]:
         if junction.exposed:
             states.append(words.port(path, "x", junction.quantity))
         for one, other in pairwise(states):
-            yield Equation(one, other, about)
+            yield SymbolicEquation(one, other, about)
         inner = [name for name, power in on if power]
         outer = junction.exposed and junction.power
         net = sum((words.port(name, "f", junction.quantity) for name in inner), sp.Integer(0))
         if inner or outer:
-            yield Equation(net, words.port(path, "f", junction.quantity) if outer else sp.Integer(0), about)
+            yield SymbolicEquation(net, words.port(path, "f", junction.quantity) if outer else sp.Integer(0), about)
         efforts = [words.port(name, "e", junction.quantity) for name in inner]
         if outer:
             efforts.append(words.port(path, "e", junction.quantity))
         for one, other in pairwise(efforts):
-            yield Equation(one, other, about)
+            yield SymbolicEquation(one, other, about)
     for path, primitive in writer.components():
         about = f"{path} ({primitive.name}, {primitive.kind})"
 
@@ -177,14 +177,14 @@ def _relation(writer: Writer) -> Iterator[Equation]:
         said = say(writer.voice(path, primitive, effort))
         for port, expression in said.efforts.items():
             junction, quantity = writer.state(path, port)
-            yield Equation(words.port(path / port, "x", quantity), words.state(junction, quantity), about)
-            yield Equation(words.port(path / port, "f", quantity), _flow_of(writer, junction, quantity), about)
-            yield Equation(words.port(path / port, "e", quantity), sp.expand(expression), about)
+            yield SymbolicEquation(words.port(path / port, "x", quantity), words.state(junction, quantity), about)
+            yield SymbolicEquation(words.port(path / port, "f", quantity), _flow_of(writer, junction, quantity), about)
+            yield SymbolicEquation(words.port(path / port, "e", quantity), sp.expand(expression), about)
         for port, expression in said.flows.items():
             quantity = primitive.bundle.quantity(port)
-            yield Equation(words.port(path / port, "f", quantity), sp.expand(expression), about)
+            yield SymbolicEquation(words.port(path / port, "f", quantity), sp.expand(expression), about)
         for condition in said.conditions:
-            yield Equation(sp.Integer(0), sp.expand(condition), about)
+            yield SymbolicEquation(sp.Integer(0), sp.expand(condition), about)
 
 
 def _flow_of(writer: Writer, junction: Path, quantity: Quantity) -> Expr:
@@ -198,27 +198,27 @@ def _flow_of(writer: Writer, junction: Path, quantity: Quantity) -> Expr:
 # ---- the descriptor form ---------------------------------------------------------------------------------------
 
 
-def _descriptor(writer: Writer) -> Iterator[Equation]:
+def _descriptor(writer: Writer) -> Iterator[SymbolicEquation]:
     parts = parts_of(writer, writer.junctions())
     for junction, (expression, quantity, path) in parts.storages.items():
-        yield Equation(writer.effort(junction, quantity), sp.expand(expression), f"effort of {path}")
+        yield SymbolicEquation(writer.effort(junction, quantity), sp.expand(expression), f"effort of {path}")
     for junction, balance in parts.balances.items():
         rate = parts.rates.get(junction)
         about = f"flows at {junction}"
         if rate is None:
-            yield Equation(sp.Integer(0), sp.expand(balance), about)
+            yield SymbolicEquation(sp.Integer(0), sp.expand(balance), about)
         else:
             quantity = parts.storages[junction][1]
             right = _moving(writer, junction, quantity, sp.expand(rate - balance))
-            yield Equation(writer.words.rate(junction, quantity), right, about)
+            yield SymbolicEquation(writer.words.rate(junction, quantity), right, about)
     for path, condition in parts.conditions:
-        yield Equation(sp.Integer(0), sp.expand(condition), f"condition of {path}")
+        yield SymbolicEquation(sp.Integer(0), sp.expand(condition), f"condition of {path}")
 
 
 # ---- the reduced form ------------------------------------------------------------------------------------------
 
 
-def _reduced(writer: Writer) -> Iterator[Equation]:
+def _reduced(writer: Writer) -> Iterator[SymbolicEquation]:
     junctions = writer.junctions()
     parts = parts_of(writer, junctions)
     outer = [slot for slot in junctions if slot.exposed]
@@ -235,20 +235,22 @@ def _reduced(writer: Writer) -> Iterator[Equation]:
     for junction, rate in parts.rates.items():
         quantity = parts.storages[junction][1]
         flow = final(rate - parts.balances[junction])
-        yield Equation(writer.words.rate(junction, quantity), _moving(writer, junction, quantity, flow), "states")
+        yield SymbolicEquation(
+            writer.words.rate(junction, quantity), _moving(writer, junction, quantity, flow), "states"
+        )
     for expression in algebraic:
         if final(expression) != 0:
-            yield Equation(sp.Integer(0), final(expression), "conditions")
+            yield SymbolicEquation(sp.Integer(0), final(expression), "conditions")
     for slot in outer:
         effort = writer.effort(slot.path, slot.quantity)
         if effort in known:
-            yield Equation(effort, final(effort), "outer ports")
+            yield SymbolicEquation(effort, final(effort), "outer ports")
         if slot.path not in parts.rates:
             flow = open_flows[slot.path]
-            yield Equation(flow, final(flow + parts.balances[slot.path]), "outer ports")
+            yield SymbolicEquation(flow, final(flow + parts.balances[slot.path]), "outer ports")
 
 
-def _candidates(writer: Writer, junctions: list[Junction], parts: Parts) -> list[Expr]:
+def _candidates(writer: Writer, junctions: list[SymbolicJunction], parts: SquareForm) -> list[Expr]:
     """Unknowns in the order in which they should go: flows through transformers, inner efforts, other multipliers."""
     transformers: list[Expr] = []
     others: list[Expr] = []

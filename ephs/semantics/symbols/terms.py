@@ -81,7 +81,7 @@ def _value(term: Term, x: Mapping[str, Any]) -> Any:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenFunction:
     """A function of numbers, arrays or symbols, by name: the value of a term.
 
     Parameters
@@ -104,7 +104,7 @@ class Written:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Matrix:
+class TermMatrix:
     """A matrix of terms as a function, with rows of equal length."""
 
     rows: tuple[tuple[Term, ...], ...]
@@ -121,11 +121,11 @@ class Matrix:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Structure:
+class StructureFunction:
     """L and C of a Dirac structure as one function; either may be absent."""
 
-    skew: Matrix | None
-    constraint: Matrix | None
+    skew: TermMatrix | None
+    constraint: TermMatrix | None
 
     def __call__(self, **x: Any) -> tuple[list[list[Any]] | None, list[list[Any]] | None]:
         """The values."""

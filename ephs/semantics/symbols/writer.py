@@ -14,7 +14,7 @@ from ephs.semantics.symbols.words import Words, plain
 from ephs.semantics.systems.system import System
 
 
-class Junction(NamedTuple):
+class SymbolicJunction(NamedTuple):
     """A power junction."""
 
     path: Path
@@ -71,7 +71,7 @@ class Writer:
         e = {str(port): effort(port, primitive.bundle.quantity(port)) for port in primitive.bundle.ports}
         return Voice(path, primitive, self.words, x, e, parameter)
 
-    def junctions(self) -> list[Junction]:
+    def junctions(self) -> list[SymbolicJunction]:
         """The power junctions.
 
         Raises
@@ -88,7 +88,7 @@ class Writer:
                 raise
         bearing = {port.junction for box in pattern.boxes.values() for port in box.ports.values() if port.power}
         return [
-            Junction(path, j.quantity, exposed)
+            SymbolicJunction(path, j.quantity, exposed)
             for path, j in pattern.junctions.items()
             if (exposed := j.exposed and j.power) or path in bearing
         ]
@@ -100,7 +100,7 @@ class Writer:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Parts:
+class SquareForm:
     """Square form: equations of storages, balances by junction, conditions."""
 
     storages: dict[Path, tuple[Expr, Quantity, Path]]  # junction -> effort, quantity, component
@@ -110,9 +110,9 @@ class Parts:
     said: dict[Path, Said]
 
 
-def parts_of(writer: Writer, junctions: list[Junction]) -> Parts:
+def parts_of(writer: Writer, junctions: list[SymbolicJunction]) -> SquareForm:
     """The square form of a flat system."""
-    parts = Parts({}, {}, {slot.path: sp.Integer(0) for slot in junctions}, [], {})
+    parts = SquareForm({}, {}, {slot.path: sp.Integer(0) for slot in junctions}, [], {})
     for path, primitive in writer.components():
 
         def effort(port: Path, quantity: Quantity, path: Path = path) -> Expr:

@@ -12,7 +12,7 @@ from ephs.operad import Path, Quantity
 from ephs.operad.charges import ENTROPY
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.meaning.step import Solved, solved
-from ephs.semantics.primitives.behaviour import Natural
+from ephs.semantics.primitives.behaviour import NaturalBehaviour
 from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import TINY
@@ -28,7 +28,7 @@ VACUOUS = Verdict(0.0, 0.0, "vacuous: no step was found, a constraint contradict
 
 @lru_cache(maxsize=1)  # all laws of a step at one probe; probes are distinguished by identity
 def _solved(probe: Probe) -> Solved:
-    return solved(probe.system, probe.state, Natural(probe.reference, probe.h), probe.inputs, probe.ports)
+    return solved(probe.system, probe.state, NaturalBehaviour(probe.reference, probe.h), probe.inputs, probe.ports)
 
 
 def _after(probe: Probe, solved: Solved) -> dict[Path, Array]:
@@ -167,7 +167,7 @@ def naturality(probe: Probe) -> Verdict:
     nested = _solved(probe)
     if nested.residual > UNSOLVED:
         return VACUOUS
-    behaviour = Natural(probe.reference, probe.h)
+    behaviour = NaturalBehaviour(probe.reference, probe.h)
     flat = solved(probe.system.flatten(), probe.state, behaviour, probe.inputs, probe.ports)
     if flat.residual > UNSOLVED:
         return VACUOUS

@@ -21,7 +21,7 @@ from ephs.semantics.systems.system import System
 __all__ = ["SYSTEM_LAWS", "Probe", "SystemLaw", "Verdict", "random_probe", "system_law"]
 
 
-def _at(system: System, probe: Probe) -> Instant:
+def _instant_of(system: System, probe: Probe) -> Instant:
     return system.relation(probe.reference).at(probe.state, probe.ports, efforts=probe.efforts)
 
 
@@ -67,7 +67,7 @@ def _tellegen(probe: Probe) -> Verdict:
 def _dirac(probe: Probe) -> Verdict:
     """The pattern with all reversible components: a Dirac structure on outer ports and those of the others."""
     flat = probe.system.flatten()
-    found = _at(flat, probe)
+    found = _instant_of(flat, probe)
     if found.contradiction:
         return _decided(True, found.contradiction)
     point = found.point
@@ -95,8 +95,8 @@ def _renaming(probe: Probe) -> Verdict:
     def new(path: Path) -> Path:
         return path.moved(names)
 
-    one = _at(system, probe)
-    two = _at(
+    one = _instant_of(system, probe)
+    two = _instant_of(
         renamed,
         replace(
             probe,

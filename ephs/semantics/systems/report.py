@@ -133,9 +133,9 @@ def _items(
     yield check_structure(system)
     try:
         d = system.descriptor()
-        found = [_at(random_probe(system, seed, reference=reference, h=h), state) for seed in range(probes)]
+        found = [_probe_at(random_probe(system, seed, reference=reference, h=h), state) for seed in range(probes)]
         if state is None and system.initial:  # random states of what has loops contradict them, and have no step
-            found[0] = _at(found[0], {})
+            found[0] = _probe_at(found[0], {})
     except SemanticsError as error:
         yield CheckItem("assembly", False, str(error))
         return
@@ -148,7 +148,7 @@ def _items(
         yield CheckItem(f"{law.name}: {law.statement}", holds, detail)
 
 
-def _at(probe: Probe, state: Mapping[str, object] | None) -> Probe:
+def _probe_at(probe: Probe, state: Mapping[str, object] | None) -> Probe:
     if state is None:
         return probe
     return replace(probe, state={**probe.state, **probe.system.state(state)})

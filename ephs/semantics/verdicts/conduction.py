@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.recording import Untraceable
-from ephs.semantics.symbols.terms import Matrix
+from ephs.semantics.symbols.terms import TermMatrix
 from ephs.semantics.verdicts.claims import claim_of
 from ephs.semantics.verdicts.proving import signs_of
 from ephs.semantics.verdicts.replay import Replay
@@ -50,10 +50,10 @@ class _Process:
 
 
 @lru_cache(FORMULAS)
-def _written(process: _Process) -> Matrix | None:
+def _written(process: _Process) -> TermMatrix | None:
     """The matrix as a function of the parameters."""
     try:
         rows = Replay(claim_of(process.primitive, signs_of(process.primitive))).conductances()
     except (Untraceable, Unexpandable):
         return None
-    return None if rows is None else Matrix(tuple(map(tuple, rows)))
+    return None if rows is None else TermMatrix(tuple(map(tuple, rows)))

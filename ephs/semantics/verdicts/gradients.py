@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.recording import Untraceable, record
-from ephs.semantics.derive.relations import Storage as Recorded
+from ephs.semantics.derive.relations import StorageStep as Recorded
 from ephs.semantics.spaces import manifold
 from ephs.semantics.verdicts.rounding import ROUNDED, rounding, slopes_of, steps_of
 

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.charts import moved
 from ephs.semantics.derive.recording import Recording
-from ephs.semantics.derive.relating import Port
+from ephs.semantics.derive.relating import StatePort
 from ephs.semantics.derive.tape import OPERATIONS, Tape
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
@@ -51,7 +51,7 @@ def steps_of(recording: Recording, numbers: Sequence[float], factor: Factor = ex
 
 
 def slopes_of(
-    tape: Tape, ports: Sequence[Port], x: Sequence[float], parameters: Sequence[float], factor: Factor = exactly
+    tape: Tape, ports: Sequence[StatePort], x: Sequence[float], parameters: Sequence[float], factor: Factor = exactly
 ) -> Array:
     """dE (n,), left-trivialised, of a recorded energy; exact up to rounding, NaN where it has no value."""
     n = sum(port.dim for port in ports)

@@ -8,8 +8,8 @@ from ephs.show.charts.families import Family as Family
 from ephs.show.charts.measure import Point as Point
 from ephs.show.charts.measure import work_precision as work_precision
 from ephs.show.charts.outcomes import SILENT as SILENT
-from ephs.show.charts.outcomes import Outcome as Outcome
-from ephs.show.charts.reference import Reference as Reference
+from ephs.show.charts.outcomes import ChartOutcome as ChartOutcome
+from ephs.show.charts.reference import ReferenceMotion as ReferenceMotion
 from ephs.show.charts.reference import shipped_reference as shipped_reference
 from ephs.show.charts.reference import tight_reference as tight_reference
 from ephs.show.charts.stability import Cell as Cell
@@ -19,10 +19,10 @@ __all__ = [
     "FAMILIES",
     "SILENT",
     "Cell",
+    "ChartOutcome",
     "Family",
-    "Outcome",
     "Point",
-    "Reference",
+    "ReferenceMotion",
     "draw_stability",
     "draw_work_precision",
     "shipped_reference",

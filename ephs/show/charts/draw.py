@@ -15,7 +15,7 @@ import numpy as np
 from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts.families import Family
 from ephs.show.charts.measure import Point
-from ephs.show.charts.outcomes import SILENT, Outcome
+from ephs.show.charts.outcomes import SILENT, ChartOutcome
 from ephs.show.charts.reasons import Key, Reason, letter_of, reasons, reasons_table
 from ephs.show.charts.runs import RunEnding, RunSetting
 from ephs.show.charts.stability import Cell
@@ -32,25 +32,25 @@ _PEER_COLOURS = ("#6b7280", "#9aa3af", "#4b5563", "#b8bec7")
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "h")
 _PEER_MARKERS = ("<", ">", "p", "d")
 _FILLS = {
-    Outcome.RIGHT: GREEN,
-    Outcome.WRONG_BUT_BOUNDED: "#f0e442",
-    Outcome.ENERGY_DRIFT: PURPLE,
-    Outcome.DAMPED: SKY,
-    Outcome.REFUSED: "#d1d5db",
-    Outcome.SLOW: "#f3f4f6",
-    Outcome.DIVERGED: RED,
-    Outcome.FLAGGED: ORANGE,
-    Outcome.UNKNOWN: "#ffffff",
+    ChartOutcome.RIGHT: GREEN,
+    ChartOutcome.WRONG_BUT_BOUNDED: "#f0e442",
+    ChartOutcome.ENERGY_DRIFT: PURPLE,
+    ChartOutcome.DAMPED: SKY,
+    ChartOutcome.REFUSED: "#d1d5db",
+    ChartOutcome.SLOW: "#f3f4f6",
+    ChartOutcome.DIVERGED: RED,
+    ChartOutcome.FLAGGED: ORANGE,
+    ChartOutcome.UNKNOWN: "#ffffff",
 }
 _SIGNS = {
-    Outcome.WRONG_BUT_BOUNDED: "wrong",
-    Outcome.ENERGY_DRIFT: "drift",
-    Outcome.DAMPED: "damped",
-    Outcome.REFUSED: "–",
-    Outcome.SLOW: "slow",
-    Outcome.DIVERGED: "diverged",
-    Outcome.FLAGGED: "flagged",
-    Outcome.UNKNOWN: "?",
+    ChartOutcome.WRONG_BUT_BOUNDED: "wrong",
+    ChartOutcome.ENERGY_DRIFT: "drift",
+    ChartOutcome.DAMPED: "damped",
+    ChartOutcome.REFUSED: "–",
+    ChartOutcome.SLOW: "slow",
+    ChartOutcome.DIVERGED: "diverged",
+    ChartOutcome.FLAGGED: "flagged",
+    ChartOutcome.UNKNOWN: "?",
 }
 _DPI = 150
 _DEFECTS = (1e-16, 1e-2)
@@ -145,11 +145,11 @@ def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: st
         for cell in cells:
             x, y = values.index(cell.value), rows.index(_row(cell, family))
             axes.add_patch(Rectangle((x, y), 1, 1, facecolor=_FILLS[cell.outcome], edgecolor="white", linewidth=1.2))
-            dark = cell.outcome in (Outcome.RIGHT, Outcome.DIVERGED)
+            dark = cell.outcome in (ChartOutcome.RIGHT, ChartOutcome.DIVERGED)
             axes.text(
                 x + 0.5,
                 y + 0.5,
-                _said(cell, family, found),
+                _cell_text(cell, family, found),
                 ha="center",
                 va="center",
                 color="white" if dark else INK,
@@ -208,12 +208,12 @@ def write_cells(cells: Sequence[Cell], folder: Path, name: str) -> list[Path]:
 def counts_table(cells: Sequence[Cell]) -> str:
     """Cells of each method by outcome, in Markdown; silently wrong ones in one column."""
     columns = {
-        "right": {Outcome.RIGHT},
-        "refused or failed, with a message": {Outcome.REFUSED},
-        "flagged by the audit": {Outcome.FLAGGED},
+        "right": {ChartOutcome.RIGHT},
+        "refused or failed, with a message": {ChartOutcome.REFUSED},
+        "flagged by the audit": {ChartOutcome.FLAGGED},
         "silently wrong": SILENT,
-        "took too long": {Outcome.SLOW},
-        "no reference": {Outcome.UNKNOWN},
+        "took too long": {ChartOutcome.SLOW},
+        "no reference": {ChartOutcome.UNKNOWN},
     }
     methods = list(dict.fromkeys(cell.method for cell in cells))
     rows = [["method", *columns], ["---"] * (1 + len(columns))]
@@ -235,11 +235,11 @@ def _flat(record: Point | Cell) -> dict[str, Any]:
         if isinstance(value, RunSetting):
             row |= {"control": value.kind, "setting": value.value}
         else:
-            row[field.name] = str(value) if isinstance(value, Outcome | RunEnding) else value
+            row[field.name] = str(value) if isinstance(value, ChartOutcome | RunEnding) else value
     return row
 
 
-def _look(method: str) -> tuple[str, str]:
+def _line_style(method: str) -> tuple[str, str]:
     """One colour and one marker a method, the same in every figure."""
     if method in METHODS:
         at = list(METHODS).index(method)
@@ -252,7 +252,7 @@ def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: s
     done = [p for p in points if p.outcome is RunEnding.DONE and getattr(p, key) > 0 and p.error > 0.0]
     if not done:
         return
-    colour, marker = _look(method)
+    colour, marker = _line_style(method)
     x, y = [getattr(p, key) for p in done], [p.error for p in done]
     hollow = kind == "step"
     axes.plot(
@@ -282,7 +282,7 @@ def _defects(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]]) ->
         fills = [shade.to_rgba(max(p.defect, _DEFECTS[0])) if math.isfinite(p.defect) else _UNKNOWN for p in done]
         x, y = [p.seconds for p in done], [p.error for p in done]
         axes.plot(x, y, color=GREY, linewidth=0.5, zorder=1.0)
-        axes.scatter(x, y, c=fills, marker=_look(method)[1], s=26.0, edgecolors=INK, linewidths=0.3, zorder=2.0)
+        axes.scatter(x, y, c=fills, marker=_line_style(method)[1], s=26.0, edgecolors=INK, linewidths=0.3, zorder=2.0)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("time [s]")
@@ -303,7 +303,7 @@ def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]], f
         return
     axes.text(1.06, 1.0, "failed", transform=axes.transAxes, fontsize=8.0, color=GREY, va="bottom")
     for row, ((method, kind), points) in enumerate(failed.items()):
-        colour, marker = _look(method)
+        colour, marker = _line_style(method)
         y = 0.96 - 0.045 * row
         axes.plot(
             [1.05],
@@ -329,10 +329,10 @@ def _row(cell: Cell, family: Family) -> tuple[str, str]:
     return cell.method, "" if by_step else str(cell.setting)
 
 
-def _said(cell: Cell, family: Family, found: _Reasons) -> str:
+def _cell_text(cell: Cell, family: Family, found: _Reasons) -> str:
     if family.name == "chaos" and np.isfinite(cell.horizon):
         return f"{cell.horizon:.3g} s"
-    if cell.outcome is Outcome.RIGHT:
+    if cell.outcome is ChartOutcome.RIGHT:
         return "0" if cell.error == 0.0 else f"{cell.error:.0e}".replace("e-0", "e-")
     return f"{_SIGNS[cell.outcome]} {letter_of(cell, found)}".rstrip()
 

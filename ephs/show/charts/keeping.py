@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.show.charts.outcomes import Outcome
+from ephs.show.charts.outcomes import ChartOutcome
 from ephs.show.charts.runs import RunSetting
 from ephs.show.charts.stability import Cell
 
@@ -58,6 +58,6 @@ def _read(file: Path) -> Iterator[Cell]:
             row: dict[str, Any] = json.loads(line)
         except json.JSONDecodeError:
             continue
-        row |= {"setting": RunSetting(*row["setting"]), "outcome": Outcome(row["outcome"])}
+        row |= {"setting": RunSetting(*row["setting"]), "outcome": ChartOutcome(row["outcome"])}
         found: dict[str, Any] = {key: np.nan if value is None else value for key, value in row.items()}
         yield Cell(**found)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.methods.registry import AUTO, METHODS
 from ephs.mechanics.scene.model import Scene
-from ephs.show.charts.reference import PosesInTime, Reference, tight_reference
+from ephs.show.charts.reference import PosesInTime, ReferenceMotion, tight_reference
 from ephs.show.charts.runs import RunEnding, RunSetting, attempt
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 13))
@@ -77,7 +77,7 @@ def work_precision(
     until: float,
     methods: Sequence[str] | None = None,
     *,
-    reference: Reference | None = None,
+    reference: ReferenceMotion | None = None,
     repeats: int = 3,
     limit: float = 20.0,
     tolerances: Sequence[float] = TOLERANCES,
@@ -131,7 +131,13 @@ def settings_over(
 
 
 def _refined(
-    scene: Scene, until: float, name: str, settings: list[RunSetting], truth: Reference, repeats: int, limit: float
+    scene: Scene,
+    until: float,
+    name: str,
+    settings: list[RunSetting],
+    truth: ReferenceMotion,
+    repeats: int,
+    limit: float,
 ) -> Iterator[Point]:
     both = np.array([0.0, until])
     for setting in settings:
@@ -173,7 +179,7 @@ def measured_point(
     evaluations: int,
     steps: int,
     defect: float,
-    truth: Reference,
+    truth: ReferenceMotion,
 ) -> Point:
     """The point of a finished run; a failure if its error is not finite."""
     floor = error < FLOOR * truth.cross_check

@@ -33,7 +33,7 @@ BLOWN = 100.0
 _NO_ENERGY = 1e-9
 
 
-class Outcome(StrEnum):
+class ChartOutcome(StrEnum):
     """Outcome of a run.
 
     ``RIGHT``: the error where the motion is judged is at most what `right` says.
@@ -58,7 +58,9 @@ class Outcome(StrEnum):
     UNKNOWN = "not known"
 
 
-SILENT = frozenset({Outcome.WRONG_BUT_BOUNDED, Outcome.ENERGY_DRIFT, Outcome.DAMPED, Outcome.DIVERGED})
+SILENT = frozenset(
+    {ChartOutcome.WRONG_BUT_BOUNDED, ChartOutcome.ENERGY_DRIFT, ChartOutcome.DAMPED, ChartOutcome.DIVERGED}
+)
 """Silent failures: the run succeeded, its audit found nothing, and the result is wrong."""
 
 
@@ -69,24 +71,24 @@ def right(setting: RunSetting, condition: float, steps: int) -> float:
     return min(RIGHT, setting.value * max(TIMES, steps, AMPLIFIED * condition))
 
 
-def judge(found: PosesInTime, true: PosesInTime, allowed: float = RIGHT) -> tuple[Outcome, float]:
+def judge(found: PosesInTime, true: PosesInTime, allowed: float = RIGHT) -> tuple[ChartOutcome, float]:
     """The outcome of a complete motion, and its error at the end; both motions at the same times.
 
     The error is that of positions and rotations, or of heat and work, whichever is larger.
     """
     error = float(np.maximum(found.off(true, true.length), found.misbooked(true))[-1])
     if _lost(found, true):
-        return Outcome.DIVERGED, error
+        return ChartOutcome.DIVERGED, error
     if error <= allowed:
-        return Outcome.RIGHT, error
+        return ChartOutcome.RIGHT, error
     drift = found.balance / max(true.turnover, found.turnover, _NO_ENERGY)
     if drift[-1] < -ENERGY:
-        return Outcome.DAMPED, error
+        return ChartOutcome.DAMPED, error
     if np.abs(drift).max() > ENERGY:
-        return Outcome.ENERGY_DRIFT, error
+        return ChartOutcome.ENERGY_DRIFT, error
     if _extent(found) < KEPT * _extent(true):
-        return Outcome.DAMPED, error
-    return Outcome.WRONG_BUT_BOUNDED, error
+        return ChartOutcome.DAMPED, error
+    return ChartOutcome.WRONG_BUT_BOUNDED, error
 
 
 def horizon(found: PosesInTime, true: PosesInTime) -> float:

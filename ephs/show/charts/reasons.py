@@ -7,7 +7,7 @@ from string import ascii_lowercase
 from typing import final
 
 from ephs.show.charts.measure import Point
-from ephs.show.charts.outcomes import Outcome
+from ephs.show.charts.outcomes import ChartOutcome
 from ephs.show.charts.runs import RunEnding
 from ephs.show.charts.stability import Cell
 
@@ -15,7 +15,7 @@ Key = tuple[str, str]
 """Outcome and cause."""
 LISTED = 5
 """Largest number of reasons printed by the command line."""
-_FINE = {str(RunEnding.DONE), str(Outcome.RIGHT), str(RunEnding.SLOW)}
+_FINE = {str(RunEnding.DONE), str(ChartOutcome.RIGHT), str(RunEnding.SLOW)}
 _PLACE = re.compile(r"^t = [^:;]*: ")
 _LIMIT = re.compile(r" where \S+ is allowed.*")
 _REMARK = re.compile(r" ?\([^()]*\)")

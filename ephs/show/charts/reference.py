@@ -103,7 +103,7 @@ class PosesInTime:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Reference:
+class ReferenceMotion:
     """A reference motion.
 
     Parameters
@@ -122,7 +122,9 @@ class Reference:
     run: tuple[str, RunSetting] | None = None
 
 
-def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None, limit: float = 60.0) -> Reference:
+def tight_reference(
+    scene: Scene, until: float, *, save_at: Array | None = None, limit: float = 60.0
+) -> ReferenceMotion:
     """A run with tight tolerances, by the applicable method of highest order.
 
     Parameters
@@ -151,7 +153,7 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
         motion, check = map(PosesInTime.of, solutions)
         if not (np.isfinite(motion.position).all() and np.isfinite(check.position).all()):
             continue
-        found = Reference(motion, float(motion.off(check)[-1]), f"{method}, {tight}", (method, tight))
+        found = ReferenceMotion(motion, float(motion.off(check)[-1]), f"{method}, {tight}", (method, tight))
         if found.cross_check <= TRUSTED:
             return found
         best = found if best is None or found.cross_check < best.cross_check else best
@@ -160,7 +162,7 @@ def tight_reference(scene: Scene, until: float, *, save_at: Array | None = None,
     return best
 
 
-def condition(scene: Scene, truth: Reference, limit: float = 60.0) -> Array:
+def condition(scene: Scene, truth: ReferenceMotion, limit: float = 60.0) -> Array:
     """(n,) amplification of a relative change of rates, a mass and gravity in a motion at its times.
 
     Ones where that is no run, or its run with other data does not reach the end.
@@ -182,17 +184,17 @@ def condition(scene: Scene, truth: Reference, limit: float = 60.0) -> Array:
     return np.maximum.accumulate(PosesInTime.of(run.solution).off(motion, motion.length)) / CHANGE
 
 
-def resting_reference(scene: Scene, save_at: Array) -> Reference:
+def resting_reference(scene: Scene, save_at: Array) -> ReferenceMotion:
     """Constant motion of an immobile mechanism."""
     n = len(save_at)
     poses = np.array([body.pose for _, body in scene.all_bodies()])
     rotations = np.array([quaternion_to_matrix(pose[:4]) for pose in poses])
     position, rotation = np.tile(poses[:, 4:], (n, 1, 1)), np.tile(rotations, (n, 1, 1, 1))
     motion = PosesInTime(save_at, position, rotation, np.zeros(n), np.zeros((n, 2)), 0.0, _length(scene))
-    return Reference(motion, 0.0, "it cannot move")
+    return ReferenceMotion(motion, 0.0, "it cannot move")
 
 
-def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> tuple[Reference, float]:
+def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> tuple[ReferenceMotion, float]:
     """The states of a file, at a time or at the earliest that it has, and this time.
 
     The file is JSON: ``{"how": text, "states": {time: {"cross_check": number, "bodies": {name: {"position": [3],
@@ -219,7 +221,7 @@ def shipped_reference(file: Path, scene: Scene, until: float | None = None) -> t
             raise
         raise ShowError("reference-file", path=str(file), found=f"{type(error).__name__}: {error}") from error
     motion = PosesInTime(np.array([found]), position, rotation, np.zeros(1), np.zeros((1, 2)), 0.0, _length(scene))
-    return Reference(motion, check, how), found
+    return ReferenceMotion(motion, check, how), found
 
 
 def _length(scene: Scene) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 from ephs.mechanics.methods.registry import METHODS, MethodEntry
 from ephs.mechanics.scene.model import Scene
 from ephs.show.charts.families import Family
-from ephs.show.charts.outcomes import CONDITION, SILENT, Outcome, horizon, judge, right
-from ephs.show.charts.reference import PosesInTime, Reference, condition, resting_reference, tight_reference
+from ephs.show.charts.outcomes import CONDITION, SILENT, ChartOutcome, horizon, judge, right
+from ephs.show.charts.reference import PosesInTime, ReferenceMotion, condition, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, ChartRun, RunEnding, RunSetting, attempt
 from ephs.show.errors import ShowError
 
@@ -54,7 +54,7 @@ class Cell:
     value: float
     method: str
     setting: RunSetting
-    outcome: Outcome
+    outcome: ChartOutcome
     error: float
     horizon: float
     seconds: float
@@ -112,7 +112,7 @@ def stability(
                     cell = trial.cell(method, setting, limit, slow.get(setting.kind))
                     if kept is not None:
                         kept.add(cell)
-                if cell.outcome is Outcome.SLOW:
+                if cell.outcome is ChartOutcome.SLOW:
                     slow.setdefault(setting.kind, setting)
                 cells.append(cell)
     return cells
@@ -127,7 +127,7 @@ class _ValueTrial:
     value: float
     scene: Scene
     times: Array
-    truth: Reference | None
+    truth: ReferenceMotion | None
     condition: float
     why: str
 
@@ -156,10 +156,10 @@ class _ValueTrial:
         outcome, error, held = _outcome(found, self.truth, right(setting, self.condition, steps))
         said = run.message or self.why
         if run.solution is not None:
-            if outcome in SILENT | {Outcome.UNKNOWN} and not run.solution.audit.passed:
-                outcome, said = Outcome.FLAGGED, str(run.solution.audit)
+            if outcome in SILENT | {ChartOutcome.UNKNOWN} and not run.solution.audit.passed:
+                outcome, said = ChartOutcome.FLAGGED, str(run.solution.audit)
         elif run.ending is RunEnding.SLOW:
-            outcome = Outcome.SLOW
+            outcome = ChartOutcome.SLOW
         return Cell(
             self.family.name,
             self.value,
@@ -177,7 +177,7 @@ class _ValueTrial:
         )
 
 
-def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Reference | None, str]:
+def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[ReferenceMotion | None, str]:
     scene = family.make(value) if family.meant is None else family.meant(value)
     if family.rests:
         return resting_reference(scene, times), ""
@@ -191,13 +191,15 @@ def _truth(family: Family, value: float, times: Array, limit: float) -> tuple[Re
     return found, ""
 
 
-def _outcome(found: PosesInTime | None, truth: Reference | None, allowed: float) -> tuple[Outcome, float, float]:
+def _outcome(
+    found: PosesInTime | None, truth: ReferenceMotion | None, allowed: float
+) -> tuple[ChartOutcome, float, float]:
     """Outcome, error and horizon; without a reference as far as the motion alone shows them."""
     if found is None:
-        return Outcome.REFUSED, np.nan, np.nan
+        return ChartOutcome.REFUSED, np.nan, np.nan
     if truth is None:
         alone, _ = judge(found, found)
-        return (alone if alone is Outcome.DIVERGED else Outcome.UNKNOWN), np.nan, np.nan
+        return (alone if alone is ChartOutcome.DIVERGED else ChartOutcome.UNKNOWN), np.nan, np.nan
     found = found.until(len(truth.motion.t))
     outcome, error = judge(found, truth.motion, allowed)
     return outcome, error, horizon(found, truth.motion)

@@ -285,7 +285,7 @@ def _worst(values: Array) -> int:
 
 @final
 @dataclass(frozen=True, slots=True)
-class Law:
+class AuditLaw:
     """A law of the audit.
 
     Parameters
@@ -311,8 +311,8 @@ class Law:
     other: Other | None = None
 
 
-LAWS: Mapping[str, Law] = {
-    "energy": Law(
+LAWS: Mapping[str, AuditLaw] = {
+    "energy": AuditLaw(
         "energy changes by heat and work only",
         "largest K + |V − V₀| + |heat| + |work|",
         f"{LAWFUL:g} where a method's steps are lawful; else {MANY_TIMES:g} rtol (atol where that is 0), "
@@ -322,7 +322,7 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step", "lower rtol"),
         ("natural", "keeps the balance"),
     ),
-    "accuracy": Law(
+    "accuracy": AuditLaw(
         "steps resolve the motion, and the positions of bodies are accurate. Constant steps: the difference between "
         "two steps and four of half the length, and between the run and one with longer or shorter steps. Chosen steps "
         "of natural methods: the difference between a step and three of a third of its length. Corrected steps: the "
@@ -333,7 +333,7 @@ LAWS: Mapping[str, Law] = {
         lambda bounds: bounds.accuracy,
         ("take a shorter step", "lower rtol"),
     ),
-    "entropy": Law(
+    "entropy": AuditLaw(
         "no component, and no system without entropy from outside, loses entropy in a step",
         "entropy produced and exchanged",
         f"{PRODUCTION:g}",
@@ -342,7 +342,7 @@ LAWS: Mapping[str, Law] = {
         ("take a smaller step", "lower rtol"),
         ("natural", "makes entropy only"),
     ),
-    "constraint": Law(
+    "constraint": AuditLaw(
         "joints are closed",
         "length of the mechanism; 1 rad",
         f"{CLOSED:g}",
@@ -350,7 +350,7 @@ LAWS: Mapping[str, Law] = {
         lambda _: CLOSED,
         ("take a smaller step, or check that the joints fit together", "lower rtol, or check that the joints fit"),
     ),
-    "ledger": Law(
+    "ledger": AuditLaw(
         "stored entropy and volume change by production and supply; where prescribed motions leave no degree of "
         "freedom, their work, the gain of energies plus heat, is the integral of their power",
         "amounts produced and exchanged; gross energies",
@@ -359,7 +359,7 @@ LAWS: Mapping[str, Law] = {
         lambda bounds: bounds.ledger,
         ("take a smaller step", "lower rtol"),
     ),
-    "input": Law(
+    "input": AuditLaw(
         "inputs are smooth but for some jumps: functions of time are searched for these",
         "jumps that were found; the search ends with more",
         f"{MOST_FOUND}",

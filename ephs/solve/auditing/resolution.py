@@ -37,7 +37,7 @@ from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.paced import Paced
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record, Rows
+from ephs.solve.result.record import RowBlocks, RunRecord
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Instants, Stepper
 
@@ -335,12 +335,12 @@ def trials_of(
         first, second, third = zip(shown.x, shown.energies, strict=True)
         return first, second, third
 
-    none = Rows().whole(problem.descriptor)
+    none = RowBlocks().whole(problem.descriptor)
     own = Trials(_shown(problem, none)[0], order, tuple(t * seconds for t, _ in chosen), tried)
     return own if natural is None else replace(natural, own=own)
 
 
-def _shown(problem: Problem, record: Record) -> tuple[Problem, Record]:
+def _shown(problem: Problem, record: RunRecord) -> tuple[Problem, RunRecord]:
     """Problem and rows as a solution shows them."""
     while problem.shown is not None:
         problem, record, _ = problem.shown(record, {})

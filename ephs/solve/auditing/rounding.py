@@ -12,7 +12,7 @@ from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import Pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import compile_model
 from ephs.solve.result.states import RecordedStates
 
@@ -75,17 +75,17 @@ def trembling(solution: "Solution") -> float:
     far = max((float(np.abs(place).max(initial=0.0)) for place in places), default=0.0)
     away = _part(solution) * max(far, problem.length)
     x = states.x[-1] if isinstance(states, RecordedStates) else d.pack(solution.state_at(len(solution) - 1))
-    mass, turned, pushed = _held(problem, float(solution.t[0]), x)
+    mass, turned, pushed = _storage_sizes(problem, float(solution.t[0]), x)
     return 0.5 * mass * (away / h) ** 2 + pushed * away + turned * _part(solution) if h else 0.0
 
 
-def _held(problem: "Problem", t: float, x: Array) -> tuple[float, float, float]:
+def _storage_sizes(problem: "Problem", t: float, x: Array) -> tuple[float, float, float]:
     """Mass of all bodies in kg; sums of the sizes of torques in N m and forces in N of storages at the states x."""
     d = problem.descriptor
     turning, moving, momenta, velocities = once(d, "places of storages", lambda: _places(d))
     if not (turning.size or moving.size or velocities.size):
         return 0.0, 0.0, 0.0
-    stored = Stored(compile_model(d, problem.reference, problem.inputs(t, problem.initial)))
+    stored = StoredEnergies(compile_model(d, problem.reference, problem.inputs(t, problem.initial)))
     sizes = np.abs(stored.efforts(x)[d.rate_size :])
     unit = x.copy()  # momenta of 1 N s along x: velocities are inverse masses
     unit[momenta] = UNIT

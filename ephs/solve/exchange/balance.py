@@ -22,7 +22,7 @@ PART: Final = 0.2
 
 
 @final
-class Balance:
+class PortBalance:
     """Balance of one power port along a run.
 
     Parameters

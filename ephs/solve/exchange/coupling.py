@@ -12,11 +12,11 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import nearest_of
-from ephs.solve.exchange.balance import Balance
+from ephs.solve.exchange.balance import PortBalance
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.together import Together, number
 from ephs.solve.exchange.unit import PowerPort
-from ephs.solve.exchange.wires import Place, place_of
+from ephs.solve.exchange.wires import WireEnd, place_of
 from ephs.solve.sampled import Sampled
 from ephs.solve.snapshot import Snapshot
 
@@ -76,7 +76,7 @@ class Traffic:
 class _Joined:
     """A power port at a coupling: both signs, and the readings of the system."""
 
-    place: Place
+    place: WireEnd
     port: PowerPort
     taken: float
     given: float
@@ -85,7 +85,7 @@ class _Joined:
 
 
 @final
-class _Memory(Mapping[str, Any]):
+class _CouplingMemory(Mapping[str, Any]):
     """Memory of a coupling after a sample; written down only where a journal asks, which is before the next."""
 
     __slots__ = ("_count", "_of")
@@ -117,9 +117,9 @@ class Coupling:
         For `ephs.simulate`.
     """
 
-    def __init__(self, exchange: "Exchange", joined: Mapping[str, _Joined], signals: Mapping[str, Place], kept: bool):
+    def __init__(self, exchange: "Exchange", joined: Mapping[str, _Joined], signals: Mapping[str, WireEnd], kept: bool):
         self._of, self._joined, self._signals = exchange, joined, signals
-        self._balances = {name: Balance(one.taken, one.given, kept) for name, one in joined.items()}
+        self._balances = {name: PortBalance(one.taken, one.given, kept) for name, one in joined.items()}
         self._together: Together | None = None
         self._count, self._values, self._integrals = 0, dict[str, float](), dict[str, float]()
         self._times: list[float] = []
@@ -149,7 +149,7 @@ class Coupling:
                 if memory["count"] != self._count or self._together is None:
                     self._restore(memory)
                 self._go_on(t, state)
-            return self._values[name], _Memory(self, self._count)
+            return self._values[name], _CouplingMemory(self, self._count)
 
         return sample
 
@@ -158,17 +158,19 @@ class Coupling:
         self._count, self._times = 1, []
         self._made = {name: [] for name in self._joined}
         measured = {name: number(one.measured(t, state), name) for name, one in self._joined.items()}
-        held = {Place(one.place.unit, one.port.input): one.taken * measured[name] for name, one in self._joined.items()}
+        held = {
+            WireEnd(one.place.unit, one.port.input): one.taken * measured[name] for name, one in self._joined.items()
+        }
         together.begin(t, state, held)
         for name, one in self._joined.items():
-            self._balances[name].begin(measured[name], together.value(Place(one.place.unit, one.port.output)))
+            self._balances[name].begin(measured[name], together.value(WireEnd(one.place.unit, one.port.output)))
         self._read(t, state)
 
     def _go_on(self, t: float, state: Any) -> None:
         together = self._together
         assert together is not None
         h = t - together.t
-        held: dict[Place, float] = {}
+        held: dict[WireEnd, float] = {}
         displacements: dict[str, float] = {}
         before = {name: self._integral_of_unit(one) for name, one in self._joined.items()}
         for name, one in self._joined.items():
@@ -176,10 +178,10 @@ class Coupling:
             if one.integral is not None:
                 whole = number(one.integral(t, state), name) - self._integrals[name]
             taken, displacements[name] = self._balances[name].moved(h, number(one.measured(t, state), name), whole)
-            held[Place(one.place.unit, one.port.input)] = taken
+            held[WireEnd(one.place.unit, one.port.input)] = taken
         together.step(t, held)
         for name, one in self._joined.items():
-            y = together.value(Place(one.place.unit, one.port.output))
+            y = together.value(WireEnd(one.place.unit, one.port.output))
             start, end = before[name], self._integral_of_unit(one)
             whole = None if start is None or end is None else end - start
             self._made[name].append(self._balances[name].returned(h, y, whole, displacements[name]))
@@ -190,7 +192,7 @@ class Coupling:
 
     def _integral_of_unit(self, one: _Joined) -> float | None:
         assert self._together is not None
-        return None if one.port.integral is None else self._together.value(Place(one.place.unit, one.port.integral))
+        return None if one.port.integral is None else self._together.value(WireEnd(one.place.unit, one.port.integral))
 
     def _read(self, t: float, state: Any) -> None:
         assert self._together is not None
@@ -226,7 +228,7 @@ class Coupling:
 def coupling_of(exchange: "Exchange", targets: "Mapping[str, str | Bond]", balanced: bool) -> Coupling:
     """Couple an exchange to a system; see `Exchange.couple`."""
     joined: dict[str, _Joined] = {}
-    signals: dict[str, Place] = {}
+    signals: dict[str, WireEnd] = {}
     for name, given in targets.items():
         text = given.port if isinstance(given, Bond) else given
         place = place_of(text, exchange.units)

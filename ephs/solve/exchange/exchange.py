@@ -12,7 +12,7 @@ from ephs.solve.exchange.coupling import Bond, Coupling, coupling_of
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.together import Together
 from ephs.solve.exchange.unit import Unit
-from ephs.solve.exchange.wires import Place, Source, place_of, sources_of, starting_order
+from ephs.solve.exchange.wires import Source, WireEnd, place_of, sources_of, starting_order
 
 SLIVER = 1e-9
 """Tolerance for times, as a fraction of a period."""
@@ -57,9 +57,9 @@ class Exchange:
     period: float
     wires: Mapping[str, Any] = field(default_factory=dict[str, Any])
     initial: Mapping[str, float] = field(default_factory=dict[str, float])
-    sources: Mapping[Place, Place | Source] = field(init=False, repr=False)
-    order: tuple[Place, ...] = field(init=False, repr=False)
-    starts: Mapping[Place, float] = field(init=False, repr=False)
+    sources: Mapping[WireEnd, WireEnd | Source] = field(init=False, repr=False)
+    order: tuple[WireEnd, ...] = field(init=False, repr=False)
+    starts: Mapping[WireEnd, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         period = number_of("period", self.period)
@@ -73,7 +73,7 @@ class Exchange:
                 if round(ratio) < 1 or abs(ratio - round(ratio)) > SLIVER * ratio:
                     expected = f"a multiple of the step of unit {name!r}, {unit.step!r} s"
                     raise ExchangeError("period", found=self.period, expected=expected)
-        starts: dict[Place, float] = {}
+        starts: dict[WireEnd, float] = {}
         for text, value in self.initial.items():
             place = place_of(text, self.units)
             self.units[place.unit].variable(place.name, "initial", "output")

@@ -47,10 +47,10 @@ class Running:
         if self._three:
             from fmpy.fmi3 import fmi3LogMessageCallback
 
-            def said(_environment: Any, _status: int, _category: bytes, message: bytes | None) -> None:
+            def log_message(_environment: Any, _status: int, _category: bytes, message: bytes | None) -> None:
                 told.append((message or b"").decode("utf-8", "replace"))
 
-            self._slave.instantiate(logMessage=fmi3LogMessageCallback(said))
+            self._slave.instantiate(logMessage=fmi3LogMessageCallback(log_message))
         else:
             from fmpy import calloc, free
             from fmpy.fmi2 import (

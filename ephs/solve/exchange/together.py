@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.running import Running
-from ephs.solve.exchange.wires import Place
+from ephs.solve.exchange.wires import WireEnd
 from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -29,9 +29,9 @@ class Together:
     def __init__(self, exchange: "Exchange") -> None:
         self._of, self.t = exchange, 0.0
         self._units = {name: Running(name, unit) for name, unit in exchange.units.items()}
-        self.places = [Place(name, output) for name, unit in exchange.units.items() for output in unit.outputs]
+        self.places = [WireEnd(name, output) for name, unit in exchange.units.items() for output in unit.outputs]
 
-    def begin(self, t: float, state: Any, held: Mapping[Place, float]) -> None:
+    def begin(self, t: float, state: Any, held: Mapping[WireEnd, float]) -> None:
         """Initialise them at a time, in the order of their outputs' dependencies."""
         self.t, of = t, self._of
         for unit in self._units.values():
@@ -39,13 +39,13 @@ class Together:
         self._set({**self._functions(state), **held})
         for target in of.order:
             source = of.sources[target]
-            assert isinstance(source, Place)
+            assert isinstance(source, WireEnd)
             value = of.starts[source] if source in of.starts else self.value(source)
             self._set({target: value})
         for unit in self._units.values():
             unit.ready()
 
-    def step(self, t: float, held: Mapping[Place, float]) -> None:
+    def step(self, t: float, held: Mapping[WireEnd, float]) -> None:
         """Go on to a time."""
         self._set(held)
         for unit in self._units.values():
@@ -57,21 +57,21 @@ class Together:
         wired = {target: self.value(source) for target, source in self._wired()}
         self._set({**self._functions(state), **wired})
 
-    def _wired(self) -> list[tuple[Place, Place]]:
-        return [(target, source) for target, source in self._of.sources.items() if isinstance(source, Place)]
+    def _wired(self) -> list[tuple[WireEnd, WireEnd]]:
+        return [(target, source) for target, source in self._of.sources.items() if isinstance(source, WireEnd)]
 
-    def _functions(self, state: Any) -> dict[Place, float]:
-        out: dict[Place, float] = {}
+    def _functions(self, state: Any) -> dict[WireEnd, float]:
+        out: dict[WireEnd, float] = {}
         for target, source in self._of.sources.items():
-            if not isinstance(source, Place):
+            if not isinstance(source, WireEnd):
                 out[target] = number(source(self.t, state), f"wire to {target}") if callable(source) else source
         return out
 
-    def _set(self, values: Mapping[Place, float]) -> None:
+    def _set(self, values: Mapping[WireEnd, float]) -> None:
         for name, unit in self._units.items():
             unit.set({place.name: value for place, value in values.items() if place.unit == name})
 
-    def value(self, place: Place) -> float:
+    def value(self, place: WireEnd) -> float:
         """An output now."""
         return self._units[place.unit].get([place.name])[0]
 

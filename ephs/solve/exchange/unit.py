@@ -44,7 +44,7 @@ SECOND = Measure("s", (0, 0, 1, 0, 0, 0, 0))
 
 @final
 @dataclass(frozen=True, slots=True)
-class Variable:
+class UnitVariable:
     """A variable of a unit: ``kind`` is its type in FMI, ``measure`` None where the file gives no unit."""
 
     name: str
@@ -105,7 +105,7 @@ class Unit:
 
     file: Path
     description: Any
-    variables: Mapping[str, Variable]
+    variables: Mapping[str, UnitVariable]
     feeds: Mapping[str, tuple[str, ...]]
     ports: Mapping[str, PowerPort]
     start: Mapping[str, float]
@@ -126,7 +126,7 @@ class Unit:
         """Whether its state can be saved and restored."""
         return bool(self.description.coSimulation.canSerializeFMUstate)
 
-    def variable(self, name: str, where: str, *causalities: str) -> Variable:
+    def variable(self, name: str, where: str, *causalities: str) -> UnitVariable:
         """One real variable of one of some causalities.
 
         Raises
@@ -217,11 +217,11 @@ def _measure(of: Any) -> Measure:
     return Measure(of.name, tuple(int(getattr(base, name)) for name in BASES), float(base.factor), float(base.offset))
 
 
-def _variable(of: Any, measures: Mapping[str, Measure]) -> Variable:
+def _variable(of: Any, measures: Mapping[str, Measure]) -> UnitVariable:
     name = of.unit or (of.declaredType.unit if of.declaredType is not None else None)
     measure = None if name is None else measures.get(name, Measure(name))
     kind = "an array" if of.dimensions else of.type
-    return Variable(of.name, of.valueReference, of.causality or "local", kind, measure)
+    return UnitVariable(of.name, of.valueReference, of.causality or "local", kind, measure)
 
 
 def _port(unit: Unit, where: str, words: Mapping[str, str]) -> PowerPort:
@@ -251,7 +251,7 @@ def _port(unit: Unit, where: str, words: Mapping[str, str]) -> PowerPort:
     return PowerPort(input.name, output.name, effort.name, None if integral is None else integral.name)
 
 
-def _told(variable: Variable) -> str:
+def _told(variable: UnitVariable) -> str:
     return f"{variable.name} in {variable.measure.name if variable.measure else 'no unit'}"
 
 

@@ -16,7 +16,7 @@ Source = float | Callable[[float, Any], Any]
 
 @final
 @dataclass(frozen=True, slots=True, order=True)
-class Place:
+class WireEnd:
     """A variable, or a power port, of a unit of an exchange."""
 
     unit: str
@@ -26,7 +26,7 @@ class Place:
         return f"{self.unit}.{self.name}"
 
 
-def place_of(text: str, units: Mapping[str, Unit]) -> Place:
+def place_of(text: str, units: Mapping[str, Unit]) -> WireEnd:
     """Place of ``unit.name``; names within units may have dots.
 
     Raises
@@ -38,10 +38,10 @@ def place_of(text: str, units: Mapping[str, Unit]) -> Place:
     if unit not in units:
         known = ", ".join(units)
         raise ExchangeError("unit", found=unit, expected=known, near=nearest_of(unit, units))
-    return Place(unit, name)
+    return WireEnd(unit, name)
 
 
-def sources_of(units: Mapping[str, Unit], wires: Mapping[str, Any]) -> dict[Place, Place | Source]:
+def sources_of(units: Mapping[str, Unit], wires: Mapping[str, Any]) -> dict[WireEnd, WireEnd | Source]:
     """Source of each wired input.
 
     Raises
@@ -49,7 +49,7 @@ def sources_of(units: Mapping[str, Unit], wires: Mapping[str, Any]) -> dict[Plac
     ExchangeError
         An end of a wire is not there, or they do not fit.
     """
-    found: dict[Place, Place | Source] = {}
+    found: dict[WireEnd, WireEnd | Source] = {}
     for text, given in wires.items():
         target = place_of(text, units)
         variable = units[target.unit].variable(target.name, f"wire to {text}", "input")
@@ -77,8 +77,8 @@ def sources_of(units: Mapping[str, Unit], wires: Mapping[str, Any]) -> dict[Plac
 
 
 def starting_order(
-    units: Mapping[str, Unit], sources: Mapping[Place, Place | Source], initial: Mapping[Place, float]
-) -> tuple[Place, ...]:
+    units: Mapping[str, Unit], sources: Mapping[WireEnd, WireEnd | Source], initial: Mapping[WireEnd, float]
+) -> tuple[WireEnd, ...]:
     """Inputs that read outputs, each after those that its output depends on at the same instant.
 
     Raises
@@ -86,19 +86,19 @@ def starting_order(
     ExchangeError
         A loop of them.
     """
-    order: list[Place] = []
-    done: set[Place] = set()
+    order: list[WireEnd] = []
+    done: set[WireEnd] = set()
 
-    def visit(target: Place, above: tuple[Place, ...]) -> None:
+    def visit(target: WireEnd, above: tuple[WireEnd, ...]) -> None:
         source = sources.get(target)
-        if target in done or not isinstance(source, Place):
+        if target in done or not isinstance(source, WireEnd):
             return
         if target in above:
             around = (*above[above.index(target) :], target)
             raise ExchangeError("loop", found=" <- ".join(f"{each} <- {sources[each]}" for each in around[:-1]))
         if source not in initial:
             for name in units[source.unit].feeds.get(source.name, ()):
-                visit(Place(source.unit, name), (*above, target))
+                visit(WireEnd(source.unit, name), (*above, target))
         done.add(target)
         order.append(target)
 

@@ -22,7 +22,7 @@ WHOLE = 1.0
 """The same of semi-implicit steps: an estimate of low order misses surfaces that meet at a step's end."""
 
 
-class Account(Record):
+class RunAccount(Record):
     """Energy account of a run.
 
     Attributes
@@ -70,7 +70,7 @@ def stretch(on: Evaluator, share: Real) -> Real:
     return share / (1.0 + on.sqrt(on.maximum(1.0 + share, 0.0)))
 
 
-def worth(on: Evaluator, account: Account, share: Real = WORTH) -> Real:
+def worth(on: Evaluator, account: RunAccount, share: Real = WORTH) -> Real:
     """Return the error of the last tried step by a share of its correction, less the remainder of earlier ones."""
     short = account.moved + account.rest
     own = on.maximum(on.absolute(short - account.left) - account.noise, 0.0) / on.maximum(on.absolute(short), TINY)

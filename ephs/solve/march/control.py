@@ -8,7 +8,7 @@ from typing import Any, TypeAlias, final
 
 from ephs.semantics.stage import PLAIN, Evaluator, Integer, Real, Truth
 from ephs.solve.control import SLIVER, Symmetric
-from ephs.solve.march.records import Control
+from ephs.solve.march.records import MarchControl
 from ephs.solve.snapshot import Snapshot
 
 DAMPING, STRICT, NEAR = 0.4, 30.0, 0.93
@@ -28,7 +28,7 @@ def _power(on: Evaluator, x: Real, exponent: Real) -> Real:
     return on.exp(exponent * on.log(x))
 
 
-def length(on: Evaluator, control: Control, rest: Real) -> Real:
+def length(on: Evaluator, control: MarchControl, rest: Real) -> Real:
     """Return the length of the next try, with ``rest`` remaining: on the grid, or without a tiny last step."""
     h, grid = control.step, control.grid
     free = on.select(rest <= 1.0000001 * h, rest, 0.5 * rest)
@@ -38,7 +38,7 @@ def length(on: Evaluator, control: Control, rest: Real) -> Real:
     return on.select(grid > 0.0, fixed, free)
 
 
-def judge(on: Evaluator, control: Control, h: Real, error: Real, hold: float = 1.0) -> Integer:
+def judge(on: Evaluator, control: MarchControl, h: Real, error: Real, hold: float = 1.0) -> Integer:
     """Return 1 where a step is accepted, else 0; write the length of the next one, or of the next try, to `step`.
 
     With ``hold`` above 1 a step that may grow by less than this factor stays as it is, since its matrices are
@@ -75,7 +75,7 @@ def judge(on: Evaluator, control: Control, h: Real, error: Real, hold: float = 1
     return on.select(good, 1, 0)
 
 
-def held_back(on: Evaluator, control: Control) -> Truth:
+def held_back(on: Evaluator, control: MarchControl) -> Truth:
     """Tell whether stability, whose limit is `limit`, has held back enough steps."""
     over = control.stiff > control.limit
     held = on.select(over, control.held + 1, control.held)
@@ -108,7 +108,7 @@ class Proportional:
         self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, hold: float = 1.0
     ) -> None:
         self._exponent, self._share, self._hold = exponent, share, hold
-        self._control: Any = Control.table(1)[0]
+        self._control: Any = MarchControl.table(1)[0]
         self._control.before, self._control.most_step = 1e-4, BEYOND
         self._control.damping, self._control.strict = DAMPING, STRICT
 

@@ -2,7 +2,7 @@
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
-from ephs.solve.march.records import Control, Motion
+from ephs.solve.march.records import MarchControl, Motion
 
 
 def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
@@ -12,7 +12,7 @@ def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
 
 @staged
 def evaluate(
-    on: Evaluator, motion: Motion, control: Control, base: Vector, y: Vector, q: Vector, out: Vector
+    on: Evaluator, motion: Motion, control: MarchControl, base: Vector, y: Vector, q: Vector, out: Vector
 ) -> Integer:
     """Evaluate the rates at base·exp(v) and count it; return a status."""
     control.evaluations = control.evaluations + 1

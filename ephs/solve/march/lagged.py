@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
 from ephs.solve.march.evaluating import combine
-from ephs.solve.march.records import Control, Motion, Tableau
+from ephs.solve.march.records import MarchControl, Motion, TableauRecord
 
 
 class Lagged(ABC):
@@ -52,9 +52,19 @@ class Lagged(ABC):
 
 @staged
 def stage(
-    on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
-    lagged: Lagged, i: Integer, y: Vector, q: Vector,
-) -> Integer:  # fmt: skip
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    control: MarchControl,
+    base: Vector,
+    start: Vector,
+    h: Real,
+    k: Matrix,
+    lagged: Lagged,
+    i: Integer,
+    y: Vector,
+    q: Vector,
+) -> Integer:
     """Evaluate a stage into its row of k; return a status."""
     nv, n, status, known = motion.increments, motion.freedoms, on.counter(0), on.same(lagged.again[i], 1)
 
@@ -84,9 +94,17 @@ def stage(
 
 
 def end(
-    on: Evaluator, motion: Motion, tableau: Tableau, base: Vector, start: Vector, h: Real, k: Matrix, lagged: Lagged,
-    y: Vector, q: Vector,
-) -> None:  # fmt: skip
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    base: Vector,
+    start: Vector,
+    h: Real,
+    k: Matrix,
+    lagged: Lagged,
+    y: Vector,
+    q: Vector,
+) -> None:
     """Write the step's end to y and q."""
     count = tableau.a.columns
     combine(on, tableau.a.row(count), count, h, k, start, y)
@@ -95,17 +113,26 @@ def end(
 
 @staged
 def lag(
-    on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
-    lagged: Lagged, y: Vector, q: Vector,
-) -> Integer:  # fmt: skip
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    control: MarchControl,
+    base: Vector,
+    start: Vector,
+    h: Real,
+    k: Matrix,
+    lagged: Lagged,
+    y: Vector,
+    q: Vector,
+) -> Integer:
     """Evaluate the stages after the first, and write the step's end to y and q; return a status."""
     at, status = on.counter(1), on.counter(0)
 
-    def one() -> Truth:
+    def once() -> Truth:
         status.value = stage(on, motion, tableau, control, base, start, h, k, lagged, at.value, y, q)
         at.value = at.value + 1
         return on.either(on.negate(on.same(status.value, 0)), at.value >= tableau.a.columns)
 
-    on.repeat(one)
+    on.repeat(once)
     end(on, motion, tableau, base, start, h, k, lagged, y, q)
     return status.value

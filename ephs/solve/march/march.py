@@ -6,12 +6,12 @@ from typing import final
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
-from ephs.solve.march.account import WHOLE, WORTH, Account, worth
+from ephs.solve.march.account import WHOLE, WORTH, RunAccount, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
-from ephs.solve.march.records import Control, Ending, Motion, Status, Tableau
+from ephs.solve.march.records import Ending, MarchControl, Motion, Status, TableauRecord
 from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
 from ephs.solve.march.stiff import Stiff
 
@@ -22,9 +22,16 @@ ROUNDING = 16.0 * 2.220446049250313e-16
 
 
 def march(
-    on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, control: Control, account: Account, steps: Integer,
-    stiff: Stiff | None = None, lagged: Lagged | None = None,
-) -> Integer:  # fmt: skip
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    memory: Memory,
+    control: MarchControl,
+    account: RunAccount,
+    steps: Integer,
+    stiff: Stiff | None = None,
+    lagged: Lagged | None = None,
+) -> Integer:
     """Take steps from the state in (memory.q, memory.y) until the end, or ``steps`` of them.
 
     With memory for that, steps are implicit, their stages by Newton's method, or semi-implicit.
@@ -36,32 +43,32 @@ def march(
     Integer
         An `Ending`.
     """
-    run = _Run(
+    run = _TrialStep(
         on, motion, tableau, memory, control, account, stiff, lagged, on.counter(GOING), on.counter(0), on.counter(0)
     )
     tries = on.counter(0)
 
-    def one() -> Truth:
+    def once() -> Truth:
         run.step()
         tries.value = tries.value + 1
         return on.either(run.ended, tries.value >= steps)
 
-    on.when(steps > 0, lambda: on.repeat(one))
+    on.when(steps > 0, lambda: on.repeat(once))
     reached = on.select(control.time >= on.absolute(control.end), int(Ending.DONE), int(Ending.PAUSED))
     return on.select(run.ended, run.ending.value, reached)
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Run:
+class _TrialStep:
     """A trial step and its outcome; `ending` is the march's status."""
 
     on: Evaluator
     motion: Motion
-    tableau: Tableau
+    tableau: TableauRecord
     memory: Memory
-    control: Control
-    account: Account
+    control: MarchControl
+    account: RunAccount
     stiff: Stiff | None
     lagged: Lagged | None
     ending: Variable[Integer]
@@ -92,16 +99,16 @@ class _Run:
         on, c = self.on, self.control
         rest = on.absolute(c.end) - c.time
 
-        def go() -> None:
+        def go_on() -> None:
             h = c.tried = length(on, c, rest)
             on.when(on.same(c.fresh, 0), self._begin)
             self.unless_ended(self._refresh)
             self.unless_ended(lambda: self._try(h, rest))
 
-        def look() -> None:
-            on.when(c.rows >= self.memory.rows_t.rows, lambda: self.end(Ending.FULL), go)
+        def check_rest() -> None:
+            on.when(c.rows >= self.memory.rows_t.rows, lambda: self.end(Ending.FULL), go_on)
 
-        on.when(rest <= 0.0, lambda: self.end(Ending.DONE), look)
+        on.when(rest <= 0.0, lambda: self.end(Ending.DONE), check_rest)
 
     def _begin(self) -> None:
         """Evaluate the rates at the state."""
@@ -140,12 +147,12 @@ class _Run:
             self.lagged,
         )  # fmt: skip
 
-        def look() -> None:
+        def estimate_error() -> None:
             allow(on, motion, m.errors, m.y, m.y1)
             if self.lagged is None:
                 c.stiff = stiffness_of(on, motion, self.tableau, m, h)
 
-        on.when(self.sound, look)
+        on.when(self.sound, estimate_error)
         totals = Totals(m.y, m.y1, m.carry, m.carry1, m.change, m.size, m.whole, m.low)
         error = self._finish(m.k, self.sign * h, m.q1, totals, part=False)
 
@@ -190,7 +197,7 @@ class _Run:
         def keep_books() -> None:
             self.status.value = book(on, motion, self.tableau, k, h, totals, self.account.anchor, part, damped)
 
-        def settle() -> None:
+        def settle_end() -> None:
             if motion.closes:
                 copy(on, y.part(nv, n), m.open)
             self.status.value = motion.settle(on, m.q, y, q)
@@ -217,7 +224,7 @@ class _Run:
             on.when(self.sound, weigh)
 
         on.when(self.sound, keep_books)
-        on.when(self.sound, settle)
+        on.when(self.sound, settle_end)
         on.when(self.sound, measure)
         # A step that will be refused needs no correction.
         right = on.either(c.grid > 0.0, error.value <= 1.0)
@@ -288,7 +295,7 @@ class _Run:
             moved = self.account.moved
             on.when(kept, lambda: self._keep(wanted, least, moved, m.q2, m.y2), lambda: self.end(Ending.CAREFUL))
 
-        def one() -> Truth:
+        def once() -> Truth:
             wanted = m.times[c.saved]
 
             def keep() -> None:
@@ -306,7 +313,7 @@ class _Run:
             on.when(due, keep)
             return on.either(on.either(on.negate(due), self.ended), c.saved >= m.times.size)
 
-        on.when(c.saved < m.times.size, lambda: on.repeat(one))
+        on.when(c.saved < m.times.size, lambda: on.repeat(once))
 
     def _go(self, h: Real, after: Real, least: Real) -> None:
         """Make the step's end the state."""

@@ -11,15 +11,25 @@ from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, stage
 from ephs.solve.march.evaluating import evaluate, place
 from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
-from ephs.solve.march.records import Control, Motion, Status, Tableau
+from ephs.solve.march.records import MarchControl, Motion, Status, TableauRecord
 from ephs.solve.march.stiff import Solver, Stiff, whole
 
 
 @staged
 def newton(
-    on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, h: Real, k: Matrix,
-    errors: Errors, stiff: Stiff, y: Vector, q: Vector,
-) -> Integer:  # fmt: skip
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    control: MarchControl,
+    base: Vector,
+    start: Vector,
+    h: Real,
+    k: Matrix,
+    errors: Errors,
+    stiff: Stiff,
+    y: Vector,
+    q: Vector,
+) -> Integer:
     """Solve the stages of a step of length h from (base, start), k[0] known; their rates go to k.
 
     Returns
@@ -27,19 +37,19 @@ def newton(
     Integer
         A status: `Status.UNSETTLED` where the iteration does not converge.
     """
-    run = _Newton(on, motion, control, start, h, k, stiff)
+    run = _NewtonParts(on, motion, control, start, h, k, stiff)
     n = stiff.newton[0]
     status, moved = on.counter(0), on.variable(0.0)
     on.when(on.negate(on.absolute(n.factored - h) <= 0.0), Solver(on, stiff, h).factorise)
     clear(on, whole(stiff.stages))
 
     def stage(i: Integer) -> None:
-        def look() -> None:
+        def check_size() -> None:
             run.place(i, y)
             motion.warm(on, start, y)
             status.value = evaluate(on, motion, control, base, y, q, k.row(i + 1))
 
-        on.when(on.same(status.value, 0), look)
+        on.when(on.same(status.value, 0), check_size)
 
     def rest(i: Integer) -> None:
         copy(on, k.row(0), k.row(i + 1))
@@ -49,10 +59,10 @@ def newton(
         # The stages begin at the start of the step, whose rates are known.
         begins = on.same(tries, 1)
         on.when(begins, lambda: on.loop(stiff.stages.rows, rest), lambda: on.loop(stiff.stages.rows, stage))
-        on.when(on.same(status.value, 0), go)
+        on.when(on.same(status.value, 0), solve_once)
         return moved.value
 
-    def go() -> None:
+    def solve_once() -> None:
         run.solve()
         moved.value = run.size(errors, y)
         run.move()
@@ -70,9 +80,16 @@ def newton(
 
 @staged
 def filtered(
-    on: Evaluator, motion: Motion, tableau: Tableau, control: Control, base: Vector, start: Vector, k: Matrix,
-    errors: Errors, stiff: Stiff,
-) -> Real:  # fmt: skip
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    control: MarchControl,
+    base: Vector,
+    start: Vector,
+    k: Matrix,
+    errors: Errors,
+    stiff: Stiff,
+) -> Real:
     """Return the error of a step relative to the tolerance, by the embedded method, of order ``stages``.
 
     The difference is filtered by the equations, as its stiff part must be; where it is too large, once more from where
@@ -82,11 +99,11 @@ def filtered(
     worst, solver = on.variable(0.0), Solver(on, stiff, n.factored)
 
     def estimate(first: Vector) -> None:
-        def one(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             m[j] = first[j]
             on.loop(stiff.stages.rows, lambda i: _add(m, j, tableau.error[i + 1] * k[i + 1, j]))
 
-        on.loop(m.size, one)
+        on.loop(m.size, each_entry)
         solver.one()
         worst.value = 0.0
 
@@ -114,12 +131,12 @@ def _add(x: Vector, j: Integer, by: Real) -> None:
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Newton:
+class _NewtonParts:
     """The parts of an iteration."""
 
     on: Evaluator
     motion: Motion
-    control: Control
+    control: MarchControl
     start: Vector
     h: Real
     k: Matrix
@@ -199,10 +216,10 @@ class _Newton:
         """Rates that lead to the stages, of all that is not summed: these are those of the stages."""
 
         def stage(i: Integer) -> None:
-            def one(j: Integer) -> None:
+            def each_entry(j: Integer) -> None:
                 self.k[i + 1, j] = self._led(i, j)
 
-            self.on.loop(self.motion.summed, one)
+            self.on.loop(self.motion.summed, each_entry)
 
         self.on.loop(self.stiff.stages.rows, stage)
 

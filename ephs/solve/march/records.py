@@ -16,7 +16,7 @@ from ephs.semantics.stage import (
     integer,
     real,
 )
-from ephs.solve.march.account import Account
+from ephs.solve.march.account import RunAccount
 
 
 class Ending(IntEnum):
@@ -128,12 +128,12 @@ class Motion(ABC):
         """Put a part's sums between those of a shorter part of the step and those of the whole."""
 
     @abstractmethod
-    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+    def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:
         """Make the account's anchor that of a state; return a status."""
 
     @abstractmethod
     def correct(
-        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
+        self, on: Evaluator, account: RunAccount, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
     ) -> Integer:
         """Move the end (q, y) of a step of h seconds to its remaining energy; return a status."""
 
@@ -152,7 +152,7 @@ class Motion(ABC):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Tableau:
+class TableauRecord:
     """Coefficients of a Runge-Kutta method whose first stage is the step's start.
 
     Attributes
@@ -171,7 +171,7 @@ class Tableau:
     eighth: Annotated[Integers, 1]
 
 
-class Control(Record):
+class MarchControl(Record):
     """Present state of a march, and the choice of its steps. Times are counted from the start and grow.
 
     Attributes

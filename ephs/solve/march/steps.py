@@ -22,7 +22,7 @@ from ephs.solve.march.evaluating import combine, evaluate, place
 from ephs.solve.march.lagged import Lagged, lag
 from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
-from ephs.solve.march.records import Control, Motion, Status, Tableau
+from ephs.solve.march.records import MarchControl, Motion, Status, TableauRecord
 from ephs.solve.march.stiff import Stiff
 
 DRIFT = 1e-2
@@ -35,7 +35,7 @@ stage's drift has a part along the motion that the embedded formula misses. Trie
 
 
 @staged
-def first(on: Evaluator, motion: Motion, memory: Memory, control: Control) -> Integer:
+def first(on: Evaluator, motion: Motion, memory: Memory, control: MarchControl) -> Integer:
     """Evaluate the rates at the state into the first row of k; return a status."""
     return evaluate(on, motion, control, memory.q, memory.y, memory.q1, memory.k.row(0))
 
@@ -44,8 +44,8 @@ def first(on: Evaluator, motion: Motion, memory: Memory, control: Control) -> In
 def attempt(
     on: Evaluator,
     motion: Motion,
-    tableau: Tableau,
-    control: Control,
+    tableau: TableauRecord,
+    control: MarchControl,
     base: Vector,
     start: Vector,
     h: Real,
@@ -73,7 +73,7 @@ def attempt(
     count = tableau.a.columns
     stage, status = on.counter(1), on.counter(0)
 
-    def one() -> Truth:
+    def once() -> Truth:
         i = stage.value
         combine(on, tableau.a.row(i), i, h, k, start, y)
         on.when(on.same(i, count - 1), lambda: copy(on, y, last))
@@ -88,14 +88,21 @@ def attempt(
         status.value = newton(on, motion, tableau, control, base, start, h, k, errors, stiff, y, q)
         copy(on, y, last)
         stage.value = count
-    on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(one))
+    on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(once))
     return status.value
 
 
 def book(
-    on: Evaluator, motion: Motion, tableau: Tableau, k: Matrix, h: Real, totals: Totals, anchor: Real, hold: Truth,
+    on: Evaluator,
+    motion: Motion,
+    tableau: TableauRecord,
+    k: Matrix,
+    h: Real,
+    totals: Totals,
+    anchor: Real,
+    hold: Truth,
     q: Vector | None = None,
-) -> Integer:  # fmt: skip
+) -> Integer:
     """Sum what a step of length h with rates k adds to heats and totals; return a status.
 
     What the last row of a tableau weighs are h Σ b k. ``hold`` where the step is a part of one whose sums are known.
@@ -105,7 +112,7 @@ def book(
     at, count = motion.summed, tableau.a.columns
     nothing = motion.rounding(on, anchor, totals.start)
 
-    def one(j: Integer) -> None:
+    def each_entry(j: Integer) -> None:
         total, size, most = on.variable(0.0), on.variable(0.0), on.variable(0.0)
 
         def add(s: Integer) -> None:
@@ -145,7 +152,7 @@ def book(
     def grow(j: Integer) -> None:
         totals.end[at + j], totals.after[j] = grown(totals.start[at + j], totals.before[j], totals.change[j])
 
-    on.loop(totals.change.size, one)
+    on.loop(totals.change.size, each_entry)
     on.when(hold, part, entire)
     status = motion.book(on, totals.start, totals.change, totals.size, on.select(h >= 0.0, 1.0, -1.0))
     on.loop(totals.change.size, grow)
@@ -156,10 +163,10 @@ def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vec
     """Write what errors of a step from ``start`` to ``end`` may be, atol + rtol · size, to ``allowed``."""
     motion.sizes(on, start, end, errors.allowed)
 
-    def one(j: Integer) -> None:
+    def each_entry(j: Integer) -> None:
         errors.allowed[j] = errors.atol[j] + errors.rtol[j] * errors.allowed[j]
 
-    on.loop(motion.counted, one)
+    on.loop(motion.counted, each_entry)
 
 
 def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:
@@ -184,7 +191,9 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
 
 
 @staged
-def error_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, k: Matrix, h: Real, q: Vector) -> Real:
+def error_of(
+    on: Evaluator, motion: Motion, tableau: TableauRecord, memory: Memory, k: Matrix, h: Real, q: Vector
+) -> Real:
     """Return the size of the estimates of a step with rates k that ends at q, relative to the tolerance."""
     m, blended = memory, tableau.eighth[0] > 0
     _estimate(on, motion, tableau.error, k, h, q, m.fine)
@@ -200,13 +209,13 @@ def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth
     two, size = eighth[0] > 0, allowed.size
     first, second = on.variable(0.0), on.variable(0.0)
 
-    def one(j: Integer) -> None:
+    def each_entry(j: Integer) -> None:
         x = fine[j] / allowed[j]
         first.value = first.value + x * x
         y = coarse[j] / allowed[j]
         second.value = on.select(two, second.value + y * y, 0.0)
 
-    on.loop(size, one)
+    on.loop(size, each_entry)
     count = on.real(on.select(size > 1, size, 1))
     both = first.value / on.sqrt((first.value + 0.01 * second.value) * count)
     return on.select(on.both(two, on.negate(first.value <= 0.0)), both, on.sqrt(first.value / count))
@@ -216,11 +225,11 @@ def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real
     """Return the error shown by closing: DRIFT of the change of the rates, relative to their tolerance."""
     n, total = after.size, on.variable(0.0)
 
-    def one(j: Integer) -> None:
+    def each_entry(j: Integer) -> None:
         x = (after[j] - before[j]) / allowed[n + j]
         total.value = total.value + x * x
 
-    on.loop(n, one)
+    on.loop(n, each_entry)
     return DRIFT * on.sqrt(total.value / on.real(on.select(n > 1, n, 1)))
 
 
@@ -231,27 +240,27 @@ def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real
     """
     above, along = on.variable(0.0), on.variable(0.0)
 
-    def one(j: Integer) -> None:
+    def each_entry(j: Integer) -> None:
         x, y = rise[j] / allowed[j], run[j] / allowed[j]
         above.value, along.value = above.value + x * x, along.value + y * y
 
-    on.loop(allowed.size, one)
+    on.loop(allowed.size, each_entry)
     return on.select(along.value > 0.0, on.absolute(h) * on.sqrt(above.value / along.value), 0.0)
 
 
-def stiffness_of(on: Evaluator, motion: Motion, tableau: Tableau, memory: Memory, h: Real) -> Real:
+def stiffness_of(on: Evaluator, motion: Motion, tableau: TableauRecord, memory: Memory, h: Real) -> Real:
     """Return the stiffness by the last two stages; their differences overwrite the memory of estimates."""
     count, m = tableau.a.columns, memory
 
-    def one(j: Integer) -> None:
+    def each_entry(j: Integer) -> None:
         at = place(on, motion, j)
         m.fine[j], m.coarse[j] = m.k[count, at] - m.k[count - 1, at], m.y1[at] - m.last[at]
 
-    on.loop(motion.counted, one)
+    on.loop(motion.counted, each_entry)
     return stiffness(on, m.fine, m.coarse, m.allowed, h)
 
 
-def _judge(on: Evaluator, control: Table[Control], h: Real, error: Real) -> Integer:
+def _judge(on: Evaluator, control: Table[MarchControl], h: Real, error: Real) -> Integer:
     return judge(on, control[0], h, error)
 
 

@@ -117,7 +117,7 @@ def whole(x: Matrix) -> Vector:
 
 @final
 @dataclass(frozen=True, slots=True)
-class _System:
+class _ShiftedSystem:
     """μ/h − J of an eigenvalue μ, of all numbers or of the freedoms alone; a real one, or both parts of a complex one.
 
     Attributes
@@ -159,17 +159,17 @@ class Solver:
         self.one()
         self.on.loop(self.stiff.newton[0].pairs, lambda pair: self._solve(pair, 2))
 
-    def _each(self, size: Integer, do: Callable[[_System], None]) -> None:
+    def _each(self, size: Integer, do: Callable[[_ShiftedSystem], None]) -> None:
         do(self._system(0, 1, size))
         self.on.loop(self.stiff.newton[0].pairs, lambda pair: do(self._system(pair, 2, size)))
 
-    def _system(self, pair: Integer, count: int, size: Integer) -> _System:
+    def _system(self, pair: Integer, count: int, size: Integer) -> _ShiftedSystem:
         """The real one, of which count is 1, or that of a pair."""
         s, m = self.stiff, self.stiff.matrix.rows
         first = 0 if count == 1 else 2 * pair + 1
         place = 0 if count == 1 else (pair + 1) * m
         held, rows = s.factors, [first + k for k in range(count)]
-        return _System(
+        return _ShiftedSystem(
             [Matrix(held.cells, held.start + row * (m * m), size, size) for row in rows],
             s.swaps.part(place, size), s.ends.part(place, size), [s.parts.row(row) for row in rows],
             [s.values[row] / self.h for row in rows],
@@ -183,14 +183,14 @@ class Solver:
             lambda: self._solved(whole, whole.parts),
         )  # fmt: skip
 
-    def _solved(self, system: _System, parts: list[Vector]) -> None:
+    def _solved(self, system: _ShiftedSystem, parts: list[Vector]) -> None:
         envelope_solve(self.on, system.factors, system.swaps, system.ends, parts)
 
     def _whole(self) -> None:
         """Write and factorise the matrices of all numbers."""
         on, s = self.on, self.stiff
 
-        def one(system: _System) -> None:
+        def each_row(system: _ShiftedSystem) -> None:
             def row(i: Integer) -> None:
                 def entry(j: Integer) -> None:
                     for k, x in enumerate(system.factors):
@@ -203,13 +203,13 @@ class Solver:
             on.loop(s.matrix.rows, row)
             envelope_lu(on, system.factors, system.swaps, system.ends)
 
-        self._each(s.matrix.rows, one)
+        self._each(s.matrix.rows, each_row)
 
     def _of_freedoms(self) -> None:
         """Write and factorise the matrices of the freedoms."""
         on, s, n = self.on, self.stiff, self.stiff.damping.rows
 
-        def one(system: _System) -> None:
+        def each_row(system: _ShiftedSystem) -> None:
             def row(i: Integer) -> None:
                 def entry(j: Integer) -> None:
                     for k, (x, by) in enumerate(zip(system.factors, system.by, strict=True)):
@@ -222,9 +222,9 @@ class Solver:
             on.loop(n, row)
             envelope_lu(on, system.factors, system.swaps, system.ends)
 
-        self._each(n, one)
+        self._each(n, each_row)
 
-    def _by_freedoms(self, system: _System) -> None:
+    def _by_freedoms(self, system: _ShiftedSystem) -> None:
         """Solve for (δv, δr, δs) in place of (f_v, f_r, f_s)."""
         on, s, n, by, parts = self.on, self.stiff, self.stiff.damping.rows, system.by, system.parts
         right = [s.right.part(k * n, n) for k in range(len(parts))]

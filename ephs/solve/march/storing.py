@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
-from ephs.solve.march.account import BEYOND, MOST, ROUNDING, Account
+from ephs.solve.march.account import BEYOND, MOST, ROUNDING, RunAccount
 
 ROUNDS = 8
 """Iterations."""
@@ -45,7 +45,7 @@ class Missing(ABC):
     """
 
     on: Evaluator
-    account: Account
+    account: RunAccount
     target: Real
     energies: Vector
     status: Variable[Integer]
@@ -120,7 +120,7 @@ def store(run: Missing, x: Moved) -> None:
     whole = on.variable(slope + more)
     run.look(x.states)
     within = on.both(whole.value > 0.0, on.absolute(run.short) <= FARTHEST * whole.value)
-    on.when(within, lambda: _go(run, x, whole))
+    on.when(within, lambda: _newton_along(run, x, whole))
 
 
 def _even(on: Evaluator, x: Moved) -> None:
@@ -153,7 +153,7 @@ def _energies(run: Missing, x: Moved) -> Vector:
     """Return the changes (4,) of the energy forwards and backwards along both directions; BEYOND without one."""
     on, here, found = run.on, run.on.variable(run.energy), run.on.scratch(4)
 
-    def one(k: Integer) -> None:
+    def each_entry(k: Integer) -> None:
         sign = on.select(on.either(on.same(k, 0), on.same(k, 2)), 1.0, -1.0)
 
         def place(j: Integer) -> None:
@@ -165,7 +165,7 @@ def _energies(run: Missing, x: Moved) -> Vector:
         sound = on.both(on.same(run.status.value, 0), on.absolute(change) < BEYOND)
         found[k] = on.select(sound, change, BEYOND)
 
-    on.loop(4, one)
+    on.loop(4, each_entry)
     run.status.value = 0
     return found
 
@@ -181,7 +181,7 @@ def _weigh(run: Missing, found: Vector, which: int) -> tuple[Real, Real]:
     return ratio, ratio * slope
 
 
-def _go(run: Missing, x: Moved, whole: Variable[Real]) -> None:
+def _newton_along(run: Missing, x: Moved, whole: Variable[Real]) -> None:
     """Move along a direction by Newton's method, no further than chosen steps may."""
     on, account = run.on, run.account
     total, count, first = on.variable(0.0), on.variable(0.0), on.variable(run.short)
@@ -197,10 +197,10 @@ def _go(run: Missing, x: Moved, whole: Variable[Real]) -> None:
     rounds = on.counter(0)
 
     def shift(by: Real) -> None:
-        def one(k: Integer) -> None:
+        def each_entry(k: Integer) -> None:
             x.states[k] = x.states[k] + by * x.along[k]
 
-        on.loop(x.along.size, one)
+        on.loop(x.along.size, each_entry)
 
     def once() -> Truth:
         short, known = on.variable(run.short), [on.variable(run.energies[k]) for k in range(3)]

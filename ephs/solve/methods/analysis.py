@@ -57,16 +57,16 @@ def entries_at(model: Model, x: Array, z: Array, h: float, tried: int = AT_START
     as in alignment.
     """
 
-    def found(h: float) -> Array:
+    def entries_over(h: float) -> Array:
         status, component, memory = evaluate_at(model, x, z, h)
         if status:
             raise SolveError.of_component(status, model, component)
         return memory.data
 
-    values = found(h)
+    values = entries_over(h)
     if tried != AT_START:
         return values, values
-    return values, np.where(np.isin(model.tables.row, model.constraint_rows), found(0.0), values)
+    return values, np.where(np.isin(model.tables.row, model.constraint_rows), entries_over(0.0), values)
 
 
 def dependent_rows(

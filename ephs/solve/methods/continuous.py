@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.errors import SolveError
 from ephs.solve.methods.records import STORING
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Evaluation, Model, cancelled
 
 
@@ -38,7 +38,7 @@ class Matrices:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Instant:
+class AccumulatorRates:
     """Rates of the accumulators at one instant.
 
     Parameters
@@ -84,7 +84,7 @@ class Continuous:
 
     def guess(self, x: Array) -> Array:
         """Unknowns from which to begin: the storages' efforts."""
-        return Stored(self.model).efforts(x)
+        return StoredEnergies(self.model).efforts(x)
 
     def residual(self, x: Array, z: Array, inputs: Array) -> Array:
         """g(x, z), (n,).
@@ -118,12 +118,12 @@ class Continuous:
         unknowns[t.row.size - n + empty] = 1.0  # no equation: the multiplier stays
         return Matrices(whole(unknowns), whole(states))
 
-    def instant(self, x: Array, z: Array, inputs: Array) -> Instant:
+    def instant(self, x: Array, z: Array, inputs: Array) -> AccumulatorRates:
         """Powers and energies at (x, z)."""
         self._evaluate(x, z, 0.0, inputs)
         m = self._memory
         energies = np.where(self.model.tables.kind == STORING, m.energy, 0.0)  # ledgers write to unused memory
-        return Instant(self._evaluation.ledgers(1.0), m.flows.copy(), z, energies)
+        return AccumulatorRates(self._evaluation.ledgers(1.0), m.flows.copy(), z, energies)
 
     def _evaluate(self, x: Array, z: Array, h: float, inputs: Array, weight: float | None = None) -> None:
         status, component = self._evaluation.at(x, z, h, inputs, weight)

@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.methods.conduction import ConductionMatrix
-from ephs.solve.methods.continuous import Continuous, Instant, Matrices
+from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.solvers import DENSE
 from ephs.solve.methods.stores import HeatStores
@@ -93,10 +93,12 @@ class EnergyEquations:
         states = states - _diagonal(rates * bend)
         return Matrices(found.unknowns, states if self.conduction is None else states - self._conducting)
 
-    def instants(self, ys: Array, zs: Array, inputs: Array) -> list[Instant]:
+    def instants(self, ys: Array, zs: Array, inputs: Array) -> list[AccumulatorRates]:
         """Powers and energies at stages (y, z), those of conduction aside; the unknowns are those by states."""
         if self.linear:
-            none = Instant(np.zeros(4 + self._components), np.zeros(0), np.zeros(0), np.zeros(self._components))
+            none = AccumulatorRates(
+                np.zeros(4 + self._components), np.zeros(0), np.zeros(0), np.zeros(self._components)
+            )
             return [none] * len(ys)
         xs = self.stores.entropies(ys)
         if self.stores.warm.size and not isinstance(self.within, Integral):

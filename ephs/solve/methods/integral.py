@@ -29,14 +29,14 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.errors import SolveError
 from ephs.solve.layout import LINEAR
-from ephs.solve.methods.continuous import Continuous, Instant, Matrices
+from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
 from ephs.solve.methods.places import Part, add_to
 from ephs.solve.methods.records import (
     COMPONENT,
     REVERSIBLE,
     STORING,
     Columns,
-    Outer,
+    OuterPort,
     Scratch,
     parts_of,
     row_of,
@@ -82,9 +82,9 @@ def rates(
     efforts = z.part(n_rate, place.size)
 
     def outer(i: Integer, k: Integer, *, before: bool) -> None:
-        port, first = row_of(Outer, t.outer, i), t.input_at[i]
+        port, first = row_of(OuterPort, t.outer, i), t.input_at[i]
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             def effort() -> None:
                 if before:
                     efforts[port.at + j] = inputs[k, first + j]
@@ -97,7 +97,7 @@ def rates(
 
             on.when(on.same(port.prescribed, 1), effort, flow)
 
-        on.loop(port.dim, one)
+        on.loop(port.dim, each_freedom)
 
     def stage(k: Integer) -> None:
         x = xs.row(k)
@@ -235,7 +235,7 @@ class Integral:
         balance = csr_array(flows @ slopes + reads)
         return Matrices(csc_array(eye_array(x.size)), csc_array(balance[self._effort - self.unknowns]))
 
-    def instant(self, x: Array, z: Array, inputs: Array) -> Instant:
+    def instant(self, x: Array, z: Array, inputs: Array) -> AccumulatorRates:
         """Powers and energies at x."""
         self.rates(x[None], inputs[None])
         t, m = self.model.tables, self._memory
@@ -244,7 +244,7 @@ class Integral:
         energies[self._calls[0]] = m.energy[self._calls[0]]
         self._sums[:], self._given[: inputs.size] = 0.0, inputs
         self._account()
-        return Instant(self._sums.copy(), m.flows.copy(), self._z.copy(), energies)
+        return AccumulatorRates(self._sums.copy(), m.flows.copy(), self._z.copy(), energies)
 
     def _parts(self, found: Matrices) -> tuple[csr_array, csr_array, csr_array]:
         """∂e/∂x, and of the flows at balances ∂/∂e and ∂/∂x."""

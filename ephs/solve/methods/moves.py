@@ -3,7 +3,7 @@
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector, staged
-from ephs.solve.methods.records import Columns, State, row_of
+from ephs.solve.methods.records import Columns, StateRecord, row_of
 
 
 def tighten(on: Evaluator, q: Vector) -> None:
@@ -25,10 +25,10 @@ def retract(on: Evaluator, code: Integer, x: Vector, v: Vector, out: Vector) -> 
     """x·exp(v) of a group, which may be x's own place."""
 
     def vectors() -> None:
-        def one(i: Integer) -> None:
+        def each_entry(i: Integer) -> None:
             out[i] = x[i] + v[i]
 
-        on.loop(v.size, one)
+        on.loop(v.size, each_entry)
 
     def group(number: int, size: int, dim: int) -> None:
         def point() -> None:
@@ -43,11 +43,11 @@ def retract(on: Evaluator, code: Integer, x: Vector, v: Vector, out: Vector) -> 
         group(number, size, dim)
 
 
-def settle(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v: Vector) -> None:
+def move_states(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v: Vector) -> None:
     """Move all states, in place, by h times their rates; v is scratch for one of them."""
 
     def state(k: Integer) -> None:
-        row = row_of(State, t.states, k)
+        row = row_of(StateRecord, t.states, k)
         point = x.part(row.at, row.size)
 
         def increment(j: Integer) -> None:
@@ -58,4 +58,4 @@ def settle(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v: Vect
         flat = on.either(on.same(row.code, codes.VECTOR), on.same(row.code, codes.SE2))
         on.when(on.negate(flat), lambda: tighten(on, point))
 
-    on.loop(t.states.size // State.integer_width, state)
+    on.loop(t.states.size // StateRecord.integer_width, state)

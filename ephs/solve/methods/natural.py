@@ -36,7 +36,7 @@ from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, 
 from ephs.solve.methods.residuals import FAULTS
 from ephs.solve.methods.scheme import gauss
 from ephs.solve.methods.spread import closing_of, groups_of, memory_of
-from ephs.solve.methods.stored import Stored
+from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Model
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index, order
@@ -165,7 +165,7 @@ class Natural:
         self._decided: Decided | None = None
         self._inputs = self._given(None)
         self._bound: _Loop | None = None
-        self._stored = Stored(model)
+        self._stored = StoredEnergies(model)
 
     def init(self, x: Array) -> NaturalState:
         """The state of the method at the states x; unknowns are guessed from the efforts there."""

@@ -19,7 +19,7 @@ from ephs.semantics.stage import (
     Vector,
 )
 from ephs.solve.methods.guesses import BEFORE, extrapolated, restrain
-from ephs.solve.methods.moves import settle
+from ephs.solve.methods.moves import move_states
 from ephs.solve.methods.places import add_to
 from ephs.solve.methods.records import (
     COMPONENT,
@@ -38,8 +38,8 @@ from ephs.solve.methods.scales import COMMON, FAR, measure
 from ephs.solve.methods.scheme import (
     GroupColumns,
     Node,
-    Place,
     Scheme,
+    StageEntry,
     StageScratch,
     gauss,
 )
@@ -87,7 +87,7 @@ def _assemble(
         on.when(on.same(o.dropped[i], 1), leave)
 
     def entry(k: Integer) -> None:
-        place = row_of(Place, g.where, k)
+        place = row_of(StageEntry, g.where, k)
         i, j, source = place.row, place.column, place.source
 
         def hold() -> None:
@@ -272,7 +272,7 @@ def advance(
         row = outcome[2]
         least.value = 0.0
         _each(on, scheme, book)
-        settle(on, t, x, unit, whole, m.v)
+        move_states(on, t, x, unit, whole, m.v)
         copy(on, x, states.row(row))
 
         def kept(i: Integer) -> None:

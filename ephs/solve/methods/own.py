@@ -20,7 +20,7 @@ from ephs.solve.methods.orders import order_of, power_of
 MOST_STAGES = 64
 
 
-class _Recorded:
+class _RecordedSum:
     """What only adds up and is multiplied by numbers."""
 
     __slots__ = ()
@@ -55,7 +55,7 @@ def _number(value: object) -> float | None:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Combination(_Recorded):
+class Combination(_RecordedSum):
     """A sum of a step's rates times numbers, and times the step's length where it is a change.
 
     Attributes
@@ -118,7 +118,7 @@ class Combination(_Recorded):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class StepLength(_Recorded):
+class StepLength(_RecordedSum):
     """The length of a step, in s, times a number."""
 
     factor: float = 1.0

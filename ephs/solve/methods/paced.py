@@ -17,7 +17,7 @@ from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.model import Model, compile_model
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record, record_of
+from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.snapshot import Snapshot
 from ephs.solve.starting import check_start
 from ephs.solve.stepping import Attempt, Counts, Instant, Instants, Row, Span, Taken
@@ -76,9 +76,9 @@ class Paced:
         """Compile programs that are not in the cache, before timing starts."""
         self.method.prepare(state.inner, h)
 
-    def many(self, span: Span[PacedState]) -> "_Leg | None":
+    def many(self, span: Span[PacedState]) -> "_FixedSteps | None":
         """Constant steps with constant inputs."""
-        return _Leg(self, span, self._step) if self._step is not None and self.problem.constant else None
+        return _FixedSteps(self, span, self._step) if self._step is not None and self.problem.constant else None
 
     def chunk(self, state: PacedState, h: float, steps: int) -> tuple[NaturalState, Chunk]:
         """Up to so many steps of h seconds from a state, in compiled calls where inputs are constant."""
@@ -130,10 +130,10 @@ class Paced:
         """The same state as one to start from: unknowns are guessed afresh."""
         return replace(state, inner=replace(self.method.init(state.kept.x), sums=self._sums(state.kept)))
 
-    def record(self, taken: Instants[PacedState]) -> Record:
+    def record(self, taken: Instants[PacedState]) -> RunRecord:
         """Records of many instants."""
         if isinstance(taken, Taken):
-            return Record(taken.times, *taken.data)
+            return RunRecord(taken.times, *taken.data)
         return record_of(taken, [state.kept for _, state, _ in taken])
 
     def row(self, state: PacedState) -> Row:
@@ -214,7 +214,7 @@ def _taken(times: Array, chunk: Chunk, last: NaturalState) -> Taken[PacedState]:
 
 
 @final
-class _Leg:
+class _FixedSteps:
     """Many constant steps a compiled call, those of full length on the grid of the run."""
 
     left = False

@@ -10,7 +10,7 @@ from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.heats import Heats
 from ephs.solve.methods.conduction import ConductionMatrix
-from ephs.solve.methods.continuous import Instant
+from ephs.solve.methods.continuous import AccumulatorRates
 from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.methods.stores import HeatStores
 from ephs.solve.model import Model
@@ -86,7 +86,7 @@ class Passages:
         """Whether some heat is that of friction, which follows what other states lose."""
         return bool(self._heats.frictions.size)
 
-    def powers(self, found: Instant) -> Array:
+    def powers(self, found: AccumulatorRates) -> Array:
         """(2, passages) power in W and entropy in W/K that go to the stores at an instant, conduction aside."""
         entropies = -found.flows[self._flows]
         return np.array([entropies * (found.unknowns[self._effort] + self._intensive), entropies])

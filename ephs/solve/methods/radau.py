@@ -16,7 +16,7 @@ from ephs.solve.control import Control
 from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.march.iteration import FAST, iterate
 from ephs.solve.methods.collocation import moments, radau_for, values
-from ephs.solve.methods.continuous import Instant, Matrices
+from ephs.solve.methods.continuous import AccumulatorRates, Matrices
 from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
@@ -25,7 +25,7 @@ from ephs.solve.methods.solvers import Solver, Solvers
 from ephs.solve.methods.stores import HeatStores
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
-from ephs.solve.result.record import Record, record_of
+from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.snapshot import Snapshot, like, parts
 from ephs.solve.stepping import Attempt, Instants, Row, Span
 
@@ -67,7 +67,7 @@ class RadauState:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Totals:
+class StepTotals:
     """Powers of a step.
 
     Parameters
@@ -113,7 +113,7 @@ class Radau:
         self._family = Solvers(self.model.unknown_name, self.equations.pivots)
         self._solvers: tuple[float, list[Solver]] | None = None
         self._current: RadauState | None = None
-        self._last: tuple[RadauState, Instant] | None = None
+        self._last: tuple[RadauState, AccumulatorRates] | None = None
 
     def inputs(self, t: float, y: Array) -> Array:
         """Values at the outer ports, one after the other."""
@@ -192,7 +192,7 @@ class Radau:
         """The same state as one to start from, whose rates may be others than before."""
         return replace(state, h=0.0)
 
-    def record(self, taken: Instants[RadauState]) -> Record:
+    def record(self, taken: Instants[RadauState]) -> RunRecord:
         """Records of many instants."""
         noted = [(state.t, *state.account[PUT : TOTAL + 1]) for _, state, _ in taken if state.account.size]
         times, *put = np.array(noted).reshape(-1, 3).T
@@ -250,7 +250,7 @@ class Radau:
             stages, iterations = self._stages(state, h)
         return stages, state.y + h * self.scheme.coefficients[-1] @ stages[:, : self._rates], iterations
 
-    def _totals(self, state: RadauState, h: float, stages: Array) -> Totals:
+    def _totals(self, state: RadauState, h: float, stages: Array) -> StepTotals:
         """Entries of the ledgers at the stages, and the heat that is passed there and at the start."""
         ys = state.y + h * self.scheme.coefficients @ stages[:, : self._rates]
         found = self.equations.instants(ys, stages, self._inputs(state.t + h * self.scheme.nodes, ys))
@@ -258,15 +258,15 @@ class Radau:
         if self._passages.called:
             start = [self._known(state)] if self._passages.frictions else found[:1]
             passed = np.array([self._passages.powers(each) for each in (*start, *found)])
-        return Totals(ys, np.array([each.sums for each in found]), passed)
+        return StepTotals(ys, np.array([each.sums for each in found]), passed)
 
-    def _known(self, state: RadauState) -> Instant:
+    def _known(self, state: RadauState) -> AccumulatorRates:
         """Powers and stored energies at a state."""
         if self._last is None or self._last[0] is not state:
             self._last = state, self._instant(state.t, state.y, state.z)
         return self._last[1]
 
-    def _instant(self, t: float, y: Array, z: Array) -> Instant:
+    def _instant(self, t: float, y: Array, z: Array) -> AccumulatorRates:
         return self.equations.instants(y[None], z[None], self.inputs(t, y)[None])[0]
 
     def _inputs(self, times: Array, ys: Array) -> Array:
@@ -274,7 +274,7 @@ class Radau:
         return np.array([self.inputs(t, y) for t, y in zip(times.tolist(), ys, strict=True)])
 
     def _end(
-        self, state: RadauState, h: float, theta: float, y: Array, z: Array, totals: Totals
+        self, state: RadauState, h: float, theta: float, y: Array, z: Array, totals: StepTotals
     ) -> tuple[RadauState, float]:
         """The state at a part of a step of h seconds, and what its error is by the energy that it missed.
 

@@ -9,7 +9,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, matrix, vector
 from ephs.semantics.stage.kinds import Kind, group
-from ephs.semantics.stage.memory import Held
+from ephs.semantics.stage.memory import HeldCells
 
 DONE, DIVERGED, PIVOT, INCONSISTENT, COMPONENT = 0, 1, 2, 3, 10
 """Outcome of a step: COMPONENT + what a component's kernel returned, see `ephs.semantics.descriptor.kernel_table`."""
@@ -33,7 +33,7 @@ class Dims(Record):
 
 
 @final
-class State(Record):
+class StateRecord(Record):
     """A state: its group, its place and how many numbers it has, the place and number of its rates."""
 
     code = integer()
@@ -44,7 +44,7 @@ class State(Record):
 
 
 @final
-class Outer(Record):
+class OuterPort(Record):
     """An outer port: place and number of its efforts, 1 where they are prescribed, then the place of its flows."""
 
     at = integer()
@@ -77,7 +77,7 @@ class TablesOf(Generic[Whole, Numbers]):
     jacobian, jacobian_at
         Place in the matrix' entries of each entry of a component's Jacobian, −1 where it is structurally zero.
     states
-        (states, 5): `State`.
+        (states, 5): `StateRecord`.
     intensive, entropy
         (efforts,): what turns an exergetic effort into the energy effort; 1 on entropy.
     row, column, template
@@ -88,7 +88,7 @@ class TablesOf(Generic[Whole, Numbers]):
         (rows,): residuals are measured block by block; (blocks,): blocks of one kind, whose scales do not differ
         beyond reason.
     outer, input_at
-        (outer ports, 4): `Outer`; where inputs begin.
+        (outer ports, 4): `OuterPort`; where inputs begin.
     """
 
     counts: Whole
@@ -220,7 +220,7 @@ Elimination: TypeAlias = Annotated[OrderOf[Integers, Vector], kind_of(OrderOf)]
 Scratch: TypeAlias = Annotated[MemoryOf[Vector], kind_of(MemoryOf)]
 
 Row = TypeVar("Row", bound=Record)
-_NO_REALS: Final[Held[Any]] = Held([])
+_NO_REALS: Final[HeldCells[Any]] = HeldCells([])
 
 
 def row_of(record: type[Row], integers: Integers, i: Integer) -> Row:

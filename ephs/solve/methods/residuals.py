@@ -24,7 +24,7 @@ from ephs.solve.methods.records import (
     WORKING,
     Columns,
     Dims,
-    Outer,
+    OuterPort,
     Scratch,
     row_of,
 )
@@ -193,7 +193,7 @@ def _relate(on: Evaluator, part: Part, z: Vector, weight: Real, m: Scratch) -> N
         # a balance of one term, Bᵀλ = 0, has no other scale: the largest multiplier counts
         scale.value = m.scale[balance] + on.absolute(m.f[j])
 
-        def held(q: Integer) -> None:
+        def add_multiplier(q: Integer) -> None:
             scale.value = on.maximum(scale.value, on.absolute(m.jac[j * width + n + q]) * force.value)
 
         def term(q: Integer) -> None:
@@ -202,7 +202,7 @@ def _relate(on: Evaluator, part: Part, z: Vector, weight: Real, m: Scratch) -> N
             size = on.absolute(m.jac[j * width + q] * (z[part.balance(q)] + known))
             scale.value = on.maximum(scale.value, size)
 
-        on.loop(k, held)
+        on.loop(k, add_multiplier)
         on.loop(n, term)  # a flow may be a small difference of large terms: p × v of a body that does not turn
         m.scale[balance] = scale.value
         m.flows[part.e_at + j] = m.f[j]
@@ -225,10 +225,10 @@ def _prescribe(on: Evaluator, t: Columns, z: Vector, inputs: Vector, m: Scratch)
     """Given quantities of outer ports: flows, or efforts whose flows are unknown."""
 
     def port(i: Integer) -> None:
-        outer = row_of(Outer, t.outer, i)
+        outer = row_of(OuterPort, t.outer, i)
         at, unknown, first = t.counts[0] + outer.at, outer.unknown, t.input_at[i]
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             row, given = at + j, inputs[first + j]
 
             def take(flow: Real) -> None:
@@ -242,7 +242,7 @@ def _prescribe(on: Evaluator, t: Columns, z: Vector, inputs: Vector, m: Scratch)
 
             on.when(on.same(outer.prescribed, 1), effort, lambda: take(given))
 
-        on.loop(outer.dim, one)
+        on.loop(outer.dim, each_freedom)
 
     on.loop(t.input_at.size, port)
 
@@ -259,7 +259,7 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
         def produced() -> None:
             part, heat, made = Part.of(t, i), on.variable(0.0), on.variable(0.0)
 
-            def one(j: Integer) -> None:
+            def each_freedom(j: Integer) -> None:
                 effort, flow = part.effort(j), m.flows[part.e_at + j]
 
                 def warm() -> None:
@@ -270,7 +270,7 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
 
                 on.when(t.entropy[effort] > 0.0, warm, work)
 
-            on.loop(part.n, one)
+            on.loop(part.n, each_freedom)
             add_to(sums, 0, h * heat.value)
             add_to(sums, 3, h * made.value)
             add_to(sums, 4 + i, h * made.value)
@@ -280,10 +280,10 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
         def worked() -> None:
             part, work = Part.of(t, i), on.variable(0.0)
 
-            def one(j: Integer) -> None:
+            def each_freedom(j: Integer) -> None:
                 work.value = work.value - z[n_rate + part.effort(j)] * m.flows[part.e_at + j]
 
-            on.loop(part.n, one)
+            on.loop(part.n, each_freedom)
             for place in (1, 2):
                 add_to(sums, place, h * work.value)
             add_to(sums, 4 + i, h * work.value)
@@ -293,9 +293,9 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
         on.when(on.same(t.kind[i], WORKING), worked)
 
     def port(i: Integer) -> None:
-        outer, first = row_of(Outer, t.outer, i), t.input_at[i]
+        outer, first = row_of(OuterPort, t.outer, i), t.input_at[i]
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             effort, at, flow = z[n_rate + outer.at + j], outer.at + j, on.variable(0.0)
 
             def unknown() -> None:
@@ -308,7 +308,7 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
             add_to(sums, 1, h * (effort + t.intensive[at]) * flow.value)
             add_to(sums, 2, h * effort * flow.value)
 
-        on.loop(outer.dim, one)
+        on.loop(outer.dim, each_freedom)
 
     on.loop(t.kind.size, component)
     on.loop(t.input_at.size, port)

@@ -127,7 +127,7 @@ def weigh(on: Evaluator, t: Columns, m: Scratch) -> None:
         least[i] = FAR
 
     def known(entries: Integers) -> None:
-        def one(k: Integer) -> None:
+        def each_entry(k: Integer) -> None:
             entry = entries[k]
             effort, value = t.column[entry] - n_rate, on.absolute(m.data[entry])
 
@@ -136,7 +136,7 @@ def weigh(on: Evaluator, t: Columns, m: Scratch) -> None:
 
             on.when(value > 0.0, lower)
 
-        on.loop(entries.size, one)
+        on.loop(entries.size, each_entry)
 
     def component(i: Integer) -> None:
         def stored() -> None:
@@ -171,7 +171,7 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
         raise_to(on, m.block, block, m.scale[i])
         raise_to(on, m.group, t.group[block], m.scale[i])
 
-    def one(i: Integer) -> None:
+    def each_entry(i: Integer) -> None:
         block = t.block[i]
         scale = on.maximum(m.block[block], SPREAD * m.group[t.group[block]])
         scale = on.maximum(scale, FAINT * m.defect[1])
@@ -193,6 +193,6 @@ def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch)
 
     on.loop(m.residual.size, gather)
     m.defect[1] = on.minimum(m.defect[1], largest.value)
-    on.loop(m.residual.size, one)
+    on.loop(m.residual.size, each_entry)
     m.defect[0] = defect.value
     return worst.value

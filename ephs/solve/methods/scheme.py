@@ -79,7 +79,7 @@ class Node(Record):
 
 
 @final
-class Place(Record):
+class StageEntry(Record):
     """An entry of the system of all stages: stages of its row and column, entry of the model's matrix.
 
     Its source is −1 − row where it holds the place of a row.
@@ -103,7 +103,7 @@ class GroupsOf(Generic[Whole, Numbers]):
     node, entry
         (nodes, 4): `Node`; (nodes, stages²): its places in the system of all stages.
     where
-        (entries, 3): `Place`.
+        (entries, 3): `StageEntry`.
     """
 
     velocity: Whole

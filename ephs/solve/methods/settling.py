@@ -17,7 +17,7 @@ from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Table, Vector
 from ephs.solve.errors import SolveError
-from ephs.solve.march.account import ROUNDING, Account, rounding, worth
+from ephs.solve.march.account import ROUNDING, RunAccount, rounding, worth
 from ephs.solve.march.noted import Noted
 from ephs.solve.march.storing import Missing, Moved, store
 from ephs.solve.methods.places import Part
@@ -26,10 +26,10 @@ from ephs.solve.methods.residuals import FAULTS, called
 from ephs.solve.model import Model
 
 ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY = range(6)
-"""Numbers of a state's account: those of `Account`; the heat in J that went to stores of heat, and its rounding."""
+"""Numbers of a state's account: those of `RunAccount`; the heat in J that went to stores of heat, and its rounding."""
 
 
-def _held(
+def _stored_energies(
     on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, states: Vector, out: Vector
 ) -> Integer:
     """Write the energy in J of all storages, zero, and the sum of its terms' sizes to out (3,).
@@ -61,37 +61,37 @@ def _held(
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Network(Missing):
+class _StorageNetwork(Missing):
     """The energy of storages."""
 
     given: tuple[Columns, Vector, Vector, Vector, Scratch]
 
     def look(self, states: Vector) -> None:
-        self.status.value = _held(self.on, *self.given, states, self.energies)
+        self.status.value = _stored_energies(self.on, *self.given, states, self.energies)
 
     @staticmethod
     def of(
-        on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[Account],
+        on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[RunAccount],
         states: Vector, work: Real, heat: Real,
-    ) -> "_Network":  # fmt: skip
+    ) -> "_StorageNetwork":  # fmt: skip
         """What states miss of the energy that work and heat in J leave to them, with its rounding in the account."""
         a, given = account[0], (t, weights, z, scal, m)
-        run = _Network(on, a, a.anchor + (work - heat), on.scratch(3), on.counter(0), False, given)
+        run = _StorageNetwork(on, a, a.anchor + (work - heat), on.scratch(3), on.counter(0), False, given)
         run.look(states)
         a.noise, a.rest = rounding(on, a.anchor, work, heat) + ROUNDING * run.energies[2], run.short
         return run
 
 
 def missed(
-    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[Account],
+    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[RunAccount],
     states: Vector, work: Real, heat: Real,
 ) -> Integer:  # fmt: skip
     """Write the energy that states miss, and its rounding, to the account; return 0, or status + FAULTS · storage."""
-    return _Network.of(on, t, weights, z, scal, m, account, states, work, heat).status.value
+    return _StorageNetwork.of(on, t, weights, z, scal, m, account, states, work, heat).status.value
 
 
 def settled(
-    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[Account],
+    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[RunAccount],
     states: Vector, start: Vector, along: Vector, beside: Vector, trial: Vector, allowed: Vector, free: Vector,
     work: Real, heat: Real,
 ) -> Integer:  # fmt: skip
@@ -99,7 +99,7 @@ def settled(
 
     The account's ``size`` becomes the step's error by that, in tolerances.
     """
-    a, run = account[0], _Network.of(on, t, weights, z, scal, m, account, states, work, heat)
+    a, run = account[0], _StorageNetwork.of(on, t, weights, z, scal, m, account, states, work, heat)
     a.moved, a.size = 0.0, 0.0
     store(run, Moved(states, start, along, beside, trial, allowed, lambda k: free[k]))
     a.rest = run.short
@@ -143,7 +143,7 @@ class Settling:
                 weights[state.point] = model.reference.intensive(state.quantity) if environment else 0.0
         self.active = bool(self._free.any())
         tables = replace(model.only(counted).tables, address=model.resting(counted)[counted])
-        self._account = Account.table(1)
+        self._account = RunAccount.table(1)
         given = (
             parts_of(tables), weights, np.zeros(model.unknowns), model.scal(0.0), parts_of(model.memory()),
             self._account,

@@ -26,7 +26,7 @@ from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Tru
 from ephs.solve.methods.corrections import bend, correct_joints, correct_storages
 from ephs.solve.methods.moves import retract, somewhere
 from ephs.solve.methods.places import Part
-from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, State, row_of
+from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, StateRecord, row_of
 from ephs.solve.methods.residuals import evaluated
 from ephs.solve.methods.scales import rest
 from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
@@ -96,7 +96,7 @@ def linearise(
     fault, zero, mean_at = on.counter(0), on.counter(0).value, somewhere(on, s.mean)
 
     def state(k: Integer) -> None:
-        row = row_of(State, t.states, k)
+        row = row_of(StateRecord, t.states, k)
         rate, dim = row.rate, row.dim
         exponents(on, scheme, row.code, h, z, rate, dim, s.v, rate, s.whole.part(rate, dim), s.turn)
 
@@ -127,7 +127,7 @@ def linearise(
 
         on.when(on.negate(on.same(row.code, codes.VECTOR)), exponent)
 
-    on.loop(t.states.size // State.integer_width, state)
+    on.loop(t.states.size // StateRecord.integer_width, state)
     on.loop(n_rate, mean_rate)
     on.loop(n, mean, start=n_rate)
     on.loop(g.velocity.size // Velocity.integer_width, velocity)

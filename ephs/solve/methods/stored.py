@@ -12,7 +12,7 @@ from ephs.solve.model import Evaluation, Model
 
 
 @final
-class Stored:
+class StoredEnergies:
     """Energies and efforts of a model's storages. It keeps memory: use one for each thread."""
 
     def __init__(self, model: Model) -> None:

@@ -43,7 +43,7 @@ _LEDGERS = {
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Variable:
+class DatasetVariable:
     """An array over time, with what its other axes count.
 
     Parameters
@@ -72,7 +72,7 @@ class Variable:
         return {"units": self.units, "long_name": self.says}
 
     @classmethod
-    def of(cls, values: Array, labels: Labels, says: str) -> "Variable":
+    def of(cls, values: Array, labels: Labels, says: str) -> "DatasetVariable":
         """Variable of a state's values."""
         axes = ((labels.dimension, labels.names),) if values.ndim > 1 else ()
         return cls(values, labels.unit, says, axes)
@@ -84,7 +84,7 @@ class Content:
     """A solution as arrays over time: variables by name, instants in s, attributes."""
 
     t: Array
-    variables: dict[str, Variable]
+    variables: dict[str, DatasetVariable]
     attributes: dict[str, Any]
 
     @property
@@ -125,17 +125,23 @@ def dataset(solution: "Solution", *, wrenches: bool = True) -> "xr.Dataset":
     return xr.Dataset(entries, coordinates, found.attributes)
 
 
-def _variables(solution: "Solution") -> Iterable[tuple[str, Variable]]:
+def _variables(solution: "Solution") -> Iterable[tuple[str, DatasetVariable]]:
     for path, values in solution.states.items():
-        yield f"state:{path}", Variable.of(values, solution.labels[path], f"state at {path}")
+        yield f"state:{path}", DatasetVariable.of(values, solution.labels[path], f"state at {path}")
     for name, values in _totals(solution.ledgers):
         group, _, path = name.partition(":")
         units, says = _LEDGERS[group]
-        yield name, Variable(values, units, f"{says} of {path}" if path else says)
-    yield "energy", Variable(solution.energy, "J", "energy of everything")
-    yield "energy_error", Variable(solution.energy_error, "1", "relative defect of the energy balance")
-    yield "constraint_error", Variable(solution.constraint_error, "m, rad", "largest position residual of a joint")
-    yield "velocity_error", Variable(solution.velocity_error, "m/s, rad/s", "largest velocity residual of a joint")
+        yield name, DatasetVariable(values, units, f"{says} of {path}" if path else says)
+    yield "energy", DatasetVariable(solution.energy, "J", "energy of everything")
+    yield "energy_error", DatasetVariable(solution.energy_error, "1", "relative defect of the energy balance")
+    yield (
+        "constraint_error",
+        DatasetVariable(solution.constraint_error, "m, rad", "largest position residual of a joint"),
+    )
+    yield (
+        "velocity_error",
+        DatasetVariable(solution.velocity_error, "m/s, rad/s", "largest velocity residual of a joint"),
+    )
     yield from ((f"input:{path}", variable) for path, variable in solution.inputs.items())
 
 
@@ -148,14 +154,16 @@ def _totals(ledgers: Ledgers) -> Iterable[tuple[str, Array]]:
             yield entry.name, value
 
 
-def sampled_inputs(problem: Problem, t: Array, state: Callable[[int], State]) -> dict[Path, Variable]:
+def sampled_inputs(problem: Problem, t: Array, state: Callable[[int], State]) -> dict[Path, DatasetVariable]:
     """Prescribed values at each outer port, at some instants; ``state(i)`` gives the states that inputs read."""
-    out: dict[Path, Variable] = {}
+    out: dict[Path, DatasetVariable] = {}
     states = [state(i) for i in range(t.size)] if not problem.constant else [{}] * t.size
     for slot in problem.descriptor.outer:
         if (signal := problem.signals.get(slot.path)) is not None:
             labels = power_labels(slot.quantity, effort=signal.effort)
             rows = [signal.at(float(time), now) for time, now in zip(t, states, strict=True)]
             values = np.array(rows, dtype=float).reshape(t.size, slot.quantity.space.dim)
-            out[slot.path] = Variable.of(values, labels, f"{'effort' if signal.effort else 'flow'} at {slot.path}")
+            out[slot.path] = DatasetVariable.of(
+                values, labels, f"{'effort' if signal.effort else 'flow'} at {slot.path}"
+            )
     return out

@@ -19,12 +19,12 @@ def durable(path: Path) -> Generator[Path, None, None]:
         with open(temporary, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
-        settle(path.parent)
+        sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def settle(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Flush the entries of a folder to the disk."""
     if os.name == "posix":
         handle = os.open(folder, os.O_RDONLY)

@@ -21,7 +21,7 @@ from ephs.solve.result.ledger import Ledgers
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Entry:
+class LedgerEntry:
     """The ledger of a component or subsystem, (n,) each.
 
     Parameters
@@ -51,7 +51,7 @@ class Entry:
     destroyed: Array
     defect: Array
     exergy_defect: Array
-    parts: Mapping[str, "Entry"] = field(default_factory=dict[str, "Entry"])
+    parts: Mapping[str, "LedgerEntry"] = field(default_factory=dict[str, "LedgerEntry"])
 
     @property
     def energy_supplied(self) -> Array:
@@ -105,7 +105,7 @@ class Entry:
         return tuple(change(values) for values in ledgers)
 
 
-def entry_of(ledgers: Ledgers, path: Path) -> Entry | None:
+def entry_of(ledgers: Ledgers, path: Path) -> LedgerEntry | None:
     """Entry of a component or subsystem, None where no ledger exists at or below the path."""
     leaves = {leaf: entry for leaf, entry in _leaves(ledgers).items() if path.is_prefix_of(leaf)}
     if not leaves:
@@ -119,25 +119,25 @@ def entry_of(ledgers: Ledgers, path: Path) -> Entry | None:
     return replace(found, defect=energy, exergy_defect=exergy)
 
 
-def _tree(path: Path, leaves: Mapping[Path, Entry]) -> Entry:
+def _tree(path: Path, leaves: Mapping[Path, LedgerEntry]) -> LedgerEntry:
     if path in leaves:
         return leaves[path]
-    below: dict[str, dict[Path, Entry]] = {}
+    below: dict[str, dict[Path, LedgerEntry]] = {}
     for leaf, entry in leaves.items():
         below.setdefault(next(iter(leaf.relative_to(path))), {})[leaf] = entry
     parts = {name: _tree(path / Path((name,)), inner) for name, inner in below.items()}
     names = ("energy", "exergy", "entropy", "volume", "momentum", "made", "destroyed", "defect", "exergy_defect")
     sums = {name: reduce(np.add, [getattr(part, name) for part in parts.values()]) for name in names}
-    return Entry(path, **sums, parts=parts)
+    return LedgerEntry(path, **sums, parts=parts)
 
 
-def _leaves(ledgers: Ledgers) -> dict[Path, Entry]:
+def _leaves(ledgers: Ledgers) -> dict[Path, LedgerEntry]:
     n = ledgers.heat.size
     nothing = np.zeros(n)
-    out: dict[Path, Entry] = {}
+    out: dict[Path, LedgerEntry] = {}
     for path in dict.fromkeys([*ledgers.storages, *ledgers.makers]):
         made = ledgers.makers.get(path, nothing)
-        out[path] = Entry(
+        out[path] = LedgerEntry(
             path,
             ledgers.storages.get(path, nothing),
             ledgers.exergies.get(path, nothing),

@@ -12,7 +12,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.problem import Problem
-from ephs.solve.result.dataset import FORMAT, TIME, Content, Variable, content
+from ephs.solve.result.dataset import FORMAT, TIME, Content, DatasetVariable, content
 from ephs.solve.result.durable import durable
 from ephs.solve.result.guard import MOST, name_for_file, name_from_file
 from ephs.solve.result.labels import Labels, labels_of
@@ -81,7 +81,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
     states = groups.get("state", {})
     inputs = {
-        path: Variable.of(each.values, each.labels, str(each.attributes["long_name"]))
+        path: DatasetVariable.of(each.values, each.labels, str(each.attributes["long_name"]))
         for path, each in groups.get("input", {}).items()
     }
     model, temperature = attributes["model"], float(attributes["reference_temperature"])

@@ -11,7 +11,7 @@ from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 
 STILL = 1e-9
 """Least fraction of the energies that counts as exchanged, above the rounding of systems at rest."""
@@ -111,7 +111,7 @@ class Ledgers:
         return np.sum([e - e[0] for e in energies], axis=0)  # differences first: a sum of large energies would round
 
 
-def ledgers(problem: Problem, record: Record) -> Ledgers:
+def ledgers(problem: Problem, record: RunRecord) -> Ledgers:
     """Ledgers of a run's records."""
     n = record.t.size
     reference = problem.reference

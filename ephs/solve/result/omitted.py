@@ -13,9 +13,9 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.problem import Problem
-from ephs.solve.result.dataset import Content, Variable
+from ephs.solve.result.dataset import Content, DatasetVariable
 from ephs.solve.result.ledger import Ledgers, ledgers
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -51,7 +51,7 @@ def shortened(solution: "Solution", found: Content) -> Content:
             del variables[f"state:{path}"]
     if rest:
         axes = ("relative pose component", AXES), ("relative pose", tuple(map(str, rest)))
-        variables[REST] = Variable(np.stack(list(rest.values()), axis=2), "rad, rad, rad, m, m, m", SAYS, axes)
+        variables[REST] = DatasetVariable(np.stack(list(rest.values()), axis=2), "rad, rad, rad, m, m, m", SAYS, axes)
     return replace(found, variables=variables)
 
 
@@ -79,7 +79,7 @@ def with_zeros(found: Ledgers, problem: Problem, n: int) -> Ledgers:
     d, zero = problem.descriptor, np.zeros(n)
     zero.flags.writeable = False
     shape = ledgers(
-        problem, Record(np.zeros(0), np.zeros((0, d.point_size)), np.zeros((0, len(d.components))), _NOTHING)
+        problem, RunRecord(np.zeros(0), np.zeros((0, d.point_size)), np.zeros((0, len(d.components))), _NOTHING)
     )
     books = {
         field.name: {path: getattr(found, field.name).get(path, zero) for path in book}

@@ -13,7 +13,7 @@ from ephs.solve.stepping import Instants, Row
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Record:
+class RunRecord:
     """The kept rows of a run.
 
     Parameters
@@ -42,9 +42,9 @@ class Record:
         ]
 
 
-def record_of(taken: Instants[Any], rows: Sequence[Row]) -> Record:
+def record_of(taken: Instants[Any], rows: Sequence[Row]) -> RunRecord:
     """Rows of states that were taken: times, states, and the least production in the step before each."""
-    return Record(
+    return RunRecord(
         np.array([t for t, _, _ in taken]),
         np.array([row.x for row in rows]),
         np.array([row.energies for row in rows]),
@@ -52,34 +52,34 @@ def record_of(taken: Instants[Any], rows: Sequence[Row]) -> Record:
     )
 
 
-def joined(records: Sequence[Record]) -> Record | None:
+def joined(records: Sequence[RunRecord]) -> RunRecord | None:
     """One after the other as one; None of none."""
     if len(records) < 2:
         return records[0] if records else None
-    return Record(*(np.concatenate([getattr(r, f.name) for r in records]) for f in fields(Record)))
+    return RunRecord(*(np.concatenate([getattr(r, f.name) for r in records]) for f in fields(RunRecord)))
 
 
 @final
-class Rows:
+class RowBlocks:
     """Recorded instants in blocks, and the number of those in the journal."""
 
     def __init__(self) -> None:
-        self._blocks: list[Record] = []
+        self._blocks: list[RunRecord] = []
         self._written = 0
 
-    def add(self, record: Record, *, written: bool = False) -> None:
+    def add(self, record: RunRecord, *, written: bool = False) -> None:
         """Another block."""
         self._blocks.append(record)
         if written:
             self._written = len(self._blocks)
 
-    def fresh(self) -> Record | None:
+    def fresh(self) -> RunRecord | None:
         """Instants since the last call."""
         found = joined(self._blocks[self._written :])
         self._written = len(self._blocks)
         return found
 
-    def whole(self, descriptor: Descriptor) -> Record:
+    def whole(self, descriptor: Descriptor) -> RunRecord:
         """Everything."""
         empty = np.zeros((0, descriptor.point_size)), np.zeros((0, len(descriptor.components))), np.zeros((0, 5))
-        return joined(self._blocks) or Record(np.zeros(0), *empty)
+        return joined(self._blocks) or RunRecord(np.zeros(0), *empty)

@@ -7,7 +7,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.ending import solution_of
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 from ephs.solve.result.solution import Solution
 from ephs.solve.stepping import Row
 
@@ -15,7 +15,7 @@ from ephs.solve.stepping import Row
 def replay(problem: Problem, t: Array, rows: Sequence[Row], remark: str) -> Solution:
     """The solution of what is kept at the times t; ``remark`` stands for the method."""
     size, count = problem.descriptor.point_size, len(problem.descriptor.components)
-    record = Record(
+    record = RunRecord(
         np.asarray(t, dtype=float),
         np.array([row.x for row in rows]).reshape(-1, size),
         np.array([row.energies for row in rows]).reshape(-1, count),

@@ -14,9 +14,9 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.events import Crossing
-from ephs.solve.problem import Linked, Motion, Problem
-from ephs.solve.result.dataset import Variable, sampled_inputs
-from ephs.solve.result.entries import Entry, entry_of
+from ephs.solve.problem import Linked, MechanicalMotion, Problem
+from ephs.solve.result.dataset import DatasetVariable, sampled_inputs
+from ephs.solve.result.entries import LedgerEntry, entry_of
 from ephs.solve.result.labels import Labels
 from ephs.solve.result.ledger import Ledgers
 
@@ -65,7 +65,7 @@ class Solution:
         stats: Mapping[str, Any],
         problem: Problem | None,
         labels: Mapping[Path, Labels],
-        inputs: Mapping[Path, Variable] | None = None,
+        inputs: Mapping[Path, DatasetVariable] | None = None,
         audited: Callable[[], Audit] | None = None,
     ) -> None:
         self.name, self.t, self.states, self.ledgers = name, t, states, ledgers
@@ -132,7 +132,7 @@ class Solution:
         return Audit() if self._audited is None else self._audited()
 
     @cached_property
-    def inputs(self) -> Mapping[Path, Variable]:
+    def inputs(self) -> Mapping[Path, DatasetVariable]:
         """Prescribed values at each outer port, with names and units: ``.values`` (n, d)."""
         if self._inputs is not None or self.problem is None:
             return self._inputs or {}
@@ -208,7 +208,7 @@ class Solution:
         return None if self.problem is None else self.problem.scene
 
     @cached_property
-    def motion(self) -> Motion | None:
+    def motion(self) -> MechanicalMotion | None:
         """The motion in the terms of mechanics, None for a system that is not a scene."""
         return None if self.problem is None or self.problem.motion is None else self.problem.motion(self)
 
@@ -279,7 +279,7 @@ class Solution:
         motion = self.body(body)
         return motion.position + motion.rotation @ np.asarray(xyz, dtype=float)
 
-    def ledger(self, path: str | Path = ROOT) -> Entry:
+    def ledger(self, path: str | Path = ROOT) -> LedgerEntry:
         """The ledger of a component, a subsystem, or everything; ``.parts`` are the ledgers one level below.
 
         Raises
@@ -375,7 +375,7 @@ class Solution:
 
         return animate(self, path, **options)
 
-    def _moving(self, what: str) -> Motion:
+    def _moving(self, what: str) -> MechanicalMotion:
         if self.motion is None:
             read = "states are read as sol['path'], temperatures as sol.temperature('path')"
             raise TypeError(f"{self.name} is not a scene, it has no {what}; {read}")

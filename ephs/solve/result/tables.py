@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from ephs.semantics.systems.markup import table
 
 if TYPE_CHECKING:
-    from ephs.solve.result.entries import Entry
+    from ephs.solve.result.entries import LedgerEntry
     from ephs.solve.result.solution import Solution
 
 
@@ -27,7 +27,7 @@ def solution_table(solution: "Solution") -> str:
     return table(f"Solution of {solution.name}", (), rows)
 
 
-def ledger_table(entry: "Entry") -> str:
+def ledger_table(entry: "LedgerEntry") -> str:
     """A ledger with those one level below."""
     (_, *head), (_, *units), *rows = entry.rows()
     words = [f"{word} [{unit}]" for word, unit in zip(head, units, strict=True)]

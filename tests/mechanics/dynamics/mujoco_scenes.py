@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_names import MjcfNames
 from ephs.semantics.spaces import SO3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
@@ -24,7 +24,7 @@ def stripped(model):
 
 def joints(model):
     """(name, kind, place in qpos, place in qvel) of the joints."""
-    names = Names(model)
+    names = MjcfNames(model)
     rows = zip(names.joints, names.kinds, model.jnt_qposadr, model.jnt_dofadr, strict=True)
     return [(name, kind, int(q), int(v)) for name, kind, q, v in rows]
 

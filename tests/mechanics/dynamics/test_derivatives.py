@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
@@ -118,7 +118,7 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
 @given(drawn=moving())
 def test_the_jacobian_of_a_step_is_that_of_its_right_hand_side(drawn):
     scene, model, state, _ = drawn
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     q, r, s = model.layout.split(state.array)
     here = replace(equations.start(0.0), q=q, r=r, heats=equations.heats.energies(s))
     jacobian = Jacobian(equations)
@@ -141,7 +141,7 @@ def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
     if joint is not None:
         dim = scene.joint(joint).dim
         inputs[f"joints.{joint}"] = lambda t, state: -0.7 * np.sin(t + np.arange(dim))
-    equations = Equations(problem_of_scene(scene, None, inputs), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene, None, inputs), 0.0)
     start = equations.start(0.0)
     jacobian = Jacobian(equations)
     y, size = equations.vector(start), jacobian.size
@@ -158,7 +158,7 @@ def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
 @given(drawn=moving())
 def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
     scene, model, state, _ = drawn
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     q, r, s = model.layout.split(state.array)
     n = equations.n
     linear = Linearised(equations)
@@ -177,7 +177,7 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
 def test_forward_columns_are_inverse_columns_solved(drawn):
     """Two ways to one Jacobian, both exact: to rounding times the condition of the mass matrix."""
     scene, model, state, _ = drawn
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     n = equations.n
     assume(n and not model.cut and not equations.driven.size)
@@ -195,7 +195,7 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
 def test_columns_add_up_along_any_direction(drawn):
     """Several directions at a time, and single ones."""
     scene, model, state, rng = drawn
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
     slopes = equations.dense.residual.slopes()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.imports.mjcf_names import Names
+from ephs.mechanics.imports.mjcf_names import MjcfNames
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, random_state, stripped
 
 MODELS = sorted((File(find_spec("gymnasium").submodule_search_locations[0]) / "envs/mujoco/assets").glob("*.xml"))
@@ -54,7 +54,7 @@ def test_mujoco_accelerates_alike(source, tmp_path):
     data = mujoco.MjData(model)
     scene = ephs.load(file)
     dynamics = ephs.dynamics(scene)
-    names = Names(model)
+    names = MjcfNames(model)
     assert sum(joint.dim for _, joint in scene.all_joints()) == model.nv
     mass = sum(body.mass for _, body in scene.all_bodies())
     assert abs(mass - model.body_mass.sum()) <= 1e-14 * mass * model.nbody

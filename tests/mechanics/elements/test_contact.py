@@ -24,7 +24,7 @@ from ephs.mechanics.shapes.gap import (
     segments,
     sphere_rounded_box,
 )
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.tree.finding import mechanism
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
@@ -237,12 +237,12 @@ def test_a_sphere_slides_until_it_rolls():
 
 @pytest.mark.parametrize("gap", GAPS, ids=lambda gap: f"{gap.name}-{gap.radius:g}")
 def test_the_loss_is_an_onsager_structure(gap):
-    check_primitive(contact_loss(gap, Law(1e3, 1.5, 0.2, 0.5, 0.1, 0.01, 0.02)), max_examples=100)
+    check_primitive(contact_loss(gap, ConstitutiveLaw(1e3, 1.5, 0.2, 0.5, 0.1, 0.01, 0.02)), max_examples=100)
 
 
 @pytest.mark.parametrize("gap", GAPS, ids=lambda gap: f"{gap.name}-{gap.radius:g}")
 def test_the_energy_has_an_exact_slope(gap):
-    rng, law = np.random.default_rng(5), Law(1e3, 1.5)
+    rng, law = np.random.default_rng(5), ConstitutiveLaw(1e3, 1.5)
     energy, q_r, touched = contact_energy(gap, law), Path.of("q_r"), 0
     for _ in range(100):
         x = 0.3 * rng.normal(size=7)

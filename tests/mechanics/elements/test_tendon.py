@@ -12,7 +12,7 @@ import ephs
 from ephs.mechanics.elements.springs import point_stretch
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.tendons import Tendon
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.solve.problem import Signal
@@ -94,7 +94,7 @@ def test_through_drawn_mechanisms_both_forms_have_its_forces(scene, seed):
     problem = problem_of_scene(tied(scene, rng))
     port = Path.of("tensions.rope")
     problem = replace(problem, signals={**problem.signals, port: Signal(rng.normal(size=1))})
-    eq = Equations(problem, 0.0)
+    eq = ReducedEquations(problem, 0.0)
     held_to_the_general_form(eq, problem, eq.start(0.0))
 
 
@@ -166,7 +166,7 @@ def test_a_body_on_tendons_alone_moves_as_a_free_one():
         text += f"[tendons.t{k}]\nbodies = ['ground', 'ball']\nstiffness = 10.0\n"
         text += f"points = [[{x}, {y}, 0.3], [{0.1 * x}, {0.1 * y}, 0.0]]\nlength = 1.0\n"
     scene = scene_of_text(text).with_state(rates={"ball": [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]})
-    eq = Equations(problem_of_scene(scene), 0.0)
+    eq = ReducedEquations(problem_of_scene(scene), 0.0)
     assert eq.layout.joints == ("ball",)
     assert eq.reduced.tables.rows.sum() == 0
     one, other = (ephs.simulate(scene, 0.5, method=m, rtol=1e-10, audit="off") for m in ("rk87", "radau"))

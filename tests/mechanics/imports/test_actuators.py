@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from tests.mechanics.imports.models import URDF
 
@@ -134,7 +134,7 @@ def test_tendons_over_several_bodies_have_mujocos_length_rate_and_forces(tmp_pat
         *(dict(zip(("shoulder", "elbow"), x.tolist(), strict=True)) for x in (data.qpos, data.qvel))
     )
     inputs = {f"actuators.{name}": float(data.ctrl[model.actuator(name).id]) for name in ("winch", "servo", "hold")}
-    eq = Equations(problem_of_scene(there, inputs=inputs), 0.0)
+    eq = ReducedEquations(problem_of_scene(there, inputs=inputs), 0.0)
     start = eq.start(0.0)
     rates = eq.rates(0.0, start.q, eq.vector(start))
     found = [rates[eq.nv + int(eq.layout.freedoms[name][0])] for name in ("shoulder", "elbow")]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.imports import convert
 from ephs.mechanics.imports.collisions import FRICTION, LOSS, SINKING, SLIP
-from ephs.mechanics.shapes.law import Law
+from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import touches
 from ephs.semantics.spaces import SE3
 from tests.mechanics.shapes.test_meshes import binary_stl, cube
@@ -126,7 +126,7 @@ def test_links_of_a_urdf_meet_a_floor_and_not_each_other(tmp_path):
         outer = 'format = 1\nname = "hall"\n[parts.it]\nuse = "model.urdf"\nposition = [0.0, 0.0, 1.0]\n' + floor
         (tmp_path / "hall.toml").write_text(outer, encoding="utf-8")
         whole, hall = ephs.load(tmp_path / "whole.toml"), ephs.load(tmp_path / "hall.toml", "free", contact=True)
-    law = Law(3 * MASS / SINKING**2, loss=LOSS, friction=FRICTION, slip=SLIP)
+    law = ConstitutiveLaw(3 * MASS / SINKING**2, loss=LOSS, friction=FRICTION, slip=SLIP)
     for each, prefix in ((whole, ""), (hall, "it.")):
         pairs = {frozenset(contact.surfaces) for contact in each.contacts.values()}
         assert pairs == {frozenset((prefix + name, "floor")) for name in scene.surfaces}
@@ -143,7 +143,7 @@ def test_a_link_has_the_numbers_that_bullet_reads(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         scene = ephs.load(tmp_path / "hall.toml", "free", contact=True)
-    assert [each.law for each in scene.contacts.values()] == [Law(3e4, loss=LOSS, friction=0.25, slip=SLIP)]
+    assert [each.law for each in scene.contacts.values()] == [ConstitutiveLaw(3e4, loss=LOSS, friction=0.25, slip=SLIP)]
 
 
 def test_an_sdf_rests_on_its_ground_with_the_numbers_of_both(tmp_path):
@@ -151,7 +151,7 @@ def test_an_sdf_rests_on_its_ground_with_the_numbers_of_both(tmp_path):
     soft = "<contact><ode><kp>6e4</kp></ode></contact>"
     scene, said = loaded(SDF.format(**GIVEN | {"surface": kp, "floor": soft, "height": 0.2}), tmp_path, "sdf")
     (contact,) = scene.contacts.values()
-    assert contact.law == Law(contact.law.stiffness, loss=LOSS, friction=0.5, slip=SLIP)
+    assert contact.law == ConstitutiveLaw(contact.law.stiffness, loss=LOSS, friction=0.5, slip=SLIP)
     assert contact.law.stiffness == pytest.approx(1.5e4, rel=1e-15)
     assert "contact" not in said
     sol = ephs.simulate(scene, 2.0, method="radau")

@@ -12,7 +12,7 @@ from ephs import Pattern, junction, library, quantity
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import SE3
 from ephs.solve.instant import instant
 from ephs.testing import mechanisms
@@ -117,7 +117,7 @@ def accelerations(equations, twist_of):
 @given(mechanisms(max_bodies=3, kinds=KINDS), st.sampled_from(["x", "pe"]), st.integers(0, 2**32 - 1))
 def test_rates_in_joint_coordinates_are_those_of_the_general_form(scene, word, seed):
     problem, _ = renamed(scene, word, seed)
-    equations = Equations(problem, 0.0)
+    equations = ReducedEquations(problem, 0.0)
     state = equations.start(0.0)
     found = equations.rates(0.0, state.q, equations.vector(state))
     d, whole = problem.descriptor, dict(problem.initial) | dict(equations.states(state))

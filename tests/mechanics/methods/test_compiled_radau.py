@@ -9,9 +9,9 @@ import ephs
 from ephs.mechanics.methods import auto
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
-from ephs.mechanics.methods.stages import Kept, scheme_of
+from ephs.mechanics.methods.stages import KeptJacobian, scheme_of
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.solve.control import Control, Tolerance
 from tests.mechanics.ball import BALL
@@ -108,13 +108,13 @@ def test_compiled_steps_of_what_is_smooth_are_those_taken_one_by_one(rtol, monke
 def test_surfaces_that_may_touch_have_three_stages_at_tolerances_that_are_not_fine(scene):
     def stages(rtol):
         control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
-        return scheme_of(Equations(problem_of_scene(scene), 0.0), control).nodes.size
+        return scheme_of(ReducedEquations(problem_of_scene(scene), 0.0), control).nodes.size
 
     assert [stages(rtol) for rtol in (1e-3, 1e-6, 1e-8)] == [3, 3, 5]
 
 
 def test_the_freedoms_alone_are_factorised_as_the_whole_is(scene, monkeypatch):
-    renew, seen = Kept.renew, []
+    renew, seen = KeptJacobian.renew, []
 
     def whole(self, state):
         renew(self, state)
@@ -122,7 +122,7 @@ def test_the_freedoms_alone_are_factorised_as_the_whole_is(scene, monkeypatch):
         self.newton[0].split = 0
 
     found = ephs.simulate(scene, 0.25, step=1e-3, **ASKED)
-    monkeypatch.setattr(Kept, "renew", whole)
+    monkeypatch.setattr(KeptJacobian, "renew", whole)
     oracle = ephs.simulate(scene, 0.25, step=1e-3, **ASKED)
     assert all(seen)
     assert motion(found) == pytest.approx(motion(oracle), rel=0.0, abs=1e-10)

@@ -10,7 +10,7 @@ from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.methods.collocation import radau
 from tests.mechanics.plain import uncorrected
@@ -34,7 +34,7 @@ def plain():
 @pytest.fixture(scope="module")
 def equations():
     scene = scene_of_text(SCENE)
-    return Equations(problem_of_scene(scene), 0.0)
+    return ReducedEquations(problem_of_scene(scene), 0.0)
 
 
 def stepper(equations, method, **options):

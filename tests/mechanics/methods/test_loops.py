@@ -6,7 +6,7 @@ import pytest
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 
 BODY = """
 [bodies.{name}]
@@ -48,7 +48,7 @@ def five_bar(folder, mass=1.0):
 
 
 def equations(scene):
-    return Equations(problem_of_scene(scene), 0.0)
+    return ReducedEquations(problem_of_scene(scene), 0.0)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.methods import registry
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve import loop
 from tests.mechanics.momenta import floating, momenta
 from tests.written import scene_of_text
@@ -91,7 +91,7 @@ def test_variational_steps_keep_momenta_by_themselves():
 @pytest.mark.parametrize(("name", "kept"), [("heavy-top", 1), ("four-bar", 0), ("slider-crank", 0), ("mbs", 6)])
 def test_what_is_held_keeps_fewer(name, kept):
     """A top keeps what turns it about the vertical; a crank keeps nothing."""
-    eq = Equations(problem_of_scene(ephs.load(SCENES / f"{name}.toml")), 0.0)
+    eq = ReducedEquations(problem_of_scene(ephs.load(SCENES / f"{name}.toml")), 0.0)
     eq.accounts.keep("energy and momenta")
     assert int(np.any(eq.engine.tables["bases"].reshape(-1, 6, 6), axis=1).sum()) == kept
 

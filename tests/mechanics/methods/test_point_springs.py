@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from tests.written import scene_of_text
 
 K, LENGTH, D = 50.0, 0.4, 3.0
@@ -43,7 +43,7 @@ def scene_of(one, two):
 )
 def test_bodies_are_pulled_together(one, two):
     scene = scene_of(one, two)
-    eq = Equations(problem_of_scene(scene), 0.0)
+    eq = ReducedEquations(problem_of_scene(scene), 0.0)
     state = eq.start(0.0)
     along = PLACES[two] - PLACES[one]
     distance = np.linalg.norm(along)

@@ -56,4 +56,4 @@ def test_mass_and_forces_on_places_are_those_of_bodies_and_storages_one_by_one(f
                     turns = np.any(twists[:3], axis=0)
                     sizes += effort[where][turns].sum(), effort[where][~turns].sum()
     mass = sum(body.mass for _, body in problem.scene.all_bodies())
-    np.testing.assert_allclose(rounding._held(problem, 0.0, x), [mass, *sizes], rtol=1e-12)
+    np.testing.assert_allclose(rounding._storage_sizes(problem, 0.0, x), [mass, *sizes], rtol=1e-12)

@@ -13,7 +13,7 @@ from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.drags import Drags, resisting
 from ephs.mechanics.tree.engine.programs import of_motion
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, Real, Vector
 from ephs.testing.mechanisms import mechanisms
@@ -69,7 +69,7 @@ class Stage:
     """One stage of a scene's equations at its start, with other rates."""
 
     def __init__(self, scene, seed):
-        self.eq = eq = Equations(problem_of_scene(scene), 0.0)
+        self.eq = eq = ReducedEquations(problem_of_scene(scene), 0.0)
         self.state = eq.start(0.0)
         self.y = eq.vector(self.state)
         self.rates = slice(eq.nv, eq.nv + eq.n)

@@ -9,7 +9,7 @@ import pytest
 import ephs
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.control import Control, Tolerance
 from tests.written import scene_of_text
 
@@ -46,7 +46,7 @@ stiffness = {stiffness}
 
 def equations(gravity, stiffness):
     scene = scene_of_text(SCENE.format(gravity=gravity, stiffness=stiffness))
-    return Equations(problem_of_scene(scene), 0.0)
+    return ReducedEquations(problem_of_scene(scene), 0.0)
 
 
 def stepper(eq, name):

@@ -8,7 +8,7 @@ from ephs import library as lib
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.offset import frame_change
-from ephs.mechanics.rewrite.rewrite import MOST, Rule, Site, StateMap, Strength, rewrite
+from ephs.mechanics.rewrite.rewrite import MOST, Rule, RuleSite, StateMap, Strength, rewrite
 from ephs.mechanics.runs.assembling import flat_joints
 from ephs.semantics.spaces import SE3
 from tests.solve.conftest import oscillator
@@ -30,7 +30,7 @@ def rule(make, last=None):
     def at(draft, place):
         if last is not None and len(draft.fillings) >= last:
             return None
-        return Site("AGAIN", place[0], Strength.MOTION, "it is a spring", "", make)
+        return RuleSite("AGAIN", place[0], Strength.MOTION, "it is a spring", "", make)
 
     return Rule("AGAIN", Strength.MOTION, "always", lambda _: [(Path(("pe",)),)], at)
 

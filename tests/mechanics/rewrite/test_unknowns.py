@@ -6,7 +6,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.runs.simulate import problem_of_scene
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.model import compile_model
 from tests.written import scene_of_text
 
@@ -41,6 +41,6 @@ def test_the_first_step_begins_with_all_unknowns(motion):
 )
 def test_the_last_step_ends_with_the_unknowns_of_a_run(file):
     scene = ephs.load(file)
-    equations = Equations(problem_of_scene(scene), 0.0)
+    equations = ReducedEquations(problem_of_scene(scene), 0.0)
     equations.start(0.0)
     assert ephs.reduce(scene).steps[-1].after == equations.stats()["unknowns"]

@@ -17,7 +17,7 @@ from ephs.mechanics import Element, key, register_element, rule
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.custom import ElementError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.own_units import Units, mobility_of
+from ephs.mechanics.scene.own_units import OwnUnits, mobility_of
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.scene.reference import scene_tables
 from ephs.mechanics.scene.registry import REGISTERED
@@ -271,7 +271,7 @@ def test_runs_in_other_units_agree(tmp_path):
     scene = dragged(tmp_path, coefficient=1.0)
     small = rescaled(scene, 1e-6, 1e-9, 1e-3)
     assert small.elements["drags"]["air"].coefficient == pytest.approx(1.0 * 1e-9 / 1e-6)
-    assert Units.of(small) != Units.of(scene)
+    assert OwnUnits.of(small) != OwnUnits.of(scene)
     one = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-9)
     other = ephs.simulate(small, 1e-3, method="rk87", rtol=1e-9)
     assert other.body("ball").position[-1] * 1e6 == pytest.approx(one.body("ball").position[-1], rel=1e-6)
@@ -396,7 +396,7 @@ def test_inputs_drive_it_in_parts_and_far_from_metres_too(tmp_path):
     assert abs(ephs.simulate(nested, 2.0, step=0.1, inputs=driven)[flux][-1]) == pytest.approx(10.0)
     small = rescaled(nested, 1e-6, 1e-9, 1e-3)
     unit = 1e-9 * 1e-12 / 1e-6
-    assert Units.of(small) != Units.of(nested)
+    assert OwnUnits.of(small) != OwnUnits.of(nested)
     assert abs(ephs.simulate(small, 2e-3, step=1e-4)[flux][-1]) == pytest.approx(6.0 * unit * 1e-3)
 
 

@@ -8,7 +8,7 @@ from ephs.mechanics.scene import schema
 from ephs.mechanics.scene.reference import TOP, scene_tables
 from tests.scene_page import PAGE, written
 
-MODELS = [each for each in vars(schema).values() if isinstance(each, type) and issubclass(each, schema.Entry)]
+MODELS = [each for each in vars(schema).values() if isinstance(each, type) and issubclass(each, schema.EntryTable)]
 
 
 def rows(table: str) -> dict[str, list[str]]:

@@ -10,7 +10,7 @@ from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from tests.written import scene_of_text
 
@@ -93,7 +93,7 @@ def test_forces_are_tension_times_the_gradient_of_the_length(a, b, rate_a, rate_
     tension = STIFFNESS * (length(a, b) - LENGTH) + DAMPING * (gradient @ [rate_a, rate_b]) + pull
     forces = dict(zip(("pin", "elbow"), (-tension * gradient).tolist(), strict=True))
     exact = bare.acceleration(bare.state0, forces)
-    eq = Equations(problem_of_scene(tied, inputs={"actuators.cable": pull}), 0.0)
+    eq = ReducedEquations(problem_of_scene(tied, inputs={"actuators.cable": pull}), 0.0)
     start = eq.start(0.0)
     found = eq.rates(0.0, start.q, eq.vector(start))[eq.nv :]
     for joint, value in exact.items():

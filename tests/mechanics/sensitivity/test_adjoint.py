@@ -6,7 +6,7 @@ import pytest
 import ephs
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.sensitivity import explicit
-from ephs.mechanics.sensitivity.family import Family
+from ephs.mechanics.sensitivity.family import ParameterFamily
 from ephs.mechanics.tree.engine.tangents import StepTangent
 from ephs.solve.errors import OptionError
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
@@ -70,7 +70,7 @@ def backwards(method, paths=PATHS):
 
 def forwards(scene, paths, times, weights, method, step):
     """The same by tangents carried forward: what elements and rates are by the parameters."""
-    family = Family(scene, paths, None, None, None, joints=True)
+    family = ParameterFamily(scene, paths, None, None, None, joints=True)
     along = explicit.ExplicitTangent(family, 0.0, tableau(method, chosen=False))
     point, layout, found = along.start(), along.equations.layout, np.zeros(len(paths))
     for k in range(round(times[-1] / step)):

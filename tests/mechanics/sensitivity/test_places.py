@@ -7,7 +7,7 @@ import ephs
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent, _whole
-from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, Family
+from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, ParameterFamily
 
 HUNG = """
 format = 1
@@ -31,7 +31,7 @@ length = 0.3
 
 
 def tangent(scene, paths):
-    return ExplicitTangent(Family(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
+    return ExplicitTangent(ParameterFamily(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
 
 
 def placed(scene):

@@ -7,7 +7,7 @@ import ephs
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names, read
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
-from ephs.mechanics.sensitivity.family import Family
+from ephs.mechanics.sensitivity.family import ParameterFamily
 
 TREES = ("chain", "heavy-top", "hot-brake", "body")
 FUSED = """
@@ -36,7 +36,7 @@ at = [0.5, 0.0, 0.0]
 
 
 def tangent(scene, paths):
-    return ExplicitTangent(Family(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
+    return ExplicitTangent(ParameterFamily(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
 
 
 def weights(scene):

@@ -14,7 +14,7 @@ from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.images import STARTS, Images
 from ephs.mechanics.sweep.outputs import outputs_of
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.tables import TREE
 from ephs.show.charts.family_scenes import parallelogram
 from ephs.solve.march import Ending
@@ -37,7 +37,7 @@ TIMES = np.array([0.0, 0.02, 0.05, 0.3])
 
 def made(scene, vary, options, *, paired=True):
     """An ensemble with the outputs that compiled members have: of the tree's joints."""
-    reduced = Equations(problem_of_scene(scene), 0.0).reduced
+    reduced = ReducedEquations(problem_of_scene(scene), 0.0).reduced
     names = [e.name for e, kind in zip(reduced.edges, reduced.tables.kind, strict=True) if kind == TREE]
     outputs = outputs_of(scene, [*(f"joints.{name}.coordinate" for name in names), "heat", "work"])
     axes = Axes.of(vary, paired=paired)

@@ -14,7 +14,7 @@ from ephs import quantity as Q
 from ephs.mechanics import beam_element, joint, rigid_body, tendon, thermoelastic
 from ephs.mechanics.elements import components
 from ephs.mechanics.methods.jacobian import Jacobian
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.operad import Path
 from ephs.solve.problem import Signal
@@ -27,7 +27,7 @@ UNTIL = 0.3
 def equations_of(system, start, signals=None):
     states = system.state() | {Path.of(path): np.atleast_1d(np.array(x, dtype=float)) for path, x in start.items()}
     given = {Path.of(p): Signal(np.atleast_1d(x), effort) for p, (x, effort) in (signals or {}).items()}
-    return Equations(problem_of(system, states, given), 0.0)
+    return ReducedEquations(problem_of(system, states, given), 0.0)
 
 
 def motor():

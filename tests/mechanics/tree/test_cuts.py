@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from ephs.mechanics.road.cuts import Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
-from ephs.mechanics.road.records import Place, State
+from ephs.mechanics.road.records import LinkPlace, LinkState
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
 
@@ -56,7 +56,7 @@ class Loop:
         far = compose(
             near, self.inner, joint, (np.array(so3.matrix(gap[:4]), dtype=float), gap[4:]), inverse(self.outer)
         )
-        self.places = np.zeros((3, Place.real_width))
+        self.places = np.zeros((3, LinkPlace.real_width))
         for row, (turn, at) in zip(self.places, (near, far), strict=False):
             row[:9], row[9:12], row[12:24] = turn.ravel(), at, rng.standard_normal(12)
         self.motions, self.value = np.zeros((1, Relative.real_width)), np.zeros((len(self.normal), 4))
@@ -206,10 +206,10 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
 
 
 def test_the_memory_of_a_link_begins_with_its_place():
-    """Rows of `State` are read as `Place`: the same fields at the same offsets."""
-    fields = [name for name, field in vars(Place).items() if hasattr(field, "offset")]
+    """Rows of `LinkState` are read as `LinkPlace`: the same fields at the same offsets."""
+    fields = [name for name, field in vars(LinkPlace).items() if hasattr(field, "offset")]
     assert fields == ["turn", "at", "twist", "bias", "change"]
     for name in fields:
-        one, other = vars(Place)[name], vars(State)[name]
+        one, other = vars(LinkPlace)[name], vars(LinkState)[name]
         assert (one.offset, one.shape) == (other.offset, other.shape)
-    assert Place.real_width == vars(State)["down"].offset
+    assert LinkPlace.real_width == vars(LinkState)["down"].offset

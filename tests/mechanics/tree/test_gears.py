@@ -14,7 +14,7 @@ from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.operad import Path
@@ -115,7 +115,7 @@ def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     _, gears = made
     start = {Path.of(path): value for path, value in start.items()}
     problem = problem_of(system, system.state() | start)
-    eq = Equations(problem, 0.0)
+    eq = ReducedEquations(problem, 0.0)
     assert len(eq.reduced.attaching.ties) == len(gears)
     state, rng = eq.start(0.0), np.random.default_rng(seed)
     state = eq.closed(replace(state, r=rng.standard_normal(eq.n)))
@@ -133,7 +133,7 @@ def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
 def test_changes_of_geared_motion_are_those_of_the_equations():
     system, start = train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
     start = {Path.of(path): value for path, value in start.items()}
-    eq = Equations(problem_of(system, system.state() | start), 0.0)
+    eq = ReducedEquations(problem_of(system, system.state() | start), 0.0)
     state, rng = eq.start(0.0), np.random.default_rng(3)
     linear, r = Linearised(eq), rng.standard_normal(eq.n)
     s = eq.heats.entropies(state.heats)
@@ -154,7 +154,7 @@ def test_gears_of_a_loop_contradict_each_other_or_repeat():
     def equations(ratio):
         system, start = train([(False, 0.1)] * 3, [((0, 1), (1, -2)), ((1, 2), (1, -3)), ((0, 2), (1, -ratio))])
         start = {Path.of(path): value for path, value in start.items()}
-        return Equations(problem_of(system, system.state() | start), 0.0)
+        return ReducedEquations(problem_of(system, system.state() | start), 0.0)
 
     assert len(equations(6).reduced.attaching.ties) == 2
     with pytest.raises(Unplaced, match=r"gear\d.*contradicts the other gears"):

@@ -9,7 +9,7 @@ from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.scene.build import drive_ports, initial_state, scene_inputs, scene_system
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from ephs.semantics.systems.system import System
 from ephs.solve.problem import Signal
@@ -128,6 +128,6 @@ class Bench:
 @given(mechanisms(max_bodies=3), st.integers(0, 2**32 - 1))
 def test_joint_coordinates_and_the_general_form_are_one(scene, seed):
     problem = Bench(scene, np.random.default_rng(seed)).problem()
-    eq = Equations(problem, 0.0)
+    eq = ReducedEquations(problem, 0.0)
     state = eq.start(0.0)
     held_to_the_general_form(eq, problem, state)

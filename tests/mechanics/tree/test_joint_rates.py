@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs.mechanics.road.pack import STANDARD
-from ephs.mechanics.road.records import Link, State, Tree
+from ephs.mechanics.road.records import LinkConstants, LinkState, Tree
 from ephs.mechanics.road.tree import axes_of, moved_by, outward, rates_of
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
@@ -23,7 +23,7 @@ class Only:
     """The constants of one link on the ground, at a pose there."""
 
     def __init__(self, pose):
-        self.link = Link.table(1)[0]
+        self.link = LinkConstants.table(1)[0]
         self.link.sense, self.link.parent, self.link.kind = 1.0, 1, 0
         self.link.rotation, self.link.place = quaternion_to_matrix(pose[:4]).tolist(), pose[4:].tolist()
         self.link.mass, self.link.inertia = 1.0, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0]
@@ -38,7 +38,7 @@ def test_a_joint_that_is_walked_backward(name, place, coordinates, r, way):
     of, joint = pair(name), STANDARD[place]
     assert joint.backward and (joint.code, joint.size) == (of.code, of.size)
     there, x, r = SE3.exp(way), of.element(coordinates[: of.dim]), r[: of.dim]
-    only, states = Only(there), State.table(2)
+    only, states = Only(there), LinkState.table(2)
     tree = Tree((joint,), 1, only, states, [0.0, 0.0, 0.0], planar=False)
     outward(PLAIN, tree, Vector(ArrayReals(x), 0, x.size), Vector(ArrayReals(r), 0, r.size))
     state, ground = states[0], states[1]

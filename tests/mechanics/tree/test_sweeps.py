@@ -11,7 +11,7 @@ from benchmarks import families
 from ephs.mechanics.road.programs import sweeps
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program
@@ -27,7 +27,7 @@ class Tree:
     """A scene's tree: its equations, its records and a state aside of the initial one."""
 
     def __init__(self, scene, seed=0):
-        self.equations = eq = Equations(problem_of_scene(scene), 0.0)
+        self.equations = eq = ReducedEquations(problem_of_scene(scene), 0.0)
         self.packed = links_of(eq.reduced).packed(eq.gravity)
         self.sweeps = sweeps(self.packed.kind)
         rng = np.random.default_rng(seed)

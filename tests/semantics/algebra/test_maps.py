@@ -33,7 +33,7 @@ from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.meaning import LinearRelation, glued
 from ephs.semantics.meaning.components import at_ports
 from ephs.semantics.meaning.fields import Rounded
-from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.meaning.variables import ONE, RelationVariable
 from ephs.testing import check_algebra_map, patterns
 from ephs.testing import systems as drawn_systems
 from ephs.testing.controls import refuted
@@ -126,7 +126,7 @@ def over_the_reals(field, relation, box):
         if kind == "one":
             return ONE
         outer = kind in ("flow", "effort")
-        return Variable("outer" if outer else "own", kind, ROOT, path if outer else box / path, i)
+        return RelationVariable("outer" if outer else "own", kind, ROOT, path if outer else box / path, i)
 
     bundle = Bundle.of(relation.interface)
     known = {named(kind, path, i) for path, dim in relation.inner for kind in ("state", "rate") for i in range(dim)}

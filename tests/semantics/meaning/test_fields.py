@@ -13,12 +13,12 @@ from ephs.semantics.meaning.fields import ROUNDED, Rational, Rounded
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer
 from ephs.semantics.meaning.relation import Instant
-from ephs.semantics.meaning.variables import ONE, Variable
+from ephs.semantics.meaning.variables import ONE, RelationVariable
 from ephs.semantics.systems.probe import random_probe
 from ephs.testing import fillings, nestings, systems
 from tests.semantics.scales import scaled
 
-X, Y, Z = (Variable("own", "rate", ROOT, Path.parse(name), 0) for name in "xyz")
+X, Y, Z = (RelationVariable("own", "rate", ROOT, Path.parse(name), 0) for name in "xyz")
 
 
 class Evaluated(Rational):

@@ -18,7 +18,7 @@ from ephs.semantics.meaning.fields import Rational, Rounded, as_written
 from ephs.semantics.meaning.functor import filled
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import curvature
-from ephs.semantics.meaning.variables import Variable
+from ephs.semantics.meaning.variables import RelationVariable
 from ephs.semantics.primitives.differences import slope
 from ephs.semantics.spaces import manifold, pair
 from ephs.testing import nestings
@@ -156,8 +156,8 @@ def test_the_relation_of_a_composite_pattern_is_the_composite_of_the_relations(n
 def test_exact_relations_leave_the_efforts_of_storages_open():
     system = Pattern.from_text("q: displacement; p: momentum, exposed; k(q); g(q, p)")(k=lib.spring(k=3.0), g=lib.pkc())
     exact = system.relation(field="rational").at().linear
-    rate, effort = (Variable("own", kind, ROOT, Path.parse("k.q"), 0) for kind in ("rate", "effort"))
-    flow, velocity = (Variable("outer", kind, ROOT, Path.parse("p"), 0) for kind in ("flow", "effort"))
+    rate, effort = (RelationVariable("own", kind, ROOT, Path.parse("k.q"), 0) for kind in ("rate", "effort"))
+    flow, velocity = (RelationVariable("outer", kind, ROOT, Path.parse("p"), 0) for kind in ("flow", "effort"))
     assert {frozenset(row.items()) for row in exact.canonical} == {
         frozenset({flow: 1, effort: -1}.items()),
         frozenset({velocity: 1, rate: -1}.items()),
@@ -170,7 +170,7 @@ def test_exact_relations_leave_the_efforts_of_storages_open():
 
 
 def test_numbers_know_what_is_near_zero():
-    x, y = (Variable("own", "rate", ROOT, Path.parse(name), 0) for name in "xy")
+    x, y = (RelationVariable("own", "rate", ROOT, Path.parse(name), 0) for name in "xy")
 
     def rank(field, entry):
         rows = [field.rounded({x: 1.0, y: 1.0}), field.rounded({x: 1.0, y: entry})]

@@ -16,12 +16,12 @@ from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.meaning.components import largest, process
 from ephs.semantics.meaning.fields import ROUNDED, Rounded
 from ephs.semantics.meaning.step import part_of, solved
-from ephs.semantics.primitives.behaviour import Continuous, Natural
+from ephs.semantics.primitives.behaviour import ContinuousBehaviour, NaturalBehaviour
 from ephs.semantics.primitives.differences import slope
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
 
-NOW = Continuous(Reference())
+NOW = ContinuousBehaviour(Reference())
 
 
 @pytest.mark.parametrize("effort", [False, True])
@@ -88,7 +88,7 @@ class Whole(dict):
 def test_slopes_of_components_are_those_of_their_results(system, seed, now):
     """Those of structures are exact, of columns all at once; over a step and at an instant."""
     rng = np.random.default_rng(seed)
-    for part in parts_of(system, seed, NOW if now else Natural(Reference(293.15, 300.0), 1e-2)):
+    for part in parts_of(system, seed, NOW if now else NaturalBehaviour(Reference(293.15, 300.0), 1e-2)):
         at = 0.1 * rng.standard_normal(len(part.arguments))
         found, expected = part.slope(at), slope(part.value, at)
         assert found.shape == (len(part.results), len(part.arguments))

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ephs.semantics.stage import PLAIN, Duals, Entry, Program, staged, vector
-from ephs.semantics.stage.duals import Dual
+from ephs.semantics.stage.duals import StagedDual
 from ephs.semantics.stage.intervals import INTERVALS, Interval
 from ephs.semantics.stage.symbolic import SYMBOLIC, Expression, expression, sp
 
@@ -183,9 +183,9 @@ def tangent(body, x):
 
 def dual(body, x):
     with np.errstate(all="ignore"):
-        out = [Dual(0.0, (0.0,))] * OUTPUTS
-        run(Duals(PLAIN), body, [Dual(np.float64(value), (np.float64(1.0),)) for value in x], out)
-    return np.array([number.value if isinstance(number, Dual) else number for number in out])
+        out = [StagedDual(0.0, (0.0,))] * OUTPUTS
+        run(Duals(PLAIN), body, [StagedDual(np.float64(value), (np.float64(1.0),)) for value in x], out)
+    return np.array([number.value if isinstance(number, StagedDual) else number for number in out])
 
 
 def members(body, x):

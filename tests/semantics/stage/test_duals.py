@@ -24,7 +24,7 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
-from ephs.semantics.stage.duals import Dual
+from ephs.semantics.stage.duals import StagedDual
 from ephs.semantics.stage.evaluator import FUNCTIONS
 
 EPSILON = np.finfo(float).eps
@@ -57,7 +57,7 @@ def test_every_operator_has_its_derivative(name, data):
     count = 1 if name == "negative" else 2
     points = [data.draw(st.integers(1, 400)) / 100 for _ in range(count)]
     slopes = [data.draw(st.integers(-200, 200)) / 100 for _ in range(count)]
-    number = OPERATORS[name](*(Dual(np.float64(x), (s,)) for x, s in zip(points, slopes, strict=True)))
+    number = OPERATORS[name](*(StagedDual(np.float64(x), (s,)) for x, s in zip(points, slopes, strict=True)))
     step = 1e-100
     moved = OPERATORS[name](*(complex(x, step * s) for x, s in zip(points, slopes, strict=True)))
     terms = sum(abs(s) for s in slopes) * (4 + max(points) / min(points) ** 2)
@@ -72,7 +72,7 @@ def test_every_function_has_its_derivative(name, data):
     low = 0.01 if name in ("sqrt", "log") else -5.0
     points = [data.draw(st.floats(low, 5.0).filter(lambda x: abs(x) > 0.01)) for _ in range(count)]
     slopes = [data.draw(st.integers(-200, 200)) / 100 for _ in range(count)]
-    number = getattr(Duals(PLAIN), name)(*(Dual(x, (s,)) for x, s in zip(points, slopes, strict=True)))
+    number = getattr(Duals(PLAIN), name)(*(StagedDual(x, (s,)) for x, s in zip(points, slopes, strict=True)))
     step = 1e-100
     expected = COMPLEX[name](*(complex(x, step * s) for x, s in zip(points, slopes, strict=True))).imag / step
     assert abs(number.slopes[0] - expected) <= 32 * EPSILON * sum(abs(s) for s in slopes) * (200 + abs(expected))
@@ -182,7 +182,7 @@ def test_an_argument_that_is_not_there_is_named():
 
 def test_second_derivatives_are_duals_of_duals():
     inner, outer = Duals(PLAIN), Duals(Duals(PLAIN))
-    x = Dual(Dual(0.3, (1.0,)), (Dual(1.0, (0.0,)),))
+    x = StagedDual(StagedDual(0.3, (1.0,)), (StagedDual(1.0, (0.0,)),))
     assert inner.base is PLAIN
     twice = outer.sin(x * x).slopes[0].slopes[0]
     assert abs(twice - (2 * np.cos(0.09) - 4 * 0.09 * np.sin(0.09))) <= 8 * EPSILON * 3

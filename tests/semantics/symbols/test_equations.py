@@ -14,7 +14,7 @@ from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference
 from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.meaning.step import solved
-from ephs.semantics.primitives.behaviour import Continuous
+from ephs.semantics.primitives.behaviour import ContinuousBehaviour
 from ephs.semantics.symbols.algebra import text_of
 from ephs.semantics.symbols.words import Words, operator, pairing
 from examples import oscillator, physics
@@ -148,7 +148,7 @@ def test_numbers_in_the_descriptor_form_give_its_residual(name, seed):
     state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
     inputs = {slot.path: Input(rng.standard_normal(1), False) for slot in d.outer}
     z = rng.standard_normal(d.unknowns(inputs))
-    residual = d.residual(Continuous(reference), d.pack(state), inputs, z)
+    residual = d.residual(ContinuousBehaviour(reference), d.pack(state), inputs, z)
     values = named_numbers(system, state, reference)
     junction_of = {path: where for path, where in zip(system.states, _junctions(system), strict=True)}
     values |= {f"d{junction_of[s.path]}/dt": z[s.rate] for s in d.states}
@@ -177,7 +177,7 @@ def test_numbers_in_the_reduced_form_give_what_the_solver_computes(name, seed):
     state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
     stored = set(_junctions(system))
     inputs = {slot.path: Input(rng.standard_normal(1), slot.path not in stored) for slot in d.outer}
-    found = solved(system, state, Continuous(reference), inputs)
+    found = solved(system, state, ContinuousBehaviour(reference), inputs)
     values = named_numbers(system, state, reference)
     for path, where in zip(system.states, _junctions(system), strict=True):
         values[f"d{where}/dt"] = float(found.rates[path][0])

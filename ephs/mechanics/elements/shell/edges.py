@@ -28,19 +28,19 @@ def rates(on: Evaluator, d: Entries) -> Rows:
 def _logarithms(on: Evaluator, starts: Matrix, ends: Matrix, logs: Matrix) -> None:
     """Write log(a⁻¹b) of sections (n, 7) at the starts and ends of edges."""
 
-    def one(k: Integer) -> None:
+    def each_row(k: Integer) -> None:
         a, b = ([poses[k, i] for i in range(7)] for poses in (starts, ends))
         for i, value in enumerate(se3.increment(on, a, b)):
             logs[k, i] = value
 
-    on.loop(logs.rows, one)
+    on.loop(logs.rows, each_row)
 
 
 def _slopes(on: Evaluator, logs: Matrix, stresses: Matrix, by: Matrix, bends: Matrix) -> None:
     """Write the derivatives (n, 6·12) of logarithms by twists, and those (n, 12·6) of the efforts by logarithms."""
     duals = Duals(on)
 
-    def one(k: Integer) -> None:
+    def each_row(k: Integer) -> None:
         d = [logs[k, i] for i in range(6)]
         for i, row in enumerate(rates(on, d)):
             for j, entry in enumerate(row):
@@ -54,7 +54,7 @@ def _slopes(on: Evaluator, logs: Matrix, stresses: Matrix, by: Matrix, bends: Ma
 
         on.loop(6, along)
 
-    on.loop(logs.rows, one)
+    on.loop(logs.rows, each_row)
 
 
 @cache

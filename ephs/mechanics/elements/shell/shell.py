@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Slopes:
+class ShellSlopes:
     """Derivatives at a configuration, by the 24 coordinates of each element's nodes.
 
     Attributes
@@ -179,7 +179,7 @@ class Shell:
         """
         return np.einsum("nij,nj->ni", self.rows, self.changes(poses))
 
-    def slopes(self, poses: Array, stress: Array) -> Slopes:
+    def slopes(self, poses: Array, stress: Array) -> ShellSlopes:
         """Derivatives at poses (m, 7), those of the forces at a stress (n, 24)."""
         sections, turned = self._sections(poses)
         by, bends = edges.slopes(edges.logarithms(*edge_ends(sections)), stress.reshape(-1, 6))
@@ -201,7 +201,7 @@ class Shell:
         turning = -np.cross(force[..., None, :], np.swapaxes(nodes, -1, -2))  # −f × the columns of R, in rows
         for node in range(4):
             bend[:, 6 * node + 3 : 6 * node + 6, 6 * node : 6 * node + 3] += np.swapaxes(turning[:, node], 1, 2)
-        return Slopes(strain, bend)
+        return ShellSlopes(strain, bend)
 
     def gathered(self, values: Array) -> Array:
         """(6m,) sum at the nodes of values (n, 24) at the elements' coordinates."""
@@ -216,7 +216,7 @@ class Shell:
         """(6m, 6m) derivative of `forces`, exact; at another stress (n, 24) than the poses' where one is given."""
         return self.assembled(self.slopes(poses, self.stress(poses) if stress is None else stress))
 
-    def assembled(self, slopes: Slopes, *, elastic: bool = True) -> "csc_array":
+    def assembled(self, slopes: ShellSlopes, *, elastic: bool = True) -> "csc_array":
         """The tangent of slopes, with the part Bᵀ K B or without."""
         values = slopes.bend
         if elastic:

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ephs.mechanics.elements.shell.mesh import Truths
 from ephs.mechanics.elements.shell.shell import Shell
-from ephs.mechanics.elements.shell.statics import Reduced, displacements, factors, negative
+from ephs.mechanics.elements.shell.statics import ReducedTangent, displacements, factors, negative
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen
 
@@ -46,7 +46,7 @@ def modes(shell: Shell, free: Truths, count: int, poses: Array | None = None) ->
     count
         Number of frequencies; there are more where the last one is multiple, since all of its shapes are given.
     """
-    reduced = Reduced.of(shell.tangent(shell.poses if poses is None else poses), free)
+    reduced = ReducedTangent.of(shell.tangent(shell.poses if poses is None else poses), free)
     root = 1.0 / np.sqrt(shell.inertia.ravel()[reduced.at])
     scaled = diags_array(root) @ reduced.matrix @ diags_array(root)
     scaled = csc_array(0.5 * (scaled + scaled.T))
@@ -82,8 +82,8 @@ def buckling(shell: Shell, load: Array, free: Truths, count: int = 1) -> Spectru
     change = displacements(shell, load, free).ravel()[shell.places()]
     slopes = shell.slopes(shell.poses, np.zeros((len(shell.cells), 24)))
     stress = shell.of_changes(np.einsum("nij,nj->ni", slopes.strain, change))
-    reduced = Reduced.of(shell.assembled(slopes), free)
-    bare = Reduced.of(shell.assembled(shell.slopes(shell.poses, stress), elastic=False), free).matrix
+    reduced = ReducedTangent.of(shell.assembled(slopes), free)
+    bare = ReducedTangent.of(shell.assembled(shell.slopes(shell.poses, stress), elastic=False), free).matrix
     geometric = csc_array(0.5 * (bare + bare.T))
     stiff = csc_array(0.5 * (reduced.matrix + reduced.matrix.T))
     inverse = LinearOperator(stiff.shape, factors(stiff).solve, dtype=float)  # pyright: ignore
@@ -120,7 +120,7 @@ def _drawn(size: int) -> Array:
     return np.random.default_rng(0).standard_normal(size)
 
 
-def _spread(shell: Shell, reduced: Reduced, vectors: Array) -> Array:
+def _spread(shell: Shell, reduced: ReducedTangent, vectors: Array) -> Array:
     out = np.zeros((vectors.shape[1], 6 * len(shell.points)))
     out[:, reduced.at] = vectors.T
     return out.reshape(len(out), -1, 6)

@@ -59,7 +59,7 @@ class ShellPath:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Reduced:
+class ReducedTangent:
     """A tangent on the free coordinates.
 
     Attributes
@@ -141,7 +141,7 @@ def displacements(shell: Shell, load: Array, free: Truths) -> Array:
         The shell is not held.
     """
     load, free = _matched(shell, load, free)
-    return Reduced.of(shell.tangent(shell.poses), free).solver()(load)
+    return ReducedTangent.of(shell.tangent(shell.poses), free).solver()(load)
 
 
 def equilibrium(
@@ -184,7 +184,7 @@ def _newton(
         left = load(share) - force
         if first is not None:
             left = left - (tangent @ first.ravel()).reshape(-1, 6)
-        solved = Reduced.of(tangent, free).solver()
+        solved = ReducedTangent.of(tangent, free).solver()
         change = solved(left)
         if first is not None:
             change, first = change + first, None
@@ -244,7 +244,7 @@ def follow(
     load, free = _matched(shell, load, free)
     metric = np.concatenate([np.full(3, 1.0), np.full(3, shell.size**-2)])
     here, share, before = shell.poses, 0.0, None
-    reduced = Reduced.of(shell.tangent(here), free)
+    reduced = ReducedTangent.of(shell.tangent(here), free)
     shares, points, unstable = [0.0], [here], [negative(reduced.matrix)]
     distance = 0.0
     while len(shares) < most:
@@ -265,7 +265,7 @@ def follow(
                 raise
             continue
         before, here, share = ahead, there, found
-        reduced = Reduced.of(shell.tangent(here), free)
+        reduced = ReducedTangent.of(shell.tangent(here), free)
         shares.append(share)
         points.append(here)
         unstable.append(negative(reduced.matrix))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.mechanics.tree.finding.tables import TREE, Mechanism
+from ephs.mechanics.tree.finding.tables import TREE, MechanismTables
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ Column = tuple[int, Index]
 """A column, and the rows in which it may have entries."""
 
 
-def columns_of_trees(t: Mechanism, increments: int, freedoms: int, warm: Index) -> Iterator[Column]:
+def columns_of_trees(t: MechanismTables, increments: int, freedoms: int, warm: Index) -> Iterator[Column]:
     """The columns of ∂ẏ/∂y of y = (v, r, heats) and their rows, of a mechanism without loops or attached networks.
 
     A tree of bodies acts on itself, on those that springs and contacts tie to it, and on what takes the heat there.

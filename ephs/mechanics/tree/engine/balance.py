@@ -18,11 +18,11 @@ from ephs.mechanics.tree.engine.attachment import attached_energy
 from ephs.mechanics.tree.engine.forces import strain
 from ephs.mechanics.tree.engine.heats import entropies
 from ephs.mechanics.tree.engine.storing import store_attached
-from ephs.mechanics.tree.sweeps.acting import Body
+from ephs.mechanics.tree.sweeps.acting import PushedBody
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
-from ephs.solve.march.account import BEYOND, MOST, ROUNDING, WORTH, Account, rounding, stretch
+from ephs.solve.march.account import BEYOND, MOST, ROUNDING, WORTH, RunAccount, rounding, stretch
 from ephs.solve.march.storing import Missing
 
 if TYPE_CHECKING:
@@ -39,7 +39,9 @@ FARTHEST = 0.5
 
 
 @staged
-def held(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector, out: Annotated[Vector, 3]) -> Integer:
+def stored_energies(
+    on: Evaluator, motion: "Mechanism", q: Vector, r: Vector, heats: Vector, out: Annotated[Vector, 3]
+) -> Integer:
     """Write kinetic energy, all other energy that is not heat, and the sum of its terms' sizes in J to out (3,).
 
     Returns
@@ -80,7 +82,7 @@ def measure(on: Evaluator, motion: "Mechanism", q: Vector, r: Vector) -> None:
 def correct(
     on: Evaluator,
     motion: "Mechanism",
-    account: Account,
+    account: RunAccount,
     work: Real,
     heat: Real,
     h: Real,
@@ -114,7 +116,7 @@ def correct(
     account.moved, account.size, account.rest = 0.0, 0.0, 0.0
     turned = on.variable(0.0)
 
-    def settle() -> None:
+    def correct_energy() -> None:
         short = run.short
         turn(on, motion, q, r, motion.work.kept)
         run.look(heats)
@@ -123,7 +125,7 @@ def correct(
     def keep() -> None:
         run.look(heats)
         account.noise = account.noise + ROUNDING * (run.energies[0] + run.energies[2])
-        on.when(on.both(run.known, run.floating), settle)
+        on.when(on.both(run.known, run.floating), correct_energy)
         on.when(run.known if always else on.negate(run.close), run.move)
         left = on.both(run.known if always else on.negate(run.close), motion.tables.own[0].attached > 0)
         on.when(on.both(left, on.same(run.status.value, 0)), lambda: store_attached(run))
@@ -148,7 +150,7 @@ class Correction(Missing):
     allowed: Vector
 
     def look(self, states: Vector) -> None:
-        self.status.value = held(self.on, self.motion, self.q, self.r, states, self.energies)
+        self.status.value = stored_energies(self.on, self.motion, self.q, self.r, states, self.energies)
 
     @property
     def floating(self) -> Truth:
@@ -200,11 +202,11 @@ class Correction(Missing):
         """Root mean square of a move relative to what is allowed."""
         on, total = self.on, self.on.variable(0.0)
 
-        def one(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             x = move[j] / self.allowed[at + j]
             total.value = total.value + x * x
 
-        on.loop(move.size, one)
+        on.loop(move.size, each_entry)
         return on.sqrt(total.value / on.real(on.select(move.size > 1, move.size, 1)))
 
     def _weigh(self, rates: Vector, out: Variable[Real]) -> None:
@@ -239,10 +241,10 @@ class Correction(Missing):
         chosen = on.both(on.same(account.chosen, 1), size > MOST)
         alpha = stretch(on, share) * on.select(chosen, MOST / on.select(chosen, size, 1.0), 1.0)
 
-        def one(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             self.r[j] = self.r[j] + alpha * w.direction[j]
 
-        on.loop(self.r.size, one)
+        on.loop(self.r.size, each_entry)
         moved = twice * alpha * (1.0 + 0.5 * alpha)
         mended = on.either(near, self.motion.tables.own[0].attached > 0)
         account.moved, account.size = moved, on.select(mended, size, size / WORTH)
@@ -287,7 +289,7 @@ class Correction(Missing):
             there = far * self.h * self.h * self._size(w.descent, 0)
             return on.sqrt(0.5 * (here * here + there * there))
 
-        def go() -> None:
+        def iterate_steps() -> None:
             on.repeat(once)
             far = size(on.absolute(gone.value))
             self.account.size = on.select(self.close, far, on.maximum(far, REFUSED) / WORTH)
@@ -298,14 +300,14 @@ class Correction(Missing):
             self.account.size = size(stretch(on, share)) / WORTH
 
         within = on.both(whole.value > 0.0, on.absolute(self.short) <= FARTHEST * whole.value)
-        on.when(on.same(self.status.value, 0), lambda: on.when(within, go, stay))
+        on.when(on.same(self.status.value, 0), lambda: on.when(within, iterate_steps, stay))
 
     def _descend(self) -> None:
         """Write the accelerations from rest by weight and springs, and those of islands that turn by themselves."""
         on, motion, w = self.on, self.motion, self.motion.work
 
         def fall() -> None:
-            bodies = Table(Body, motion.tables.body.integers, motion.tables.body.reals, 0)
+            bodies = Table(PushedBody, motion.tables.body.integers, motion.tables.body.reals, 0)
             alone = replace(motion.tables, drive=w.still, body=bodies, lead=w.zero)
             ns, idle = motion.tables.node.size, w.idle
             s_rate, made = idle.part(0, ns), idle.part(ns + 2, idle.size - (ns + 2))
@@ -317,10 +319,10 @@ class Correction(Missing):
             clear(on, w.alter)
             turn(on, motion, self.q, w.alter, w.torque)
 
-            def one(j: Integer) -> None:
+            def each_entry(j: Integer) -> None:
                 w.descent[j] = w.descent[j] + w.alter[j]
 
-            on.loop(self.r.size, one)
+            on.loop(self.r.size, each_entry)
 
         on.when(self._alone, lambda: clear(on, w.descent), fall)
         on.when(self.floating, spin)
@@ -329,11 +331,11 @@ class Correction(Missing):
         """Move rates and positions by a part of their directions, and look at the energy there."""
         on, motion, w = self.on, self.motion, self.motion.work
 
-        def one(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             w.alter[j] = -(part * self.h * self.h) * w.descent[j]
             self.r[j] = self.r[j] + part * w.direction[j]
 
-        on.loop(self.r.size, one)
+        on.loop(self.r.size, each_entry)
         motion.displace(on, w.alter, self.q)
         if motion.closes:
             self.status.value = motion.shut(on, self.q, self.r)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
-from ephs.mechanics.road.charts import TIE, Chart, Kind
+from ephs.mechanics.road.charts import TIE, Chart, GroupKind
 from ephs.mechanics.road.cuts import Cut, Relative
-from ephs.mechanics.road.elimination import Closing, closing
+from ephs.mechanics.road.elimination import ClosingProgram, closing
 from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.pack import STANDARD, Packed
 from ephs.mechanics.road.programs import sweeps
@@ -16,10 +16,10 @@ from ephs.mechanics.road.rigid import SUMS
 from ephs.mechanics.tree.engine.attachment import Attachment, attachment_of, with_derivatives
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.islands import islands_of
-from ephs.mechanics.tree.engine.links import Frames, links_of
+from ephs.mechanics.tree.engine.links import LinkFrames, links_of
 from ephs.mechanics.tree.engine.tables import Forces, table_of
-from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
-from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, Component, Own
+from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, MechanismTables
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, CompiledComponent, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -80,7 +80,7 @@ def engine_of(
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _Plan:
+class _EnginePlan:
     """The shared part of engines: all but inputs and memory.
 
     Parameters
@@ -91,7 +91,7 @@ class _Plan:
 
     tables: Mapping[str, Any]
     shapes: Mapping[str, tuple[int, ...]]
-    closing: Closing
+    closing: ClosingProgram
     sizes: tuple[int, int]
     reached: Mapping[str, tuple[Program, str]]
     looped: bool
@@ -106,7 +106,7 @@ def _plan(
     *,
     apart: bool,
     momenta: bool,
-) -> _Plan:
+) -> _EnginePlan:
     """The plan of an engine, ``rates`` the number of all joints' rates."""
     found = links_of(reduced, apart=apart)
     bodies, ground = found.bodies, found.ground
@@ -138,23 +138,23 @@ def _plan(
     booked = entropies, entropies + 2 + len(reduced.made)
     shapes = _shapes(program.width, (len(found.parts), len(bases)), freedoms, rates, len(cut), booked, eliminated)
     shapes["located"] = tables["middle"].size, 6
-    return _Plan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
+    return _EnginePlan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
 
 
-class Whole(NamedTuple):
+class WholeMechanism(NamedTuple):
     """A mechanism with all rows of its loops, and with all its joints and bodies acted on."""
 
-    bodies: Frames
+    bodies: LinkFrames
     ground: Array
     records: Packed
-    kinds: tuple[Kind, ...]  # of its joints
+    kinds: tuple[GroupKind, ...]  # of its joints
     usual: bool  # whether its joints are standard ones, which all are in its class
     body_frame: Array  # (bodies, 12): see `Forces`
     tables: dict[str, Any]
     shapes: dict[str, tuple[int, ...]]  # of its memory, without what the class's program takes for links
 
 
-def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
+def whole_of(reduced: "Reduced", gravity: Array) -> WholeMechanism:
     """A reduced scene under gravity (3,) in world axes, for equations over dense matrices.
 
     What acts is evaluated with derivatives. Prescribed motions are rows, and nothing is eliminated.
@@ -172,7 +172,7 @@ def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
     net, none = attachment_of(reduced), np.zeros(0, dtype=np.int64)
     attached = reduced.attaching.network.acts
     reached = {"attach": (network_program(), "solve")} if attached else {}
-    whole = Closing(none, none, np.arange(size), none, none, 0, 0)
+    whole = ClosingProgram(none, none, np.arange(size), none, none, 0, 0)
     own = _own((len(parts), 0, 0), reached, forced=True, driven=False, attached=attached)
     links = {"own": own, "island": none, "bases": np.zeros(0), **_links(records)}
     tables = {**links, **_joints(charts, cut, cut_numbers, whole), **forces.tables(), **_attached(net)}
@@ -181,7 +181,7 @@ def whole_of(reduced: "Reduced", gravity: Array) -> Whole:
     shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[sorted(joints)].sum()), len(cut), booked, whole)
     shapes["located"] = tables["middle"].size, 6
     shapes |= {"value": (len(ends), 4), "covector": (size, 6), "e": (64,), "jac": (1024,), "scratch": (4096,)}
-    return Whole(
+    return WholeMechanism(
         found.bodies, found.ground, records, _kinds(charts, cut), usual, forces.body_frame, tables, shapes
     )  # fmt: skip
 
@@ -190,7 +190,7 @@ def _links(records: Packed) -> dict[str, Any]:
     return {"integers": records.integers, "reals": records.reals, "gravity": records.gravity}
 
 
-def _joints(charts: Index, cut: Index, numbers: Array, closing: Closing) -> dict[str, Any]:
+def _joints(charts: Index, cut: Index, numbers: Array, closing: ClosingProgram) -> dict[str, Any]:
     return {
         "chart": table_of(Chart, charts), "cut": cut[:, :-1].ravel(), "cut_numbers": numbers.ravel(),
         **{name: getattr(closing, name).ravel() for name in ("at", "slot", "row", "flat", "end")},
@@ -201,7 +201,7 @@ def _attached(net: Attachment) -> dict[str, Any]:
     return {"net": net.integers, "numbers": net.reals}
 
 
-def _kinds(charts: Index, cut: Index) -> tuple[Kind, ...]:
+def _kinds(charts: Index, cut: Index) -> tuple[GroupKind, ...]:
     return kinds_of([*charts[:, [0, 3, 1]].tolist(), *cut[:, [2, 5, 3]].tolist()])
 
 
@@ -245,7 +245,7 @@ def _own(
 
 def _shapes(
     width: int, groups: tuple[int, int], freedoms: int, joints: int, cuts: int, booked: tuple[int, int],
-    closing: Closing,
+    closing: ClosingProgram,
 ) -> dict[str, tuple[int, ...]]:  # fmt: skip
     """Shapes of the memory of one thread, by a link's width, numbers of links and islands, of entropies, and with
     totals.
@@ -271,7 +271,7 @@ def _matrix(pose: Array) -> Array:
     return np.concatenate([quaternion_to_matrix(pose[:4]).ravel(), pose[4:]])
 
 
-def _ends(reduced: "Reduced", bodies: Frames, ground: Array, i: int) -> tuple[int, int, Array]:
+def _ends(reduced: "Reduced", bodies: LinkFrames, ground: Array, i: int) -> tuple[int, int, Array]:
     """Links of an edge, and (24,) its frames there."""
     t = reduced.tables
     links, frames = [], []
@@ -283,7 +283,7 @@ def _ends(reduced: "Reduced", bodies: Frames, ground: Array, i: int) -> tuple[in
 
 
 def _cut(
-    reduced: "Reduced", bodies: Frames, ground: Array, kept: Sequence[Array] | None
+    reduced: "Reduced", bodies: LinkFrames, ground: Array, kept: Sequence[Array] | None
 ) -> tuple[Index, Array, list[tuple[int, ...]]]:
     """Cut joints with the numbers of their edges behind them, their numbers, and the links of each row."""
     t = reduced.tables
@@ -345,7 +345,7 @@ def _chart(reduced: "Reduced", cut: Index) -> Index:
 
 
 def _forces(
-    reduced: "Reduced", bodies: Frames, ground: Array, cut: Index, acted: tuple[frozenset[int], frozenset[int]]
+    reduced: "Reduced", bodies: LinkFrames, ground: Array, cut: Index, acted: tuple[frozenset[int], frozenset[int]]
 ) -> Forces:
     t = reduced.tables
     number = {int(i): k for k, i in enumerate(cut[:, -1])}
@@ -387,8 +387,8 @@ def _forces(
     )
 
 
-def _components(t: Mechanism) -> Table[Component]:
+def _components(t: MechanismTables) -> Table[CompiledComponent]:
     """Components with their relations at rest."""
     none = np.zeros_like(t.resting[:, None])
     rows = np.hstack([t.resting[:, None], t.dims, t.parameter_at[: len(t.resting), None], t.made_at[:, None], none])
-    return table_of(Component, rows)
+    return table_of(CompiledComponent, rows)

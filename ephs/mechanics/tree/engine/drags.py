@@ -12,7 +12,7 @@ from typing import Annotated, Any, final
 import numpy as np
 
 from ephs.mechanics.road.cuts import frame_on, place_of
-from ephs.mechanics.road.pack import Part
+from ephs.mechanics.road.pack import PackedLink
 from ephs.mechanics.road.tree import shift_back, turned
 from ephs.mechanics.tree.engine.held import constrain
 from ephs.mechanics.tree.engine.motion import Mechanism
@@ -237,7 +237,7 @@ def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str
     return {**tables, "component": component}
 
 
-def chains(parts: Sequence[Part]) -> dict[str, Any]:
+def chains(parts: Sequence[PackedLink]) -> dict[str, Any]:
     """``rate``, ``row_of``, ``above``, ``owner``, ``tip`` and ``reach`` of a tree's links."""
     size = [part.joint.dim for part in parts]  # rates of a link and of what it carries
     for i, part in reversed(list(enumerate(parts))):
@@ -257,7 +257,7 @@ def chains(parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def memory_of(
-    tables: Mapping[str, Any], parts: Sequence[Part], size: int, rows: int, led: Sequence[int], *, pushed: bool
+    tables: Mapping[str, Any], parts: Sequence[PackedLink], size: int, rows: int, led: Sequence[int], *, pushed: bool
 ) -> dict[str, Any]:
     """Memory of the losses of a mechanism whose links are given, but for a scheme.
 

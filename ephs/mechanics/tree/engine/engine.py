@@ -5,13 +5,13 @@ from typing import Any, cast, final
 
 import numpy as np
 
-from ephs.mechanics.road.elimination import Closing
+from ephs.mechanics.road.elimination import ClosingProgram
 from ephs.mechanics.tree.engine.drags import resisting
 from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, stiff_program
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Program, Record, Table, members
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import Account, Control, Totals
+from ephs.solve.march import MarchControl, RunAccount, Totals
 from ephs.solve.march.account import WORTH
 
 
@@ -37,7 +37,7 @@ class Engine:
     """
 
     def __init__(
-        self, tables: Mapping[str, Any], work: Mapping[str, Any], closing: Closing, sizes: tuple[int, int],
+        self, tables: Mapping[str, Any], work: Mapping[str, Any], closing: ClosingProgram, sizes: tuple[int, int],
         reached: Mapping[str, tuple[Program, str]], *, looped: bool,
     ) -> None:  # fmt: skip
         self.tables, self.work, self.closing, self.looped = tables, work, closing, looped
@@ -52,8 +52,8 @@ class Engine:
         self._held, self._heats = np.zeros(3), np.zeros(work["entropy"].size)
         self.totals = {name: np.zeros(summed) for name in members(Totals)} | {"start": self._start, "end": self._y}
         self._counted = 2 * self._r.size + work["entropy"].size
-        self._account, self._allowed = Account.table(1), np.zeros(self._counted)
-        self._stages: dict[int, tuple[dict[str, Array], Table[Control], Array, Array, Bound]] = {}
+        self._account, self._allowed = RunAccount.table(1), np.zeros(self._counted)
+        self._stages: dict[int, tuple[dict[str, Array], Table[MarchControl], Array, Array, Bound]] = {}
         self._sums: dict[int, tuple[Mapping[str, Any], Array, Bound]] = {}
         self._arguments: dict[str, tuple[Any, ...]] = {
             "rates": (self._base, self._y, self._q, self._out),
@@ -131,7 +131,7 @@ class Engine:
         """
         if len(k) not in self._stages:
             own = {name: np.array(value) for name, value in tableau.items()}
-            control, rows, last = Control.table(1), np.zeros(k.shape), np.zeros(y.size)
+            control, rows, last = MarchControl.table(1), np.zeros(k.shape), np.zeros(y.size)
             bound = self.bind("stages", own, control, self._base, self._start, rows, last, self._y, self._q, 0.0)
             self._stages[len(k)] = own, control, rows, last, bound
         own, control, rows, last, bound = self._stages[len(k)]

@@ -8,7 +8,15 @@ from ephs.mechanics.road.cuts import Relative, frame_on, motion_of, place_of, po
 from ephs.mechanics.road.needs import NO_INTEGERS
 from ephs.mechanics.road.tree import shift_back, turned
 from ephs.mechanics.tree.engine.near import Near
-from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_TREE, Acting, Component, Conduction, Tables, Work
+from ephs.mechanics.tree.sweeps.acting import (
+    ON_BODIES,
+    ON_TREE,
+    Acting,
+    CompiledComponent,
+    ConductingComponent,
+    Tables,
+    Work,
+)
 from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
@@ -43,7 +51,7 @@ def act(
     drags
         Receives resistances in place of friction, which then does not act.
     """
-    acting = _Acting(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read, drags)
+    acting = _ActingEvaluation(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read, drags)
     totals[0], totals[1] = 0.0, 0.0
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
@@ -60,18 +68,18 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
 
     Places of links in the memory are those at q where springs act between bodies.
     """
-    acting = _Acting(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, None)
+    acting = _ActingEvaluation(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, None)
 
-    def one(edge: Acting, _: Integer) -> None:
+    def each_edge(edge: Acting, _: Integer) -> None:
         on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.store(edge, out)))
 
-    Near.of(on, tables, work).each(one)
+    Near.of(on, tables, work).each(each_edge)
     return acting.status.value
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Acting:
+class _ActingEvaluation:
     """One evaluation of what acts."""
 
     on: Evaluator
@@ -98,7 +106,7 @@ class _Acting:
         jac in place of flows.
         """
         on, tables, w, row = self.on, self.tables, self.work, self.tables.component[number]
-        dims = Integers(row.integers, row.integer_start + Component.dims.offset, 4)
+        dims = Integers(row.integers, row.integer_start + CompiledComponent.dims.offset, 4)
         if self.read is not None:
             if stored:
                 self.read.store(on, number, dims, w)
@@ -239,10 +247,10 @@ class _Acting:
         self.unless_refused(friction)
 
         def in_joint() -> None:
-            def one(j: Integer) -> None:
+            def each_freedom(j: Integer) -> None:
                 w.force[edge.r_at + j] = w.force[edge.r_at + j] + pull[j]
 
-            on.loop(edge.dim, one)
+            on.loop(edge.dim, each_freedom)
 
         def keep() -> None:
             copy(on, pull.part(0, edge.dim), w.pulled.part(edge.r_at, edge.dim))
@@ -273,10 +281,10 @@ class _Acting:
         return [row[k] for k in range(6)]
 
     def _along(self, edge: Acting, twist: list[Real], rate: Vector) -> None:
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             rate[j] = dot(self._left(edge, j), twist)
 
-        self.on.loop(edge.dim, one)
+        self.on.loop(edge.dim, each_freedom)
 
     def _drive(self, edge: Acting, rate: Vector, pull: Vector) -> None:
         """Start from the given forces on a joint, whose element goes to the states of components."""
@@ -285,12 +293,12 @@ class _Acting:
         else:
             copy(self.on, self.q.part(edge.q_at, edge.size), self.work.x.part(0, edge.size))
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             given = self.tables.drive[edge.r_at + j]
             pull[j] = given + self.work.attached[edge.r_at + j]
             self.totals[1] = self.totals[1] + given * rate[j]
 
-        self.on.loop(edge.dim, one)
+        self.on.loop(edge.dim, each_freedom)
 
     def store(self, edge: Acting, out: Vector) -> None:
         """Add the energy of a spring."""
@@ -309,10 +317,10 @@ class _Acting:
     def _spring(self, edge: Acting, pull: Vector) -> None:
         self._evaluate(edge.spring, stored=True)
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             pull[j] = pull[j] - self.work.e[j]
 
-        self.on.loop(edge.dim, one)
+        self.on.loop(edge.dim, each_freedom)
 
     def _friction(self, edge: Acting, number: Integer, rate: Vector, pull: Vector) -> None:
         w, d, heat = self.work, edge.dim, edge.heat
@@ -323,11 +331,11 @@ class _Acting:
             self.drags.note(self.on, self.tables, w, edge, number)
             return
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             pull[j] = pull[j] - w.f[j]
             self.totals[0] = self.totals[0] + w.f[j] * rate[j]
 
-        self.on.loop(d, one)
+        self.on.loop(d, each_freedom)
         self.s_rate[heat] = self.s_rate[heat] - w.f[d]
         self.made[self.tables.component[edge.friction].made] = -w.f[d]
 
@@ -335,11 +343,11 @@ class _Acting:
         """Add a pull in an edge to the wrenches on its links."""
         on, wide, pushed = self.on, [self.on.variable(0.0) for _ in range(6)], self.work.pushed
 
-        def one(j: Integer) -> None:
+        def each_freedom(j: Integer) -> None:
             for total, x in zip(wide, self._left(edge, j), strict=True):
                 total.value = total.value + x * pull[j]
 
-        on.loop(edge.dim, one)
+        on.loop(edge.dim, each_freedom)
         whole = turned(motion.turn, [total.value for total in wide])
 
         def push(link: Integer, by: list[Real]) -> None:
@@ -349,7 +357,7 @@ class _Acting:
         on.when(edge.second >= 0, lambda: push(edge.second, whole))
         on.when(edge.first >= 0, lambda: push(edge.first, scale(-1.0, whole)))
 
-    def conduct(self, row: Conduction) -> None:
+    def conduct(self, row: ConductingComponent) -> None:
         """Add the conduction of a component to the rates of two entropies, and note what leaves the first."""
         w, rate = self.work, self.s_rate
         w.e[0], w.e[1] = w.temperature[row.one], w.temperature[row.two]

@@ -24,7 +24,7 @@ def entropies(on: Evaluator, tables: Tables, work: Work, heats: Vector) -> Integ
     """Write entropies of energies in J to the memory; return a status."""
     status = on.counter(0)
 
-    def one(k: Integer) -> None:
+    def each_node(k: Integer) -> None:
         node, energy = tables.node[k], heats[k]
 
         def stored() -> None:
@@ -44,7 +44,7 @@ def entropies(on: Evaluator, tables: Tables, work: Work, heats: Vector) -> Integ
 
         on.when(node.component < 0, outside, stored)
 
-    on.loop(tables.node.size, one)
+    on.loop(tables.node.size, each_node)
     return status.value
 
 
@@ -142,7 +142,7 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
     """
     first, found = tables.node.size + 2, on.counter(0)
 
-    def one(place: Integer) -> None:
+    def each_entry(place: Integer) -> None:
         def name(number: Integer) -> None:
             here = on.same(tables.component[number].made, place - first)
             found.value = on.select(here, number + 1, found.value)
@@ -150,7 +150,7 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
         sound = sign * change[place] >= -rounding[place]
         on.when(sound, lambda: None, lambda: on.loop(tables.component.size, name))
 
-    on.loop(change.size, one, start=first)
+    on.loop(change.size, each_entry, start=first)
     return found.value
 
 
@@ -184,7 +184,7 @@ def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
 def warm(on: Evaluator, tables: Tables, before: Vector, heats: Vector) -> None:
     """Lift energies in J to what they are at a hundredth of the temperatures before."""
 
-    def one(k: Integer) -> None:
+    def each_node(k: Integer) -> None:
         c1 = tables.node[k].c1
 
         def lift() -> None:
@@ -192,7 +192,7 @@ def warm(on: Evaluator, tables: Tables, before: Vector, heats: Vector) -> None:
 
         on.when(tables.node[k].component >= 0, lift)
 
-    on.loop(tables.node.size, one)
+    on.loop(tables.node.size, each_node)
 
 
 def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector) -> None:
@@ -202,7 +202,7 @@ def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vecto
     """
     nodes = tables.node.size
 
-    def held(maker: Integer) -> Real:
+    def clamped(maker: Integer) -> Real:
         at = nodes + 2 + maker
         least, most = on.minimum(low[at], high[at]), on.maximum(low[at], high[at])
         kept = on.minimum(on.maximum(change[at], least), most)
@@ -214,14 +214,14 @@ def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vecto
         edge = tables.acting[i]
 
         def rubbed() -> None:
-            moved = held(tables.component[edge.friction].made)
+            moved = clamped(tables.component[edge.friction].made)
             change[edge.heat], change[nodes] = change[edge.heat] + moved, change[nodes] + moved
 
         on.when(edge.friction >= 0, rubbed)
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
-        moved = held(tables.component[row.component].made)
+        moved = clamped(tables.component[row.component].made)
         change[row.one], change[row.two] = change[row.one] - moved, change[row.two] + moved
 
     on.loop(tables.acting.size, friction)

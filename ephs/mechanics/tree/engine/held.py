@@ -60,7 +60,7 @@ def pull(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None:
     """Take out of accelerations what is across the constraints; add the power of prescribed motions by that."""
     pulled, part, power = drags.pulled, drags.part, motion.summed + (motion.tables.node.size + 1)
 
-    def look(a: Integer) -> None:
+    def each_entry(a: Integer) -> None:
         pulled[a] = dot(on, drags.held.row(a), part)
 
     def hold(a: Integer) -> None:
@@ -69,7 +69,7 @@ def pull(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None:
     def lead(k: Integer) -> None:
         out[power] = out[power] + pulled[k] * drags.reached[drags.led[k]]
 
-    on.loop(pulled.size, look)
+    on.loop(pulled.size, each_entry)
     forward(on, drags.among, pulled)
     backward(on, drags.among, pulled)
     on.loop(pulled.size, hold)

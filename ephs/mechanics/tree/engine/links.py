@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.mechanics.constraints.subgroup import Subgroup, generated
-from ephs.mechanics.road.pack import SLIDE, TURN, Packed, Part, packed
-from ephs.mechanics.road.records import Joint
+from ephs.mechanics.road.pack import SLIDE, TURN, Packed, PackedLink, packed
+from ephs.mechanics.road.records import JointKind
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -24,7 +24,7 @@ FLAT = 1e-9
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Frames:
+class LinkFrames:
     """Poses of bodies in the frames of the links that they belong to, found outwards along the tree."""
 
     link: list[int]
@@ -48,12 +48,12 @@ class Found:
         Whether everything moves in that plane.
     """
 
-    parts: Sequence[Part]
-    bodies: Frames
+    parts: Sequence[PackedLink]
+    bodies: LinkFrames
     ground: Array
     planar: bool
 
-    def packed(self, gravity: Array, among: Sequence[Joint] = ()) -> Packed:
+    def packed(self, gravity: Array, among: Sequence[JointKind] = ()) -> Packed:
         """The sweeps' records under gravity (3,) in world axes; ``among``: further kinds of joints of their class."""
         pull = quaternion_to_matrix(self.ground[:4]) @ np.asarray(gravity, dtype=float)
         return packed(self.parts, pull, planar=self.planar, among=among)
@@ -69,8 +69,8 @@ def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:
     joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
     normal = None if apart else _plane(reduced, joints)
     ground = SE3.identity() if normal is None else np.concatenate([matrix_to_quaternion(_onto(normal)), np.zeros(3)])
-    bodies = Frames([], [])
-    parts: list[Part] = []
+    bodies = LinkFrames([], [])
+    parts: list[PackedLink] = []
     for i in range(reduced.links):
         parent = int(t.parent[i])
         above, inside = (bodies.link[parent], bodies.inside[parent]) if parent >= 0 else (-1, ground)
@@ -97,13 +97,13 @@ def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:
         else:
             columns = tuple(tuple(column) for column in edge.pair.basis.T.tolist())
             inverted = not forward and edge.pair.code != VECTOR
-            kind, sign = Joint(edge.pair.code, edge.pair.size, columns, inverted, driven), 1 if inverted else sign
+            kind, sign = JointKind(edge.pair.code, edge.pair.size, columns, inverted, driven), 1 if inverted else sign
         matrix = quaternion_to_matrix(joint[:4])
         numbers = np.concatenate([matrix.ravel(), joint[4:], np.zeros(10)])
         numbers += _inertia(t.inertia[i], bodies.inside[-1])
         own = float(t.armature[t.r_at[i]]) if edge.pair.dim else 0.0
         kind = replace(kind, armature=own > 0.0 and not driven)
-        parts.append(Part(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers, own))
+        parts.append(PackedLink(kind, above, int(t.q_at[i]), int(t.r_at[i]), sign, numbers, own))
     return Found(parts, bodies, ground, normal is not None)
 
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, final
 
-from ephs.mechanics.road.records import Link
+from ephs.mechanics.road.records import LinkConstants
 from ephs.mechanics.road.rows import SIZE
-from ephs.mechanics.tree.engine.balance import correct, held, measure
+from ephs.mechanics.tree.engine.balance import correct, measure, stored_energies
 from ephs.mechanics.tree.engine.forces import act
 from ephs.mechanics.tree.engine.heats import absorb, count, entropies, heat_rates, hold, lawless, warm
 from ephs.mechanics.tree.engine.shutting import close
@@ -14,7 +14,7 @@ from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.semantics.linear.dense import clear, subtract
 from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
-from ephs.solve.march.account import BEYOND, Account, rounding
+from ephs.solve.march.account import BEYOND, RunAccount, rounding
 from ephs.solve.march.records import Motion, Status
 from ephs.solve.march.stiff import whole
 
@@ -115,7 +115,8 @@ class Mechanism(Motion):
         """Status where a sweep says 1 + the link whose joint moves no mass, which loops may determine; else 0."""
 
         def blame() -> None:
-            self.work.fault[0] = self.tables.integers[(still - 1) * Link.integer_width + Link.r_at.offset]
+            place = (still - 1) * LinkConstants.integer_width + LinkConstants.r_at.offset
+            self.work.fault[0] = self.tables.integers[place]
 
         on.when(still > 0, blame)
         return on.select(still > 0, int(Status.DEPENDENT if self.looped else Status.STILL), 0)
@@ -124,10 +125,10 @@ class Mechanism(Motion):
         """`Status.DEPENDENT` where a row, without those it is coupled to, is nearly nothing beside them; else 0."""
         found = on.counter(0)
 
-        def look() -> None:
+        def reach_dependent() -> None:
             found.value = on.reach(self.tables.own[0].dependent, *self._rows, self.work.largest)
 
-        on.when(self.work.value.rows > 0, look)
+        on.when(self.work.value.rows > 0, reach_dependent)
         return on.select(found.value > 0, int(Status.DEPENDENT), 0)
 
     def _resolve(self, on: Evaluator) -> Vector:
@@ -245,22 +246,22 @@ class Mechanism(Motion):
         """Put what components made in a step in place of what they passed on, at its end y."""
         at, change, size = self.summed, self.work.idle, self.work.spare
 
-        def one(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             change[j] = y[at + j] - start[at + j]
 
-        def put(j: Integer) -> None:
+        def each_number(j: Integer) -> None:
             y[at + j] = start[at + j] + change[j]
 
-        on.loop(change.size, one)
+        on.loop(change.size, each_entry)
         count(on, self.tables, self.work, start.part(at, change.size), change, size)
-        on.loop(change.size, put)
+        on.loop(change.size, each_number)
 
     def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
         nv, n, at, nodes = self.increments, self.freedoms, self.summed, self.tables.node.size
         energies, before = on.scratch(3), y0.part(at + nodes, 2)
 
         def known() -> None:
-            held(on, self, q, y1.part(nv, n), y1.part(at, nodes), energies)
+            stored_energies(on, self, q, y1.part(nv, n), y1.part(at, nodes), energies)
             lost = anchor + (before[1] - before[0]) + change[nodes + 1] - (energies[0] + energies[1])
             absorb(on, self.tables, lost, change)
 
@@ -274,7 +275,7 @@ class Mechanism(Motion):
         hold(on, self.tables, change, low, high)
 
     def correct(
-        self, on: Evaluator, account: Account, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector,
+        self, on: Evaluator, account: RunAccount, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector,
         always: bool = False,
     ) -> Integer:  # fmt: skip
         nv, n, at = self.increments, self.freedoms, self.summed + self.tables.node.size
@@ -283,9 +284,9 @@ class Mechanism(Motion):
             on, self, account, y[at + 1], y[at], h, start.part(nv, n), q, y.part(nv, n), stored, heats, allowed, always
         )
 
-    def open(self, on: Evaluator, account: Account, q: Vector, y: Vector) -> Integer:
+    def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:
         energies, at, ns = on.scratch(3), self.summed, self.tables.node.size
-        status = held(on, self, q, y.part(self.increments, self.freedoms), y.part(at, ns), energies)
+        status = stored_energies(on, self, q, y.part(self.increments, self.freedoms), y.part(at, ns), energies)
         account.anchor = energies[0] + energies[1] + (y[at + ns] - y[at + (ns + 1)])
         on.when(self.tables.own[0].islands > 0, lambda: measure(on, self, q, y.part(self.increments, self.freedoms)))
         return status
@@ -306,12 +307,12 @@ class Mechanism(Motion):
             def widen(j: Integer) -> None:
                 most.value = on.maximum(most.value, larger(nv + chart.r_at + j))
 
-            def put(j: Integer) -> None:
+            def each_freedom(j: Integer) -> None:
                 out[n + chart.r_at + j] = most.value
 
             def on_tree() -> None:
                 on.loop(chart.dim, widen)
-                on.loop(chart.dim, put)
+                on.loop(chart.dim, each_freedom)
 
             on.when(chart.cut < 0, on_tree)
 
@@ -335,13 +336,11 @@ class Mechanism(Motion):
     def least(self, on: Evaluator, change: Vector) -> Real:
         first, least = self.tables.node.size + 2, on.variable(0.0)
 
-        def one(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             least.value = on.select(on.same(j, first), change[j], on.minimum(change[j], least.value))
 
-        on.loop(change.size, one, start=first)
+        on.loop(change.size, each_entry, start=first)
         return least.value
-
-    # ---- loops -----------------------------------------------------------------------------------------------------
 
     def gaps(self, on: Evaluator, q: Vector) -> Real:
         """Write targets that close the cut joints in one step of Newton's method; how far they are open, in m, rad."""
@@ -368,11 +367,11 @@ class Mechanism(Motion):
         unsound = on.negate(on.same(status.value, 0))
         done = unsound if always else on.either(unsound, on.either(gap <= GAP, gap > 0.5 * before))
 
-        def go() -> None:
+        def displace_once() -> None:
             self.gaps(on, q)
             self.displace(on, self._resolve(on), q)
 
-        on.when(on.negate(done), go)
+        on.when(on.negate(done), displace_once)
         return status.value, gap, done
 
     def displace(self, on: Evaluator, alter: Vector, q: Vector) -> None:

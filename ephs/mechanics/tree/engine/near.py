@@ -49,7 +49,7 @@ class Near:
         """Call body(edge, number) of the edges, but those whose frames are so far apart that nothing acts."""
         on, tables = self.on, self.tables
 
-        def one(g: Integer) -> None:
+        def each_group(g: Integer) -> None:
             group, near = tables.group[g], on.counter(1)
 
             def look() -> None:
@@ -62,7 +62,7 @@ class Near:
             on.when(on.same(near.value, 1), lambda: on.loop(group.end, edge, start=group.start))
 
         on.loop(tables.middle.size, self._place)
-        on.loop(tables.group.size, one)
+        on.loop(tables.group.size, each_group)
 
     def _place(self, k: Integer) -> None:
         middle = self.tables.middle[k]
@@ -81,7 +81,7 @@ class Near:
     def _alone(self, edge: Acting, body: Callable[[Acting], None]) -> None:
         on, near = self.on, self.on.counter(1)
 
-        def look() -> None:
+        def near_edge() -> None:
             self._meet(edge)
             inner, pair = edge.inner_turn, self.pair
             way = sub(add(apply(pair.turn, edge.outer_at), pair.at), edge.inner_at)
@@ -103,7 +103,7 @@ class Near:
             for kind, test in ((APART, boxes), (ALONG, segments)):
                 on.when(on.both(on.same(edge.support, kind), on.same(near.value, 1)), test)
 
-        on.when(edge.support > 0, look)
+        on.when(edge.support > 0, near_edge)
         on.when(on.same(near.value, 1), lambda: body(edge))
 
     def _meet(self, edge: Acting) -> None:

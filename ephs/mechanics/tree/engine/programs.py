@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from ephs.mechanics.tree.engine.balance import held, measure
+from ephs.mechanics.tree.engine.balance import measure, stored_energies
 from ephs.mechanics.tree.engine.drags import Drags
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.shutting import close
@@ -21,11 +21,11 @@ from ephs.semantics.stage import (
     kind_of,
 )
 from ephs.solve.march import (
-    Account,
-    Control,
+    MarchControl,
     Memory,
+    RunAccount,
     Stiff,
-    Tableau,
+    TableauRecord,
     Totals,
     march,
 )
@@ -51,15 +51,24 @@ def motion_program(*, looped: bool) -> Program:
     """Return the program: what is the same for all mechanisms; what is not it calls by addresses in their tables."""
 
     def marched(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
-        account: Table[Account], steps: Integer,
+        on: Evaluator, motion: Mechanism, tableau: TableauRecord, memory: Memory, control: Table[MarchControl],
+        account: Table[RunAccount], steps: Integer,
     ) -> Integer:  # fmt: skip
         return march(on, motion, tableau, memory, control[0], account[0], steps)
 
     def stages(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
-        k: Matrix, last: Vector, y: Vector, q: Vector, h: Real,
-    ) -> Integer:  # fmt: skip
+        on: Evaluator,
+        motion: Mechanism,
+        tableau: TableauRecord,
+        control: Table[MarchControl],
+        base: Vector,
+        start: Vector,
+        k: Matrix,
+        last: Vector,
+        y: Vector,
+        q: Vector,
+        h: Real,
+    ) -> Integer:
         return attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
 
     def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
@@ -75,7 +84,7 @@ def motion_program(*, looped: bool) -> Program:
         motion.count(on, before, after)
 
     def summed(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, k: Matrix, totals: Totals, base: Vector, q: Vector,
+        on: Evaluator, motion: Mechanism, tableau: TableauRecord, k: Matrix, totals: Totals, base: Vector, q: Vector,
         h: Real, anchor: Real, part: Integer, damped: Integer,
     ) -> Integer:  # fmt: skip
         status = on.counter(0)
@@ -91,7 +100,7 @@ def motion_program(*, looped: bool) -> Program:
         return status.value
 
     def corrected(
-        on: Evaluator, motion: Mechanism, account: Table[Account], start: Vector, y: Vector, q: Vector,
+        on: Evaluator, motion: Mechanism, account: Table[RunAccount], start: Vector, y: Vector, q: Vector,
         allowed: Vector, h: Real, share: Real,
     ) -> Integer:  # fmt: skip
         status = motion.correct(on, account[0], h, start, y, q, allowed)
@@ -106,14 +115,14 @@ def motion_program(*, looped: bool) -> Program:
     ) -> None:
         totals = out.part(0, 2)
 
-        def one(k: Integer) -> None:
+        def each_row(k: Integer) -> None:
             motion.accelerate(on, q.row(k), r.row(k), rates.row(k), out, out, totals)
 
-        on.loop(repeats, lambda _: on.loop(q.rows, one))
+        on.loop(repeats, lambda _: on.loop(q.rows, each_row))
 
     functions = {
         "march": marched, "stages": stages, "rates": rates, "advance": advance, "velocities": velocities,
-        "counted": counted, "summed": summed, "corrected": corrected, "measured": measure, "energy": held,
+        "counted": counted, "summed": summed, "corrected": corrected, "measured": measure, "energy": stored_energies,
         "evaluations": evaluations,
     }  # fmt: skip
     if looped:
@@ -127,8 +136,8 @@ def stiff_program() -> Program:
     """Return the program of implicit steps of trees, many in one call."""
 
     def marched(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
-        account: Table[Account], stiff: Stiff, steps: Integer,
+        on: Evaluator, motion: Mechanism, tableau: TableauRecord, memory: Memory, control: Table[MarchControl],
+        account: Table[RunAccount], stiff: Stiff, steps: Integer,
     ) -> Integer:  # fmt: skip
         return march(on, motion, tableau, memory, control[0], account[0], steps, stiff)
 
@@ -140,21 +149,31 @@ def lagged_program(*, looped: bool) -> Program:
     """Return the program of semi-implicit steps, many in one call, or stage by stage."""
 
     def marched(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, memory: Memory, control: Table[Control],
-        account: Table[Account], drags: Drags, steps: Integer,
+        on: Evaluator, motion: Mechanism, tableau: TableauRecord, memory: Memory, control: Table[MarchControl],
+        account: Table[RunAccount], drags: Drags, steps: Integer,
     ) -> Integer:  # fmt: skip
         return march(on, motion, tableau, memory, control[0], account[0], steps, lagged=drags)
 
     def staged(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
-        k: Matrix, drags: Drags, y: Vector, q: Vector, i: Integer, h: Real,
-    ) -> Integer:  # fmt: skip
+        on: Evaluator,
+        motion: Mechanism,
+        tableau: TableauRecord,
+        control: Table[MarchControl],
+        base: Vector,
+        start: Vector,
+        k: Matrix,
+        drags: Drags,
+        y: Vector,
+        q: Vector,
+        i: Integer,
+        h: Real,
+    ) -> Integer:
         status = on.counter(0)
 
-        def one() -> None:
+        def next_stage() -> None:
             status.value = stage(on, motion, tableau, control[0], base, start, h, k, drags, i, y, q)
 
-        on.when(i < tableau.a.columns, one, lambda: end(on, motion, tableau, base, start, h, k, drags, y, q))
+        on.when(i < tableau.a.columns, next_stage, lambda: end(on, motion, tableau, base, start, h, k, drags, y, q))
         return status.value
 
     return Program(

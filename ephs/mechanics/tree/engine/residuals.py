@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any, Final, final
 
 from ephs.mechanics.road import charts
-from ephs.mechanics.road.charts import Kind
+from ephs.mechanics.road.charts import GroupKind
 from ephs.mechanics.road.closures import Closures
 from ephs.mechanics.road.cuts import Cut
 from ephs.mechanics.road.inverse import action, armatures, masses, needed_forces, row_of_covector, weigh
@@ -76,7 +76,7 @@ class Residuals:
         ``twists``: (n, 6) of a link by the rates. ``residual`` and ``action``: see above.
     """
 
-    def __init__(self, kind: Class, kinds: tuple[Kind, ...]) -> None:
+    def __init__(self, kind: Class, kinds: tuple[GroupKind, ...]) -> None:
         self.kinds, self.made_of = kinds, (kind, kinds)
         self._seen = [k for k in range(6) if not kind.planar or k not in (0, 1, 5)]
         self._sweeps = Sweeps(kind, others=self._entries)
@@ -115,7 +115,7 @@ class Residuals:
                 clear(on, jacobian.row(driven + a))
                 clear(on, sizes.row(driven + a))
 
-            def one(joint: Cut, a: Integer, end: Integer) -> None:
+            def each_row(joint: Cut, a: Integer, end: Integer) -> None:
                 m = driven + a
 
                 def count(at: Integer, size: Real) -> None:
@@ -125,7 +125,7 @@ class Residuals:
                     row_of_covector(on, tree, link, self._seen, closing.at_end(e), jacobian.row(m), count)
 
             on.loop(jacobian.rows - driven, empty)
-            closing.each_row(on, one)
+            closing.each_row(on, each_row)
             return cholesky(on, mass, factor)
 
         def rigid(on: Evaluator, tables: Tables, work: Work, q: Vector, r: Vector, out: Vector) -> None:
@@ -225,7 +225,7 @@ def _clear(on: Evaluator, work: Work) -> None:
 
 
 @cache
-def residuals(kind: Class, kinds: tuple[Kind, ...]) -> Residuals:
+def residuals(kind: Class, kinds: tuple[GroupKind, ...]) -> Residuals:
     """The program of a class, made once."""
     return Residuals(kind, kinds)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ephs.mechanics.road.cuts import place_of
-from ephs.mechanics.road.records import Link
+from ephs.mechanics.road.records import LinkConstants
 from ephs.mechanics.road.tree import Inertia, shift
 from ephs.mechanics.tree.engine.held import among, pull
 from ephs.mechanics.tree.engine.motion import Mechanism
@@ -153,10 +153,12 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
     tables, place, links = motion.tables, motion.work.places(motion.tables), motion.tables.links
     origin = place_of(on, place, 0).at
 
-    def link_of(i: Integer) -> Link:
-        return Link(tables.integers.cells, i * Link.integer_width, tables.reals.cells, i * Link.real_width)
+    def link_of(i: Integer) -> LinkConstants:
+        return LinkConstants(
+            tables.integers.cells, i * LinkConstants.integer_width, tables.reals.cells, i * LinkConstants.real_width
+        )
 
-    def one(i: Integer) -> None:
+    def each_link(i: Integer) -> None:
         link, here, body = link_of(i), place_of(on, place, i), drags.body.row(i)
         for k, x in enumerate(Inertia.of(link, here.turn).about(sub(here.at, origin)).numbers):
             body[k] = x
@@ -199,7 +201,7 @@ def _masses(on: Evaluator, drags: "Drags", motion: Mechanism) -> None:
         on.when(link_of(i).armature > 0.0, grow)
 
     n = drags.rate.size
-    on.loop(links, one)
+    on.loop(links, each_link)
     on.loop(links, carry, down=True)
     on.loop(n, column)
     on.loop(n, row)
@@ -286,7 +288,7 @@ def _heat(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None
         tip = on.select(link < 0, -1, drags.tip[on.select(link < 0, 0, link)])
         return [on.select(tip < 0, 0.0, drags.moved[on.select(tip < 0, 0, tip), k]) for k in range(6)]
 
-    def one(c: Integer) -> None:
+    def each_edge(c: Integer) -> None:
         edge, u, total = tables.acting[drags.edge[c]], on.scratch(6), on.variable(0.0)
         d = edge.dim
 
@@ -312,5 +314,5 @@ def _heat(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None
         made[tables.component[edge.friction].made] = entropy
 
     on.loop(drags.rate.size, move, down=True)
-    on.loop(drags.counts[EDGES], one)
+    on.loop(drags.counts[EDGES], each_edge)
     out[at + ns] = out[at + ns] + power.value

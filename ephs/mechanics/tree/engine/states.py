@@ -86,7 +86,7 @@ class Source(Record):
     flipped = integer()
 
 
-class Stored(Record):
+class StorageRow(Record):
     """A storage: its relation, its number, where its parameters and the places of its states start."""
 
     law = function(SIGNATURE)
@@ -100,7 +100,7 @@ def _vector(row: Vector, size: int) -> list[Real]:
     return [row[k] for k in range(size)]
 
 
-def _put(row: Vector, values: list[Real]) -> None:
+def _write_row(row: Vector, values: list[Real]) -> None:
     for k, x in enumerate(values):
         row[k] = x
 
@@ -140,22 +140,22 @@ def _along(on: Evaluator, body: Walked, x: Vector, at: Integer) -> list[Real]:
     """B x of the numbers that start at a place."""
     total = [on.variable(0.0) for _ in range(6)]
 
-    def one(j: Integer) -> None:
+    def each_freedom(j: Integer) -> None:
         column = Vector(body.reals, body.real_start + Walked.basis.offset + j, 31)
         for k, entry in enumerate(total):
             entry.value = entry.value + column[6 * k] * x[at + j]
 
-    on.loop(body.dim, one)
+    on.loop(body.dim, each_freedom)
     return [entry.value for entry in total]
 
 
 def _walk(on: Evaluator, bodies: Table[Walked], q: Vector, r: Vector, poses: Matrix, twists: Matrix) -> None:
     """Write poses in the world and twists of all bodies; the ground's rows are the last."""
     ground = bodies.size
-    _put(poses.row(ground), [1.0, *[0.0] * 6])
-    _put(twists.row(ground), [0.0] * 6)
+    _write_row(poses.row(ground), [1.0, *[0.0] * 6])
+    _write_row(twists.row(ground), [0.0] * 6)
 
-    def one(i: Integer) -> None:
+    def each_body(i: Integer) -> None:
         body = bodies[i]
         first, second, joint = body.first, body.second, _joint(on, body, q)
         forward = on.same(body.forward, 1)
@@ -165,10 +165,10 @@ def _walk(on: Evaluator, bodies: Table[Walked], q: Vector, r: Vector, poses: Mat
         rate = _along(on, body, r, body.r_at)
         own = on.select(forward, se3.adjoint(second, rate), scale(-1.0, se3.adjoint(there, rate)))
         row = on.select(body.parent < 0, ground, body.parent)
-        _put(poses.row(i), se3.compose(on, _vector(poses.row(row), 7), inner))
-        _put(twists.row(i), add(se3.adjoint(se3.inverse(inner), _vector(twists.row(row), 6)), own))
+        _write_row(poses.row(i), se3.compose(on, _vector(poses.row(row), 7), inner))
+        _write_row(twists.row(i), add(se3.adjoint(se3.inverse(inner), _vector(twists.row(row), 6)), own))
 
-    on.loop(bodies.size, one)
+    on.loop(bodies.size, each_body)
 
 
 def _relative(on: Evaluator, ends: Ends, poses: Matrix) -> list[Real]:
@@ -192,10 +192,10 @@ def rows(
 
         def posed(pose: list[Real]) -> None:
             other = on.same(source.flipped, 1)
-            _put(out, [*on.select(other, scale(-1.0, pose[:4]), pose[:4]), *pose[4:]])
+            _write_row(out, [*on.select(other, scale(-1.0, pose[:4]), pose[:4]), *pose[4:]])
 
         def momentum() -> None:
-            _put(out, apply(bodies[source.number].inertia, _vector(twists.row(source.number), 6)))
+            _write_row(out, apply(bodies[source.number].inertia, _vector(twists.row(source.number), 6)))
 
         def entropy() -> None:
             out[0] = s[row, source.number]
@@ -214,17 +214,31 @@ def rows(
 
         among(0)
 
-    def one(row: Integer) -> None:
+    def each_row(row: Integer) -> None:
         _walk(on, bodies, q.row(row), r.row(row), poses, twists)
         on.loop(plan.size, lambda k: state(row, plan[k]))
 
-    on.loop(x.rows, one)
+    on.loop(x.rows, each_row)
 
 
 def energies(
-    on: Evaluator, storages: Table[Stored], reads: Integers, parameters: Vector, scal: Vector, x: Matrix, x0: Vector,
-    v: Vector, e: Vector, lam: Vector, f: Vector, c: Vector, jac: Vector, work: Vector, out: Matrix, fault: Integers,
-) -> Integer:  # fmt: skip
+    on: Evaluator,
+    storages: Table[StorageRow],
+    reads: Integers,
+    parameters: Vector,
+    scal: Vector,
+    x: Matrix,
+    x0: Vector,
+    v: Vector,
+    e: Vector,
+    lam: Vector,
+    f: Vector,
+    c: Vector,
+    jac: Vector,
+    work: Vector,
+    out: Matrix,
+    fault: Integers,
+) -> Integer:
     """Write the energies in J of all storages at the states x (rows, size) to out (rows, components).
 
     ``x0`` … ``work`` are memory of a storage: its states, increments, efforts, multipliers, slopes, energy, and more.
@@ -236,14 +250,14 @@ def energies(
     """
     status = on.counter(0)
 
-    def storage(row: Integer, kept: Stored) -> None:
+    def storage(row: Integer, kept: StorageRow) -> None:
         def read(j: Integer) -> None:
             x0[j] = x[row, reads[kept.reads + j]]
 
         def still(j: Integer) -> None:
             v[j] = 0.0
 
-        dims = Integers(kept.integers, kept.integer_start + Stored.dims.offset, 4)
+        dims = Integers(kept.integers, kept.integer_start + StorageRow.dims.offset, 4)
         on.loop(dims[3], read)
         on.loop(dims[2], still)
         given = parameters.part(kept.at, parameters.size - kept.at)
@@ -256,10 +270,10 @@ def energies(
         on.when(on.negate(on.same(found, 0)), refuse)
         out[row, kept.number] = c[0]
 
-    def one(row: Integer) -> None:
+    def each_row(row: Integer) -> None:
         on.loop(storages.size, lambda i: on.when(on.same(status.value, 0), lambda: storage(row, storages[i])))
 
-    on.loop(x.rows, one)
+    on.loop(x.rows, each_row)
     return status.value
 
 

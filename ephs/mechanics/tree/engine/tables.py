@@ -8,11 +8,11 @@ from ephs.mechanics.tree.sweeps.acting import (
     ABOVE,
     BEYOND,
     Acting,
-    Body,
-    Component,
-    Conduction,
-    Node,
-    Port,
+    AttachedRate,
+    CompiledComponent,
+    ConductingComponent,
+    EntropyNode,
+    PushedBody,
     Sink,
 )
 from ephs.mechanics.tree.sweeps.grouping import Group, Middle
@@ -35,11 +35,11 @@ class Forces(NamedTuple):
     reach: Array  # (edges, 9): from where on nothing acts; margin and half lengths of boxes, angle of segments
     body: Index  # (bodies,): link on which the wrench acts, −1: none does
     body_frame: Array  # (bodies, 12): R and p of the body in its link's frame
-    node: Table[Node]
+    node: Table[EntropyNode]
     conduction: Index  # (conductions, 3): component, entropy, entropy
     sink: Index  # (sinks, 4): see `ephs.mechanics.tree.sweeps.acting.Sink`
     port: Index  # (rates, 3): place of the freedom, edge, freedom in it
-    component: Table[Component]  # with their relations at rest, without derivatives
+    component: Table[CompiledComponent]  # with their relations at rest, without derivatives
     parameters: Array
 
     def tables(self) -> dict[str, Any]:
@@ -55,11 +55,11 @@ class Forces(NamedTuple):
             ),
             "group": group,
             "middle": middle,
-            "body": table_of(Body, self.body[:, None], self.body_frame),
+            "body": table_of(PushedBody, self.body[:, None], self.body_frame),
             "node": self.node,
-            "conduction": table_of(Conduction, self.conduction),
+            "conduction": table_of(ConductingComponent, self.conduction),
             "sink": table_of(Sink, self.sink),
-            "port": table_of(Port, self.port),
+            "port": table_of(AttachedRate, self.port),
             "component": self.component,
             "parameters": self.parameters,
         }

@@ -28,7 +28,7 @@ from ephs.semantics.stage import (
     Vector,
 )
 from ephs.solve.heats import PLAIN
-from ephs.solve.march import Account, Control, Tableau
+from ephs.solve.march import MarchControl, RunAccount, TableauRecord
 from ephs.solve.march.steps import attempt
 
 BEYOND: Final = 1e100
@@ -42,16 +42,27 @@ def step_program(*, looped: bool) -> Program:
     """Return the program of one step of a given length, and of its parts."""
 
     def step(
-        on: Evaluator, motion: Mechanism, tableau: Tableau, control: Table[Control], base: Vector, start: Vector,
-        k: Matrix, last: Vector, account: Table[Account], allowed: Vector, y: Vector, q: Vector, h: Real,
-    ) -> Integer:  # fmt: skip
+        on: Evaluator,
+        motion: Mechanism,
+        tableau: TableauRecord,
+        control: Table[MarchControl],
+        base: Vector,
+        start: Vector,
+        k: Matrix,
+        last: Vector,
+        account: Table[RunAccount],
+        allowed: Vector,
+        y: Vector,
+        q: Vector,
+        h: Real,
+    ) -> Integer:
         status = on.counter(motion.rates(on, base, start, q, k.row(0))[0])
 
         def stages() -> None:
             status.value = attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
 
         def end() -> None:
-            status.value = settle(on, motion, account, allowed, base, start, y, q, h)
+            status.value = settle_step(on, motion, account, allowed, base, start, y, q, h)
 
         on.when(on.same(status.value, 0), stages)
         on.when(on.same(status.value, 0), end)
@@ -60,19 +71,19 @@ def step_program(*, looped: bool) -> Program:
     def rates(on: Evaluator, motion: Mechanism, base: Vector, start: Vector, q: Vector, k: Vector) -> Integer:
         return motion.rates(on, base, start, q, k)[0]
 
-    def settle(
-        on: Evaluator, motion: Mechanism, account: Table[Account], allowed: Vector, base: Vector, start: Vector,
+    def settle_step(
+        on: Evaluator, motion: Mechanism, account: Table[RunAccount], allowed: Vector, base: Vector, start: Vector,
         y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
         return _settled(on, motion, account[0], allowed, base, start, y, q, h)
 
-    functions = {"step": step, "rates": rates, "settle": settle, "close": _closed}
+    functions = {"step": step, "rates": rates, "settle": settle_step, "close": _closed}
     entries = {name: of_motion(function, looped=looped) for name, function in functions.items()}
     return Program("steps_of_loops" if looped else "steps_of_trees", **entries)
 
 
 def _settled(
-    on: Evaluator, motion: Mechanism, account: Account, allowed: Vector, base: Vector, start: Vector, y: Vector,
+    on: Evaluator, motion: Mechanism, account: RunAccount, allowed: Vector, base: Vector, start: Vector, y: Vector,
     q: Vector, h: Real,
 ) -> Integer:  # fmt: skip
     """Take the end y of a step to a state whose derivatives are on the constraints, and keep the balance, too.
@@ -122,7 +133,7 @@ class StepTangent:
     relation
         Called with the number of a component; returns the program and the entry that it is in machine code.
     tableau
-        Coefficients, by the names of `Tableau`.
+        Coefficients, by the names of `TableauRecord`.
     corrected
         Whether steps keep the balance of energy: not so where nothing is free to move.
 
@@ -158,9 +169,9 @@ class StepTangent:
         }  # fmt: skip
         self.pairs = {name: _pair(np.zeros(shape)) for name, shape in shapes.items()}
         self.stage = _pair(np.zeros(size))
-        account = Account.table(1)
+        account = RunAccount.table(1)
         account[0].anchor = 0.0 if corrected else np.nan
-        arguments.update({"control": _paired(Control.table(1), {}, ""), "account": _paired(account, {}, "")})
+        arguments.update({"control": _paired(MarchControl.table(1), {}, ""), "account": _paired(account, {}, "")})
         counted = 2 * engine.work["force"].size + engine.work["entropy"].size
         arguments.update({"allowed": _pair(np.full(counted, BEYOND)), "h": 0.0, **self.pairs})
         self._bound: dict[str, Any] = {}

@@ -18,7 +18,7 @@ from ephs.solve.march.noted import Noted
 from ephs.solve.snapshot import Snapshot
 
 if TYPE_CHECKING:
-    from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+    from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 
 OWN = 4
 """Numbers of an account before the momenta that steps keep."""
@@ -40,7 +40,7 @@ class Accounts:
         What corrections put into the states that were kept.
     """
 
-    def __init__(self, equations: "Equations") -> None:
+    def __init__(self, equations: "ReducedEquations") -> None:
         self._equations, self.kept, self.followed, self.noted = equations, False, True, Noted()
 
     def keep(self, what: str, also: tuple[str, ...] = ()) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.mechanics.tree.engine.heats import ROUNDING
-from ephs.mechanics.tree.engine.states import STATES, Stored
+from ephs.mechanics.tree.engine.states import STATES, StorageRow
 from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.semantics.bundles.bundle import Array
@@ -15,23 +15,23 @@ from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage.calling import Bound
 from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.model import STORING
-from ephs.solve.result.record import Record
+from ephs.solve.result.record import RunRecord
 from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
-    from ephs.mechanics.tree.equations.equations import Equations, ReducedState
+    from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 
 
 @final
 class Booking:
     """Totals that a mechanism's steps sum up."""
 
-    def __init__(self, equations: "Equations", paper: PaperStates) -> None:
+    def __init__(self, equations: "ReducedEquations", paper: PaperStates) -> None:
         self._equations, self.paper = equations, paper
         t, m = equations.model.tables, equations.model.memory()
         kept = np.flatnonzero(t.kind == STORING)
         places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
-        self.storages = table_of(Stored, np.hstack([t.address[kept, None], t.dims[kept], places]))
+        self.storages = table_of(StorageRow, np.hstack([t.address[kept, None], t.dims[kept], places]))
         self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
         number = {slot.path: i for i, slot in enumerate(equations.problem.descriptor.components)}
         self._makers = np.array([number[path] for path in equations.reduced.made], dtype=int)
@@ -99,7 +99,7 @@ class Booking:
         """All arrays of the tables that states are made from."""
         return self.paper.arrays()
 
-    def record_of(self, states: Sequence["ReducedState"], times: Array, least: Array) -> Record:
+    def record_of(self, states: Sequence["ReducedState"], times: Array, least: Array) -> RunRecord:
         """`record` of states one by one."""
         eq = self._equations
         q = np.array([state.q for state in states]).reshape(len(states), eq.reduced.coordinates)
@@ -107,7 +107,7 @@ class Booking:
         put = np.array([state.account[2:4] for state in states if state.account.size]).reshape(-1, 2)
         return self.record(times, q, np.array(rest).reshape(len(states), eq.size - eq.nv), put, least)
 
-    def record(self, times: Array, q: Array, rest: Array, put: Array, least: Array) -> Record:
+    def record(self, times: Array, q: Array, rest: Array, put: Array, least: Array) -> RunRecord:
         """Records of many states.
 
         Parameters
@@ -127,7 +127,7 @@ class Booking:
         energies[:, self._makers] = 0.0
         np.add.at(energies.T, self._makers, totals[:, 2:].T)
         ledgers = np.stack([heat, work, work, totals[:, 2:].sum(axis=1), least], axis=1)
-        return Record(times, x, energies, ledgers)
+        return RunRecord(times, x, energies, ledgers)
 
     def energies(self, q: Array, r: Array, heats: Array) -> tuple[Array, Array]:
         """(rows, point_size) all states of the scene's system, and (rows, components) the energies that they hold.

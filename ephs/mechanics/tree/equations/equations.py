@@ -37,7 +37,7 @@ from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.stepping import Row
 
-__all__ = ["Equations", "ReducedState"]
+__all__ = ["ReducedEquations", "ReducedState"]
 
 PUSHED = 1e-9
 """Size of a push below which no degree of freedom is left that it could move."""
@@ -46,7 +46,7 @@ ASIDE = 0.1
 
 
 @final
-class Equations:
+class ReducedEquations:
     """The reduced form of one problem. It keeps scratch memory: use one for each thread.
 
     With ``pushed`` forces may be put into ``drive`` at every joint, not only where the problem has an input. With
@@ -160,10 +160,10 @@ class Equations:
                 self.refuse(status, self.engine.failed)
                 return before
 
-        def at(part: float, y: Array) -> Array:
+        def rates_at(part: float, y: Array) -> Array:
             return self.rates(state.t + part * h, state.q, y)
 
-        before, y1[:] = evaluated(at, scheme["a"], c, h, y0, k)
+        before, y1[:] = evaluated(rates_at, scheme["a"], c, h, y0, k)
         return before
 
     def prepare(self, state: ReducedState) -> None:

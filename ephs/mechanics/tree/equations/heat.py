@@ -3,7 +3,7 @@
 import numpy as np
 
 from ephs.mechanics.tree.finding.mechanism import Reduced
-from ephs.mechanics.tree.sweeps.acting import Node
+from ephs.mechanics.tree.sweeps.acting import EntropyNode
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.heats import Heats
 
@@ -19,8 +19,8 @@ def heats_of(reduced: Reduced, theta: float) -> Heats:
     t, table = reduced.tables, reduced.nodes
 
     def laws() -> tuple[Array, Array]:
-        rows = table.arrays[1].reshape(-1, Node.real_width)[t.node >= 0]
-        return rows[:, Node.c1.offset], rows[:, Node.c2.offset]
+        rows = table.arrays[1].reshape(-1, EntropyNode.real_width)[t.node >= 0]
+        return rows[:, EntropyNode.c1.offset], rows[:, EntropyNode.c2.offset]
 
     flows, sinks, owners, rubs = t.sink.T
     ends = np.full((len(reduced.made), 2), -1, dtype=np.int64)

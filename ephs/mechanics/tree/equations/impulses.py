@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.road.records import Link, Place
+from ephs.mechanics.road.records import LinkConstants, LinkPlace
 from ephs.semantics.bundles.bundle import Array
 
 if TYPE_CHECKING:
-    from ephs.mechanics.tree.equations.equations import Equations
+    from ephs.mechanics.tree.equations.equations import ReducedEquations
 
-TWIST = slice(Place.twist.offset, Place.twist.offset + 6)
+TWIST = slice(LinkPlace.twist.offset, LinkPlace.twist.offset + 6)
 """Position of the twist in a link's row of `places`."""
 
 
@@ -24,15 +24,17 @@ class Impulses:
         (links, 6, 6) in the links' frames.
     """
 
-    def __init__(self, equations: "Equations", inertia: Array) -> None:
+    def __init__(self, equations: "ReducedEquations", inertia: Array) -> None:
         engine, links, n = equations.engine, equations.reduced.links, equations.n
         self._inertia = inertia
         memory = np.zeros(engine.work["work"].size)
-        self._places = memory.reshape(links + 1, -1)[:, : Place.real_width]
+        self._places = memory.reshape(links + 1, -1)[:, : LinkPlace.real_width]
         program, _ = engine.reached["move"]
         calls = program.compiled()
         reals = engine.tables["reals"].copy()
-        reals.reshape(-1, Link.real_width)[:, Link.armature.offset] = 0.0  # momenta are those of bodies
+        reals.reshape(-1, LinkConstants.real_width)[:, LinkConstants.armature.offset] = (
+            0.0  # momenta are those of bodies
+        )
         tree = links, engine.tables["integers"], reals, memory, np.zeros(3)
         whole = np.zeros(0, dtype=np.int64)
         numbers = np.zeros((0, 4)), np.zeros(0), np.zeros((0, 6)), np.zeros((0, 12))

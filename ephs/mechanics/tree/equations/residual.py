@@ -8,10 +8,10 @@ from ephs.mechanics.road.charts import TIE
 from ephs.mechanics.road.cuts import Cut, Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.pack import STANDARD
-from ephs.mechanics.road.records import Place
+from ephs.mechanics.road.records import LinkPlace
 from ephs.mechanics.tree.engine.build import whole_of
 from ephs.mechanics.tree.engine.residuals import MOVING, point_program, residuals
-from ephs.mechanics.tree.equations.slopes import Slopes
+from ephs.mechanics.tree.equations.slopes import EquationSlopes
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
 from ephs.mechanics.tree.sweeps.expanding import memory_about
@@ -102,7 +102,7 @@ class Residual:
         others = list(program.entries["about"].kinds)[len(MOVING) :]
         self._point = call.bind(*(self.arrays[name] for name in others), first=self._shared)
         self._first = net.state_at
-        self._slopes: Slopes | None = None
+        self._slopes: EquationSlopes | None = None
 
     def bound(self, calls: Any, name: str, **others: Any) -> Any:
         """An entry function over dual numbers with these arrays for arguments, but for others."""
@@ -174,7 +174,7 @@ class Residual:
 
     @property
     def places(self) -> Array:
-        """(links + 1, width) rows of links and the ground, which begin with `ephs.mechanics.road.records.Place`."""
+        """(links + 1, width) rows of links and the ground, which begin with `ephs.mechanics.road.records.LinkPlace`."""
         return self.arrays["work"].reshape(-1, self.program.width)
 
     def pose(self, body: int) -> Array:
@@ -190,7 +190,7 @@ class Residual:
 
     def twist(self, body: int) -> Array:
         """(6,) of a body in its frame, where `place` has been."""
-        at = Place.twist.offset
+        at = LinkPlace.twist.offset
         return self.inside(body, self._seen(body, self.places[self._bodies.link[body], at : at + 6]))
 
     def twists(self, body: int) -> Array:
@@ -253,10 +253,10 @@ class Residual:
         """Last result of `at`."""
         return self.outs["residual"]
 
-    def slopes(self) -> Slopes:
+    def slopes(self) -> EquationSlopes:
         """Derivatives where these equations were evaluated last."""
         if self._slopes is None:
-            self._slopes = Slopes(self)
+            self._slopes = EquationSlopes(self)
         return self._slopes
 
     @property

@@ -17,7 +17,7 @@ DIRECTIONS: Final = 4
 
 
 @final
-class Slopes:
+class EquationSlopes:
     """Derivatives where a mechanism's equations were evaluated last."""
 
     def __init__(self, residual: "Residual") -> None:

@@ -23,7 +23,7 @@ class ReducedState:
         What a method takes along from step to step; none after a start.
     account
         (4 + momenta + heats + totals,) energy in J where nothing is booked, what is missing of it, what corrections put
-        in, and the sum of their sizes, see `ephs.solve.march.account.Account`; momenta that steps keep; then what
+        in, and the sum of their sizes, see `ephs.solve.march.account.RunAccount`; momenta that steps keep; then what
         rounding left of sums. Empty where a run starts.
     """
 

@@ -5,8 +5,8 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.rewrite.coordinates import unread
-from ephs.mechanics.road.records import Place
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.road.records import LinkPlace
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 
 
@@ -14,7 +14,7 @@ from ephs.semantics.bundles.bundle import Array
 class Linearised:
     """The equations of one mechanism and their derivatives at a state. It shares the equations' memory."""
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: ReducedEquations) -> None:
         self.equations = equations
         self._dense = dense = equations.dense
         self._residual = found = dense.residual
@@ -143,7 +143,7 @@ def _seen(place: Array, slopes: Array) -> Array:
     places, whose accelerations are in world axes.
     """
     turn, turned = place[:, :9].reshape(-1, 3, 3), slopes[:, :9].reshape(len(place), 3, 3, -1)
-    bias, change = (slice(field.offset, field.offset + 6) for field in (Place.bias, Place.change))
+    bias, change = (slice(field.offset, field.offset + 6) for field in (LinkPlace.bias, LinkPlace.change))
     moved = (place[:, bias] + place[:, change]).reshape(-1, 2, 3)
     moving = (slopes[:, bias] + slopes[:, change]).reshape(len(place), 2, 3, -1)
     found = np.einsum("lijn,lhi->lhjn", turned, moved) + np.einsum("lij,lhin->lhjn", turn, moving)

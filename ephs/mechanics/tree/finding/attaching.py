@@ -12,7 +12,7 @@ from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.network import Network
 from ephs.mechanics.tree.finding.parts import Parts
 from ephs.mechanics.tree.finding.spanning import Edge
-from ephs.mechanics.tree.finding.tables import SPRING, Mechanism
+from ephs.mechanics.tree.finding.tables import SPRING, MechanismTables
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.descriptor.descriptor import ComponentSlot
@@ -23,7 +23,7 @@ from ephs.solve.sparse import Index
 
 @final
 @dataclass(frozen=True, slots=True)
-class Gear:
+class RateRelation:
     """A constant relation Σ ratio · rate = 0, by the component that has it: (edge, degree of freedom, ratio) of its
     joints.
     """
@@ -64,7 +64,7 @@ class Attaching:
     bent: Index
     edges: frozenset[int]
     outer: Array
-    ties: tuple[Gear, ...]
+    ties: tuple[RateRelation, ...]
 
 
 def makers_of(components: Sequence[ComponentSlot], network: Network) -> tuple[tuple[Path, ...], tuple[Index, ...]]:
@@ -90,7 +90,7 @@ def attaching_of(
     components: Sequence[ComponentSlot],
     parts: Parts,
     edges: Sequence[Edge],
-    tables: Mechanism,
+    tables: MechanismTables,
     stored: Sequence[Path],
     flows: tuple[Index, ...],
     reference: Reference,
@@ -121,13 +121,13 @@ def attaching_of(
         for k, out in enumerate((reads, varies)):
             out.append(np.array([place for path in one.reads for place in known[path][k]], dtype=np.int64))
     number = {id(edge): i for i, edge in enumerate(edges)}
-    ties: list[Gear] = []
+    ties: list[RateRelation] = []
     for tie in network.ties:
         terms = [(*network.rates[place], ratio) for place, ratio in tie.terms]
         path = components[tie.component].path
         if any(parts.attached[junction].pair.code != VECTOR for junction, _, _ in terms):
             raise Unplaced(path, "ties the rate of a joint whose degrees of freedom do not commute")
-        ties.append(Gear(path, tuple((number[id(parts.attached[at])], k, ratio) for at, k, ratio in terms)))
+        ties.append(RateRelation(path, tuple((number[id(parts.attached[at])], k, ratio) for at, k, ratio in terms)))
     bent = sorted({-1 - int(place) for places in varies for place in places if place < 0})
     return Attaching(
         network,

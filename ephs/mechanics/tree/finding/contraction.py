@@ -6,8 +6,8 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.tree.finding.frames import Unplaced
-from ephs.mechanics.tree.finding.network import Attached, Inertia, Injection, Network, Tie
-from ephs.mechanics.tree.finding.wiring import Wiring
+from ephs.mechanics.tree.finding.network import Attached, Injection, JointInertia, Network, Tie
+from ephs.mechanics.tree.finding.wiring import Incidence
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import StateSlot
@@ -21,7 +21,7 @@ NEGLIGIBLE = 1e-12
 
 
 def network_of(
-    wiring: Wiring,
+    wiring: Incidence,
     components: Sequence[int],
     rates: Mapping[int, int],
     nodes: Mapping[int, int],
@@ -58,7 +58,7 @@ RATE, NODE, INPUT, STATE, FREE = range(5)
 class _Contraction:
     def __init__(
         self,
-        wiring: Wiring,
+        wiring: Incidence,
         components: Sequence[int],
         rates: Mapping[int, int],
         nodes: Mapping[int, int],
@@ -70,7 +70,7 @@ class _Contraction:
         self.column: dict[tuple[int, int], int] = {}
         self.sort: list[int] = []
         self.storage: dict[int, tuple[int, StateSlot]] = {}  # column -> storage there, its state
-        self.stiff: list[Inertia] = []
+        self.stiff: list[JointInertia] = []
         self.tied: list[tuple[int, dict[int, float]]] = []  # component -> ratios of the rates that it ties
         for number in components:
             self._lay(number)
@@ -175,7 +175,8 @@ class _Contraction:
             skew=basis.T @ skew @ basis,
             attached=tuple(self._attached(number, basis, multiplier, states) for number in called),
             inertias=tuple(
-                Inertia(one.component, one.state, rate[back[one.rate]], one.ratio, one.inertia) for one in self.stiff
+                JointInertia(one.component, one.state, rate[back[one.rate]], one.ratio, one.inertia)
+                for one in self.stiff
             ),
             injections=tuple(self._injections(basis)),
             ties=tuple(
@@ -248,7 +249,7 @@ class _Contraction:
         inertia, on = _inertia(self._primitive(number)), [other for other in others if self.sort[other] == RATE]
         if inertia is None or len(others) != 1 or len(on) != 1 or self.rates[self._back(on[0])] != 1:
             raise self._fault(number, "stores what other states, or the rates of several degrees of freedom, determine")
-        self.stiff.append(Inertia(number, state, on[0], others[on[0]], inertia))
+        self.stiff.append(JointInertia(number, state, on[0], others[on[0]], inertia))
 
     def _back(self, at: int) -> int:
         """The junction of a column."""

@@ -11,7 +11,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.tree.finding.roles import Role, Roles, offset_of
-from ephs.mechanics.tree.finding.wiring import Wiring
+from ephs.mechanics.tree.finding.wiring import Incidence
 from ephs.operad import Path, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
@@ -121,7 +121,7 @@ class Frames:
         Bodies and joints that are not whole, and bodies that are joined without a joint.
     """
 
-    wiring: Wiring
+    wiring: Incidence
     links: tuple[Link, ...]
     joints: tuple[LinkJoint, ...]
     frames: dict[int, Frame]
@@ -132,12 +132,12 @@ class Frames:
 
 def frames_of(descriptor: Descriptor) -> Frames:
     """The links and joints of a flat system."""
-    return once(descriptor, "frames", lambda: _Finder(Wiring.of(descriptor)).found())
+    return once(descriptor, "frames", lambda: _Finder(Incidence.of(descriptor)).found())
 
 
 @final
 class _Finder:
-    def __init__(self, wiring: Wiring) -> None:
+    def __init__(self, wiring: Incidence) -> None:
         roles = Roles()
         self.wiring = wiring
         self.roles = tuple(roles.of(slot.primitive) for slot in wiring.components)

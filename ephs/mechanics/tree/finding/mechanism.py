@@ -11,10 +11,10 @@ from ephs.mechanics.shapes.impact import Meeting
 from ephs.mechanics.tree.finding.attaching import Attaching, attaching_of, makers_of
 from ephs.mechanics.tree.finding.frames import GROUND, Frame, Link, Unplaced
 from ephs.mechanics.tree.finding.network import Network
-from ephs.mechanics.tree.finding.parts import Acting, Parts, determined_by, parts_of
+from ephs.mechanics.tree.finding.parts import Parts, WrenchPort, determined_by, parts_of
 from ephs.mechanics.tree.finding.spanning import Edge, frames_of_joints, loop_algebra, spanning_tree, twists_of
-from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, Mechanism
-from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, Node
+from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, MechanismTables
+from ephs.mechanics.tree.sweeps.acting import ABOVE, ALONG, APART, BEYOND, EntropyNode
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Storage
@@ -62,18 +62,18 @@ class Reduced:
         What is attached.
     """
 
-    tables: Mechanism
+    tables: MechanismTables
     edges: tuple[Edge, ...]
     spans: frozenset[int]
     bodies: tuple[str | None, ...]
     places: tuple[Link, ...]
     entropies: tuple[Path, ...]
     made: tuple[Path, ...]
-    nodes: Table[Node]
+    nodes: Table[EntropyNode]
     unknowns: int
     twists: tuple[Array, ...]
     gravity: Array
-    acting: tuple[Acting, ...]
+    acting: tuple[WrenchPort, ...]
     attaching: Attaching
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
 
@@ -150,7 +150,7 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     links = [parts.links[body] for body in order]
     names = tuple(parts.names[body] for body in order)
     place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
-    acting = tuple(Acting(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
+    acting = tuple(WrenchPort(one.port, Frame(place[one.frame.link], one.frame.offset)) for one in parts.acting)
     stored = (*parts.entropies, *(state.path for state in parts.network.states))
     attaching = attaching_of(slots, parts, edges, mechanism, stored, flows, model.reference)
     unknowns = 2 * int(mechanism.driven.size) + int(mechanism.rows.sum()) + len(attaching.ties)
@@ -163,8 +163,8 @@ def _reduced(problem: Problem, model: Model) -> Reduced:
     )  # fmt: skip
 
 
-def _nodes(model: Model, parts: Parts) -> Table[Node]:
-    nodes = Node.table(len(parts.entropies) + len(parts.network.states))
+def _nodes(model: Model, parts: Parts) -> Table[EntropyNode]:
+    nodes = EntropyNode.table(len(parts.entropies) + len(parts.network.states))
     for k, state in enumerate(parts.network.states, start=len(parts.entropies)):
         nodes[k].component, nodes[k].free = PLAIN, int(state.quantity.kind != "entropy")
     for k, number in enumerate(parts.entropies.values()):
@@ -186,7 +186,7 @@ def _tables(
     flows: tuple[Index, ...],
     frames: list[Array],
     twists: list[Array],
-) -> Mechanism:
+) -> MechanismTables:
     links, count = len(order), len(edges)
     place = {body: i for i, body in enumerate(order)} | {GROUND: GROUND}
     parents = [place[e.body1 if f else e.body2] for e, f in zip(edges[:links], forward, strict=True)]
@@ -232,7 +232,7 @@ def _tables(
     owners = [owner for _, _, owner in sinks]
     rubs = [0 <= taken < len(storages) and owners.count(owner) == 1 for _, taken, owner in sinks]
     acting = np.unique([*spring, *friction, *_called(parts.network)]).astype(np.int64)
-    return Mechanism(
+    return MechanismTables(
         parent=np.array(parents, dtype=np.int64),
         inertia=np.array([parts.links[body].inertia for body in order]).reshape(links, 6, 6),
         weight=np.array([parts.weights[body] for body in order], dtype=np.int64),

@@ -23,7 +23,7 @@ from ephs.semantics.descriptor.descriptor import StateSlot
 
 @final
 @dataclass(frozen=True, slots=True)
-class Inertia:
+class JointInertia:
     """A storage of E = p²/(2 J) whose effort is g times the rate of a joint: its state is J g r.
 
     Parameters
@@ -117,7 +117,7 @@ class Network:
     unknown: int = 0
     skew: Array = field(default_factory=lambda: np.zeros((0, 0)))
     attached: tuple[Attached, ...] = ()
-    inertias: tuple[Inertia, ...] = ()
+    inertias: tuple[JointInertia, ...] = ()
     injections: tuple[Injection, ...] = ()
     ties: tuple[Tie, ...] = ()
 

@@ -30,7 +30,7 @@ OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Acting:
+class WrenchPort:
     """An outer port at which a wrench acts on a frame of a link."""
 
     port: Path
@@ -73,7 +73,7 @@ class Parts:
     spans: tuple[Edge, ...]
     entropies: dict[Path, int]
     conduction: tuple[tuple[int, int, int], ...]
-    acting: tuple[Acting, ...]
+    acting: tuple[WrenchPort, ...]
     network: Network
     attached: dict[int, Edge]
 
@@ -86,7 +86,7 @@ def parts_of(problem: Problem) -> Parts:
     Unplaced
         A component, or what is prescribed at a port, has no place in joint coordinates.
     """
-    return once(problem.descriptor, ("parts", determined_by(problem)), lambda: _Reader(problem).parts())
+    return once(problem.descriptor, ("parts", determined_by(problem)), lambda: _PartsReader(problem).parts())
 
 
 def determined_by(problem: Problem) -> Hashable:
@@ -103,7 +103,7 @@ def _prescribed(signal: Signal) -> MotionLaw | bytes | None:
 
 
 @final
-class _Reader:
+class _PartsReader:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.found: Frames = frames_of(problem.descriptor)
@@ -306,7 +306,7 @@ class _Reader:
                 self.placed.add(number)
                 yield number, ends[0], ends[1]
 
-    def _acting(self) -> Iterator[Acting]:
+    def _acting(self) -> Iterator[WrenchPort]:
         """The outer ports of links, where wrenches act.
 
         Raises
@@ -322,7 +322,7 @@ class _Reader:
                 raise Unplaced(port, "is a port of neither a joint nor a body")
             if self.problem.signal(port).effort:
                 raise Unplaced(port, "prescribes the motion of a body; a joint's can be prescribed")
-            yield Acting(port, frame)
+            yield WrenchPort(port, frame)
 
 
 def _accelerations(weight: Primitive, mass: float) -> set[tuple[float, ...]]:

@@ -9,7 +9,7 @@ TREE, CUT, SPRING = 0, 1, 2
 """Kinds of edges."""
 
 
-class Mechanism(NamedTuple):
+class MechanismTables(NamedTuple):
     """Tables of a mechanism. Links are bodies, parents first; edges are joints of the tree, then cut ones, springs."""
 
     parent: Index  # (links,): −1 for the ground

@@ -14,7 +14,7 @@ from ephs.semantics.primitives.primitives import Storage
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Wiring:
+class Incidence:
     """Incidence of the components of a flat system; components and junctions have the numbers of its descriptor.
 
     Parameters
@@ -38,7 +38,7 @@ class Wiring:
     outer: dict[int, Path]
 
     @staticmethod
-    def of(descriptor: Descriptor) -> "Wiring":
+    def of(descriptor: Descriptor) -> "Incidence":
         """The incidence of a descriptor's system."""
         n, components = descriptor.numbering, descriptor.components
         each = [tuple(map(str, primitive.bundle.ports)) for primitive in n.primitives]
@@ -47,7 +47,7 @@ class Wiring:
         owners = np.repeat(np.arange(count.size), count)[np.argsort(n.wires, kind="stable")]
         begin = np.append(0, np.cumsum(np.bincount(n.wires, minlength=n.junctions.size)))
         outer = [slot.path for slot in descriptor.outer]
-        return Wiring(
+        return Incidence(
             components, names, n.wires, starts(count), owners, begin, dict(zip(n.outer.tolist(), outer, strict=True))
         )
 

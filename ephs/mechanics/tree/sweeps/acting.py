@@ -87,7 +87,7 @@ class Own(Record):
     attach = function(ATTACH)
 
 
-class Component(Record):
+class CompiledComponent(Record):
     """A component: its relation in machine code, and what it is called with.
 
     Attributes
@@ -164,7 +164,7 @@ class Acting(Record):
     left = reals(6, 6)
 
 
-class Body(Record):
+class PushedBody(Record):
     """A body on which a given wrench acts: its link, −1 where none does, and its frame in the link's."""
 
     link = integer()
@@ -172,7 +172,7 @@ class Body(Record):
     at = reals(3)
 
 
-class Node(Record):
+class EntropyNode(Record):
     """A store of entropy: E = c1 (exp(s/c2) − 1), or the environment's θ₀ s where there is no component, −1.
 
     Or, −2, a state of what is attached, which is advanced as it is; ``free``: 1 where it is not of entropy, so that
@@ -185,7 +185,7 @@ class Node(Record):
     c2 = real()
 
 
-class Conduction(Record):
+class ConductingComponent(Record):
     """A component that conducts between two entropies."""
 
     component = integer()
@@ -205,7 +205,7 @@ class Sink(Record):
     rubs = integer()
 
 
-class Port(Record):
+class AttachedRate(Record):
     """A rate at which something is attached: its place among all degrees of freedom, its edge, and which degree of
     freedom of it.
     """
@@ -229,7 +229,7 @@ class Tables:
     chart, cut, cut_numbers
         Joints, and those at which loops are cut, see `ephs.mechanics.road.cuts`.
     at, slot, row, flat, end
-        The elimination of loops, see `ephs.mechanics.road.elimination.Closing`.
+        The elimination of loops, see `ephs.mechanics.road.elimination.ClosingProgram`.
     island, bases
         Group of each link that may move as a whole, and how: see `ephs.mechanics.road.rigid`.
     port, net, numbers
@@ -255,15 +255,15 @@ class Tables:
     acting: Table[Acting]
     group: Table[Group]
     middle: Table[Middle]
-    body: Table[Body]
-    node: Table[Node]
-    conduction: Table[Conduction]
+    body: Table[PushedBody]
+    node: Table[EntropyNode]
+    conduction: Table[ConductingComponent]
     sink: Table[Sink]
-    component: Table[Component]
+    component: Table[CompiledComponent]
     parameters: Vector
     island: Integers
     bases: Vector
-    port: Table[Port]
+    port: Table[AttachedRate]
     net: Integers
     numbers: Vector
     drive: Vector
@@ -291,7 +291,7 @@ class Work:
     Attributes
     ----------
     work
-        The sweeps' own: rows of links, the ground's last, which begin with `ephs.mechanics.road.records.Place`.
+        The sweeps' own: rows of links, the ground's last, which begin with `ephs.mechanics.road.records.LinkPlace`.
     pushed, force, zero
         Wrenches (links, 6) on links, in world axes about their frames' origins; forces on the tree's rates; zeros.
     attached, pulled
@@ -301,7 +301,7 @@ class Work:
     relative
         (cut joints, width): see `ephs.mechanics.road.cuts.Relative`.
     value, entry, covector, along, largest
-        Of the rows of loops, see `ephs.mechanics.road.rows.Rows`.
+        Of the rows of loops, see `ephs.mechanics.road.rows.LoopRows`.
     temperature, entropy
         Efforts and entropies of the nodes.
     x, v, e, lam, f, c, jac, scratch
@@ -363,6 +363,6 @@ class Work:
     fault: Annotated[Integers, 1]
 
     def places(self, tables: Tables) -> Matrix:
-        """Rows of links and the ground, which begin with `ephs.mechanics.road.records.Place`."""
+        """Rows of links and the ground, which begin with `ephs.mechanics.road.records.LinkPlace`."""
         own = tables.own[0]
         return Matrix(self.work.cells, self.work.start, own.links + 1, own.width)

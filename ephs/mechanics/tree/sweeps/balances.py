@@ -55,7 +55,7 @@ def solve_network(on: Evaluator, net: Net, q: Vector, s: Vector, warmth: Vector,
         status.value = net.flows(on, q, s, made)
 
     def newton() -> None:
-        on.loop(head[4], lambda k: _put(net.effort, known + k, 0.0))
+        on.loop(head[4], lambda k: _write_entry(net.effort, known + k, 0.0))
         _newton(on, net, evaluate, status)
 
     on.when(on.same(status.value, 0), lambda: on.when(head[4] > 0, newton, evaluate))
@@ -100,12 +100,12 @@ def _newton(on: Evaluator, net: Net, evaluate: Callable[[], None], status: Any) 
         evaluate()
         worst = on.variable(0.0)
 
-        def look(k: Integer) -> None:
+        def each_entry(k: Integer) -> None:
             at = known + k
             off = on.absolute(net.flow[at]) / on.maximum(net.gross[at], TINY)
             worst.value = on.maximum(worst.value, off)
 
-        on.loop(unknown, look)
+        on.loop(unknown, each_entry)
         rounds.value = rounds.value + 1
         stuck = on.negate(worst.value < 0.5 * before.value)
         done = on.either(worst.value <= ROUNDING, on.both(stuck, worst.value <= ENOUGH))
@@ -136,10 +136,10 @@ def _factorise(on: Evaluator, net: Net, status: Any) -> None:
         net.tangent(on)
         net.turned[known + k] = 0.0
 
-        def put(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             net.matrix[j, k] = net.changed[known + j]
 
-        on.loop(unknown, put)
+        on.loop(unknown, each_entry)
 
     on.loop(unknown, column)
     sound = lu(on, net.matrix, net.pivot)
@@ -147,8 +147,8 @@ def _factorise(on: Evaluator, net: Net, status: Any) -> None:
 
 
 def _still(on: Evaluator, net: Net) -> None:
-    on.loop(net.turned.size, lambda k: _put(net.turned, k, 0.0))
-    on.loop(net.moved.size, lambda k: _put(net.moved, k, 0.0))
+    on.loop(net.turned.size, lambda k: _write_entry(net.turned, k, 0.0))
+    on.loop(net.moved.size, lambda k: _write_entry(net.moved, k, 0.0))
 
 
 def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
@@ -162,7 +162,7 @@ def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
     def column(k: Integer) -> None:
         _still(on, net)
         at = k - net.first_state
-        on.when(at < 0, lambda: _put(net.turned, k, 1.0))
+        on.when(at < 0, lambda: _write_entry(net.turned, k, 1.0))
         on.when(on.both(at >= 0, k < known), lambda: _by_state(on, net, at))
         on.when(k >= known, lambda: _by_read(on, net, -1 - net.bent[on.select(k < known, 0, k - known)]))
         net.tangent(on)
@@ -178,38 +178,38 @@ def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
 
         on.when(unknown > 0, follow)
 
-        def put(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             out[j, k] = net.changed[j]
 
-        on.loop(known, put)
+        on.loop(known, each_entry)
 
     on.loop(out.columns, column)
     return status.value
 
 
 def _by_read(on: Evaluator, net: Net, place: Integer) -> None:
-    def one(j: Integer) -> None:
-        on.when(on.same(net.vary[j], place), lambda: _put(net.moved, j, 1.0))
+    def each_entry(j: Integer) -> None:
+        on.when(on.same(net.vary[j], place), lambda: _write_entry(net.moved, j, 1.0))
 
-    on.loop(net.vary.size, one)
+    on.loop(net.vary.size, each_entry)
 
 
 def _by_state(on: Evaluator, net: Net, at: Integer) -> None:
     """Changes of efforts and of what is read with a state."""
 
-    def one(it: Stores) -> None:
+    def each_store(it: Stores) -> None:
         n, mine = it.dims[0], at - it.state
 
-        def put(j: Integer) -> None:
+        def each_entry(j: Integer) -> None:
             net.turned[it.effort + j] = net.kept[it.kept + (j * n + mine)]
 
-        on.when(on.both(mine >= 0, mine < n), lambda: on.loop(n, put))
+        on.when(on.both(mine >= 0, mine < n), lambda: on.loop(n, each_entry))
 
-    net.stores(on, one)
+    net.stores(on, each_store)
     _by_read(on, net, at + net.head[5])
 
 
-def _put(vector: Vector, k: Integer, value: Real) -> None:
+def _write_entry(vector: Vector, k: Integer, value: Real) -> None:
     vector[k] = value
 
 

@@ -88,7 +88,7 @@ class About:
         copy(on, work.x.part(0, dims[3]), _part(one, Expansion.state).part(0, dims[3]))
         if stored:
             copy(on, work.e.part(0, n), value.part(0, n))
-            on.loop(n * n, lambda k: _put(slope, k, 2.0 * work.f[k]))
+            on.loop(n * n, lambda k: _write_entry(slope, k, 2.0 * work.f[k]))
             one.energy = work.c[0]
             return
         width = n + rates
@@ -97,8 +97,8 @@ class About:
 
         def row(j: Integer) -> None:
             at = width * j
-            on.loop(n, lambda k: _put(slope, at + k, work.jac[at + k]))
-            on.loop(rates, lambda k: _put(slope, at + (n + k), 2.0 * work.jac[at + (n + k)]))
+            on.loop(n, lambda k: _write_entry(slope, at + k, work.jac[at + k]))
+            on.loop(rates, lambda k: _write_entry(slope, at + (n + k), 2.0 * work.jac[at + (n + k)]))
 
         on.loop(n, row)
 
@@ -118,7 +118,7 @@ class About:
         n, one = dims[0], self.expansion[number]
         width, effort = n + dims[2], _part(one, Expansion.effort)
         value, slope, off = _part(one, Expansion.value), _part(one, Expansion.slope), on.scratch(7)
-        on.loop(n, lambda k: _put(off, k, work.e[k] - effort[k]))
+        on.loop(n, lambda k: _write_entry(off, k, work.e[k] - effort[k]))
 
         def flow(j: Integer) -> None:
             by_effort = _along(on, slope.part(width * j, n), off)
@@ -130,18 +130,18 @@ class About:
 
     def attach(self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work) -> Integer:
         """Keep a network that was evaluated, whose first efforts are rates, and its derivatives; return a status."""
-        self._depend(on, net, rate, work, lambda k, value: _put(self.met, k, value))
+        self._depend(on, net, rate, work, lambda k, value: _write_entry(self.met, k, value))
         copy(on, net.flow.part(0, net.known), self.flow)
         return slopes_of(on, net, self.slope)
 
     def flows(self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work) -> Vector:
         """Flows of the network."""
-        self._depend(on, net, rate, work, lambda k, value: _put(self.off, k, value - self.met[k]))
+        self._depend(on, net, rate, work, lambda k, value: _write_entry(self.off, k, value - self.met[k]))
 
-        def one(k: Integer) -> None:
+        def each_entry(k: Integer) -> None:
             self.changed[k] = self.flow[k] + _along(on, self.slope.row(k), self.off)
 
-        on.loop(self.flow.size, one)
+        on.loop(self.flow.size, each_entry)
         return self.changed
 
     def _depend(
@@ -187,7 +187,7 @@ def _along(on: Evaluator, row: Vector, by: Vector) -> Real:
     return total.value
 
 
-def _put(vector: Vector, k: Integer, value: Real) -> None:
+def _write_entry(vector: Vector, k: Integer, value: Real) -> None:
     vector[k] = value
 
 

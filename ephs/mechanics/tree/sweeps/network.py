@@ -207,10 +207,10 @@ class Net:
         """Write the flows by efforts of the constant relations."""
         first = self.row.size // 3 - z.size
 
-        def one(k: Integer) -> None:
+        def each_entry(k: Integer) -> None:
             out[k] = self._sum(on, first + k, z)
 
-        on.loop(z.size, one)
+        on.loop(z.size, each_entry)
 
     # ---- components --------------------------------------------------------------------------------------------
 
@@ -230,7 +230,7 @@ class Net:
         def surroundings(k: Integer) -> None:
             self.power[1] = self.power[1] + self.outer[k] * s[first + k]
 
-        def one(it: Stores) -> None:
+        def each_store(it: Stores) -> None:
             n = it.dims[0]
 
             def read(j: Integer) -> None:
@@ -240,25 +240,25 @@ class Net:
             found = self._call(on, it, n * n, self.work)
             self.power[1] = self.power[1] + self.f[n * n]
 
-            def put(j: Integer) -> None:
+            def each_entry(j: Integer) -> None:
                 self.effort[it.effort + j] = self.e[j]
 
             def keep(j: Integer) -> None:
                 self.kept[it.kept + j] = 2.0 * self.f[j]
 
-            on.loop(n, put)
+            on.loop(n, each_entry)
             on.loop(n * n, keep)
             self.failed(on, status, found, it.component)
 
         on.loop(self.outer.size, surroundings)
-        self.stores(on, one)
+        self.stores(on, each_store)
         return status.value
 
     def energies(self, on: Evaluator, s: Vector, out: Vector) -> Integer:
         """Add energies of storages and the environment in J to out[1], their sizes to out[2]; return a status."""
         status = on.counter(0)
 
-        def one(it: Stores) -> None:
+        def each_store(it: Stores) -> None:
             n, first = it.dims[0], self.head[5]
 
             def read(j: Integer) -> None:
@@ -271,7 +271,7 @@ class Net:
         def count(energy: Real) -> None:
             out[1], out[2] = out[1] + energy, out[2] + on.absolute(energy)
 
-        self.stores(on, one)
+        self.stores(on, each_store)
         on.loop(self.outer.size, lambda k: count(self.outer[k] * s[self.head[5] + k]))
         return status.value
 
@@ -292,7 +292,7 @@ class Net:
             self.gross[k] = self._sum(on, row, self.effort, sizes=True) + on.absolute(flow)
             self.flow[k] = self.flow[k] - flow
 
-        def one(it: Called) -> None:
+        def each_component(it: Called) -> None:
             efforts, width = it.dims[0], it.dims[0] + it.dims[1] + it.dims[2]
             rows, kept = it.dims[0] + it.dims[1], self.kept.part(it.kept, self.kept.size - it.kept)
 
@@ -301,7 +301,7 @@ class Net:
 
             def read(j: Integer) -> None:
                 at = self.read[it.read + j]
-                on.when(at >= 0, lambda: _put(self.x, j, s[at]), lambda: _put(self.x, j, q[-1 - at]))
+                on.when(at >= 0, lambda: _write_entry(self.x, j, s[at]), lambda: _write_entry(self.x, j, q[-1 - at]))
 
             on.loop(rows, gather)
             on.loop(it.dims[3], read)
@@ -312,13 +312,13 @@ class Net:
                 self._spread(on, row, self.f[j], self.flow)
                 on.when(self.head[4] > 0, lambda: self._measure(on, row, self.f[j], kept.part(j * width, rows)))
                 place = self.row[3 * row + 2]
-                on.when(place >= 0, lambda: _put(made, place, -self.f[j]))
+                on.when(place >= 0, lambda: _write_entry(made, place, -self.f[j]))
 
             on.loop(rows, scatter)
             self.failed(on, status, found, it.component)
 
         on.loop(size, inject)
-        self.each(on, one)
+        self.each(on, each_component)
         return status.value
 
     def _measure(self, on: Evaluator, row: Integer, flow: Real, slopes: Vector) -> None:
@@ -340,7 +340,7 @@ class Net:
         """Write the changes of flows by those of efforts and of what is read."""
         self._across(on, self.turned, self.changed)
 
-        def one(it: Called) -> None:
+        def each_component(it: Called) -> None:
             rows, reads = it.dims[0] + it.dims[1], it.dims[2]
             width = rows + reads
 
@@ -363,8 +363,8 @@ class Net:
             on.loop(rows, gather)
             on.loop(rows, row)
 
-        self.each(on, one)
+        self.each(on, each_component)
 
 
-def _put(vector: Vector, k: Integer, value: Real) -> None:
+def _write_entry(vector: Vector, k: Integer, value: Real) -> None:
     vector[k] = value

@@ -151,7 +151,7 @@ def test_critical_loads_are_counted_and_end_the_vibration():
     squares = []
     for part in (0.0, 0.5, 0.99, 1.01):
         poses, _ = statics.equilibrium(held.shell, part * found[0] * held.load, held.free)
-        tangent = statics.Reduced.of(held.shell.tangent(poses), held.free).matrix
+        tangent = statics.ReducedTangent.of(held.shell.tangent(poses), held.free).matrix
         assert statics.negative(tangent) == (part > 1.0)
         value = spectra.modes(held.shell, held.free, 1, poses).values[0]
         squares.append(np.copysign(value**2, value))

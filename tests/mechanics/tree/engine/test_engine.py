@@ -12,7 +12,7 @@ from benchmarks.cases import CASES
 from ephs.mechanics.road.elimination import closing
 from ephs.mechanics.runs.simulate import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import Equations
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.errors import SolveError
 from ephs.testing import mechanisms
 
@@ -23,7 +23,7 @@ SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} 
 
 
 def equations(scene):
-    return Equations(problem_of_scene(scene), 0.0)
+    return ReducedEquations(problem_of_scene(scene), 0.0)
 
 
 def moved(eq, seed=0, far=0.3):
