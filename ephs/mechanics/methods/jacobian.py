@@ -13,8 +13,8 @@ from ephs.semantics.systems.kept import once
 from ephs.solve.march import Status
 from ephs.solve.snapshot import Snapshot, like, parts
 
-RELATIVE = 2e-8
-"""Relative length of the differences in place of tangents."""
+RELATIVE = 6e-6
+"""Relative length of the central differences in place of tangents: the cube root of rounding."""
 
 TANGENT, MADE = 8, 100
 """Evaluations that cost as much as one along several directions, and as all else that a matrix takes."""
@@ -94,13 +94,15 @@ class Jacobian:
         return calls_of([[(column, np.arange(self.size))] for column in columns])
 
     def _by_differences(self, state: ReducedState) -> Array:
-        """By differences of the rates."""
+        """By central differences of the rates."""
         eq, y = self.equations, self.equations.vector(state)
-        middle, value = eq.rates(state.t, state.q, y), np.zeros((self.size, self.size))
+        value = np.zeros((self.size, self.size))
         for j in range(self.size):
-            moved = y.copy()
-            moved[j] += RELATIVE * max(1.0, abs(y[j]))
-            value[:, j] = (eq.rates(state.t, state.q, moved) - middle)[: self.size] / (moved[j] - y[j])
+            ends = [y.copy(), y.copy()]
+            for moved, sign in zip(ends, (1.0, -1.0), strict=True):
+                moved[j] += sign * RELATIVE * max(1.0, abs(y[j]))
+            rates = [eq.rates(state.t, state.q, moved).copy() for moved in ends]
+            value[:, j] = (rates[0] - rates[1])[: self.size] / (ends[0][j] - ends[1][j])
         return value
 
     def snapshot(self, state: ReducedState) -> Snapshot:
