@@ -12,10 +12,11 @@ from scipy.spatial import ConvexHull
 import ephs
 from ephs.mechanics.shapes.gap import UPRIGHT
 from ephs.mechanics.shapes.hull import inside_of
-from ephs.mechanics.shapes.pairs import PAIRS, ROUNDED, SIZES, touches
+from ephs.mechanics.shapes.pairs import PAIRS, ROUNDED, touches
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
+SHAPES = ("plane", "sphere", "capsule", "cylinder", "box", "mesh")
 NEW = [pair for pair in PAIRS if {"mesh", "cylinder"} & set(pair) and "plane" not in pair]
 BOUND = 1e-6
 """Of what is regularised along a segment, and of the rounding of iterations, beside what is said of rims."""
@@ -110,7 +111,7 @@ def test_the_least_gap_is_the_distance(pair, seed):
 
 def test_all_solids_meet_each_other_and_the_plane():
     pairs = {frozenset(pair) for pair in PAIRS}
-    assert pairs == {frozenset(pair) for pair in combinations_with_replacement(SIZES, 2)} - {frozenset(["plane"])}
+    assert pairs == {frozenset(pair) for pair in combinations_with_replacement(SHAPES, 2)} - {frozenset(["plane"])}
     assert len(pairs) == len(PAIRS)
 
 
