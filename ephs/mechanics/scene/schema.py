@@ -2,7 +2,7 @@
 
 One model a table; where keys are the attributes of an element, the model is made of the element. Values whose form
 depends on another key (a number, or one per degree of freedom) are taken as numbers or lists here and brought to shape
-by `resolve`.
+by the joint that they are of.
 """
 
 from typing import Any, Literal, TypeAlias
