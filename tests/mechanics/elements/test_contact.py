@@ -374,3 +374,35 @@ def test_no_step_leaps_over_a_thin_plate(name, monkeypatch):
 def test_the_limit_is_half_the_way_through():
     longest = pace.longest_step(problem_of_scene(scene_of_text(HEAD.format(gravity=0.0) + PLATE)), 5, 1e-3, (0.0, 1.0))
     assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)
+
+
+PART = """
+format = 1
+name = "ball"
+
+[bodies.ball]
+mass = 1.0
+inertia = [0.004, 0.004, 0.004]
+position = [0.0, 0.0, 0.15]
+
+[thermal.skin]
+capacity = 50.0
+temperature = 293.15
+
+[surfaces.ball]
+body = "ball"
+shape = { sphere = 0.1 }
+stiffness = 1e4
+loss = 0.3
+heat = "skin"
+"""
+
+
+def test_the_heat_of_a_parts_surface_warms_the_node_of_the_part(tmp_path):
+    (tmp_path / "ball.toml").write_text(PART, encoding="utf-8")
+    whole = 'format = 1\n[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n[parts.left]\nuse = "ball.toml"\n'
+    (tmp_path / "whole.toml").write_text(whole, encoding="utf-8")
+    sol = ephs.simulate(ephs.load(tmp_path / "whole.toml"), 0.2)
+    warmed = 50.0 * (sol.thermal("left.skin").temperature[-1] - 293.15)
+    assert sol.heat[-1] > 0.05
+    assert warmed == pytest.approx(sol.heat[-1], rel=1e-9)
