@@ -18,6 +18,7 @@ from ephs.semantics.meaning.fields import ROUNDED, Rounded
 from ephs.semantics.meaning.step import part_of, solved
 from ephs.semantics.primitives.behaviour import ContinuousBehaviour, NaturalBehaviour
 from ephs.semantics.primitives.differences import slope
+from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
 
@@ -71,16 +72,13 @@ def test_numbers_are_rounded_beside_the_largest_of_their_units():
 
 
 def parts_of(system, seed, behaviour):
-    probe = random_probe(system, seed)
-    names = {path: path for path in probe.state}
-    return [part_of(each, path, Whole(probe.state), names, behaviour) for path, each in system.leaves()]
-
-
-class Whole(dict):
-    """States, at the identity where none is given."""
-
-    def __missing__(self, path):
-        return np.zeros(1)
+    """The relations of all components, at the identity where a probe has no state."""
+    states, leaves = dict(random_probe(system, seed).state), list(system.leaves())
+    names = {path: path for path in states}
+    for path, each in leaves:
+        for port, described in each.interface.items():
+            states.setdefault(path / port, manifold(described.quantity.space).identity())
+    return [part_of(each, path, states, names, behaviour) for path, each in leaves]
 
 
 @settings(max_examples=20)
