@@ -88,7 +88,7 @@ def _turns(lines: list[tuple[str, Array]]) -> bool:
 def motion_lines(sol: Any) -> dict[str, list[tuple[str, Array]]]:
     """Joint angles and distances, positions of bodies and temperatures, one panel for each unit and direction.
 
-    Where an angle goes round more than once, all angles are drawn between −π and π.
+    If an angle exceeds a full turn, all angles are drawn between −π and π.
     """
     bodies = () if sol.outline is None else sol.outline.all_bodies()
     panels: dict[str, list[tuple[str, Array]]] = {}

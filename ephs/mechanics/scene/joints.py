@@ -188,8 +188,8 @@ class Place:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """What a file says of a joint's start: coordinates (d,) and rate (d,), None where not given, and whether its frames
-    are in the bodies; else they are in the world, where the coordinates are 0."""
+    """Initial coordinates (d,) and rate (d,) of a joint in a file, None where not given; and whether its frames are
+    given in the bodies, else in the world, where the coordinates are 0."""
 
     coordinates: Array | None = None
     rate: Array | None = None

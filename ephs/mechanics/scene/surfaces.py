@@ -48,7 +48,7 @@ class ContactLaw(EntryTable):
 
 
 class TouchingElement(ContactLaw, Element):
-    """What has a contact's law."""
+    """Base of surfaces and contacts: the keys and rules of a contact's law."""
 
     @rule(
         *SOFT, *HARD, at="", found="{hard} and {soft}", expected="stiffness or restitution",

@@ -8,11 +8,10 @@ Integration*, IV.4). The defect says how accurate the motion is, which a correct
 
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Real, Record, integer, real
+from ephs.solve.march.iteration import BEYOND as BEYOND
 
 ROUNDING = 16.0 * 2.220446049250313e-16
 """Fraction of the terms of energy, work and heat below which their defect is rounding and not corrected."""
-BEYOND = 1e300
-"""Bound of all energies; a target that is not below it (NaN) means no correction."""
 MOST = 10.0
 """Largest correction of a state with chosen steps, in errors allowed by the tolerance."""
 WORTH = 0.1

@@ -8,14 +8,15 @@ from typing import Any, TypeAlias, final
 
 from ephs.semantics.stage import PLAIN, Evaluator, Integer, Real, Truth
 from ephs.solve.control import SLIVER, Symmetric
+from ephs.solve.march.iteration import BEYOND
 from ephs.solve.march.records import MarchControl
 from ephs.solve.snapshot import Snapshot
 
 DAMPING, STRICT, NEAR = 0.4, 30.0, 0.93
 """How much the last error counts; the most by which a step's part of the tolerance makes its acceptance stricter; what
 a step that is kept may shrink to."""
-UNFELT, BEYOND = 1e-10, 1e300
-"""Error in tolerances below which the next step is the longest allowed; what is not below the second is no number."""
+UNFELT = 1e-10
+"""Error in tolerances below which the next step is the longest allowed."""
 
 PATIENCE = 15
 """Steps without solution, one after the other, before a stiff method is called for."""

@@ -1,6 +1,7 @@
 """Derivatives of a mechanism's rates by its state: the rates over dual numbers, several directions a call.
 
-What acts is evaluated once, with derivatives, and is then read to first order: components need no dual numbers.
+Forces of components are evaluated once at the state, with derivatives, and then read to first order: components need
+no dual numbers.
 """
 
 from collections.abc import Sequence

@@ -90,7 +90,7 @@ def parts_of(problem: Problem) -> Parts:
 
 
 def determined_by(problem: Problem) -> Hashable:
-    """What the parts depend on beside the system: the initial states, names, and prescribed motions."""
+    """Key of the parts of a system: initial states, prescribed motions and names."""
     motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
     return problem.descriptor.pack(problem.initial).tobytes(), motions, tuple(problem.names.items())
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-from ephs.mechanics.tree.sweeps.network import Net, Stores
+from ephs.mechanics.tree.sweeps.network import Net, Stores, write_entry
 from ephs.semantics.linear.dense import copy, lu, lu_solve
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import (
@@ -13,7 +13,6 @@ from ephs.semantics.stage import (
     Integer,
     Matrix,
     Program,
-    Real,
     Truth,
     Vector,
     indices,
@@ -55,7 +54,7 @@ def solve_network(on: Evaluator, net: Net, q: Vector, s: Vector, warmth: Vector,
         status.value = net.flows(on, q, s, made)
 
     def newton() -> None:
-        on.loop(head[4], lambda k: _write_entry(net.effort, known + k, 0.0))
+        on.loop(head[4], lambda k: write_entry(net.effort, known + k, 0.0))
         _newton(on, net, evaluate, status)
 
     on.when(on.same(status.value, 0), lambda: on.when(head[4] > 0, newton, evaluate))
@@ -147,8 +146,8 @@ def _factorise(on: Evaluator, net: Net, status: Any) -> None:
 
 
 def _still(on: Evaluator, net: Net) -> None:
-    on.loop(net.turned.size, lambda k: _write_entry(net.turned, k, 0.0))
-    on.loop(net.moved.size, lambda k: _write_entry(net.moved, k, 0.0))
+    on.loop(net.turned.size, lambda k: write_entry(net.turned, k, 0.0))
+    on.loop(net.moved.size, lambda k: write_entry(net.moved, k, 0.0))
 
 
 def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
@@ -162,7 +161,7 @@ def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
     def column(k: Integer) -> None:
         _still(on, net)
         at = k - net.first_state
-        on.when(at < 0, lambda: _write_entry(net.turned, k, 1.0))
+        on.when(at < 0, lambda: write_entry(net.turned, k, 1.0))
         on.when(on.both(at >= 0, k < known), lambda: _by_state(on, net, at))
         on.when(k >= known, lambda: _by_read(on, net, -1 - net.bent[on.select(k < known, 0, k - known)]))
         net.tangent(on)
@@ -189,7 +188,7 @@ def slopes_of(on: Evaluator, net: Net, out: Matrix) -> Integer:
 
 def _by_read(on: Evaluator, net: Net, place: Integer) -> None:
     def each_entry(j: Integer) -> None:
-        on.when(on.same(net.vary[j], place), lambda: _write_entry(net.moved, j, 1.0))
+        on.when(on.same(net.vary[j], place), lambda: write_entry(net.moved, j, 1.0))
 
     on.loop(net.vary.size, each_entry)
 
@@ -207,10 +206,6 @@ def _by_state(on: Evaluator, net: Net, at: Integer) -> None:
 
     net.stores(on, each_store)
     _by_read(on, net, at + net.head[5])
-
-
-def _write_entry(vector: Vector, k: Integer, value: Real) -> None:
-    vector[k] = value
 
 
 @cache

@@ -13,7 +13,7 @@ import numpy as np
 
 from ephs.mechanics.tree.sweeps.acting import Work
 from ephs.mechanics.tree.sweeps.balances import slopes_of
-from ephs.mechanics.tree.sweeps.network import Net
+from ephs.mechanics.tree.sweeps.network import Net, write_entry
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import (
     Evaluator,
@@ -88,7 +88,7 @@ class About:
         copy(on, work.x.part(0, dims[3]), _part(one, Expansion.state).part(0, dims[3]))
         if stored:
             copy(on, work.e.part(0, n), value.part(0, n))
-            on.loop(n * n, lambda k: _write_entry(slope, k, 2.0 * work.f[k]))
+            on.loop(n * n, lambda k: write_entry(slope, k, 2.0 * work.f[k]))
             one.energy = work.c[0]
             return
         width = n + rates
@@ -97,8 +97,8 @@ class About:
 
         def row(j: Integer) -> None:
             at = width * j
-            on.loop(n, lambda k: _write_entry(slope, at + k, work.jac[at + k]))
-            on.loop(rates, lambda k: _write_entry(slope, at + (n + k), 2.0 * work.jac[at + (n + k)]))
+            on.loop(n, lambda k: write_entry(slope, at + k, work.jac[at + k]))
+            on.loop(rates, lambda k: write_entry(slope, at + (n + k), 2.0 * work.jac[at + (n + k)]))
 
         on.loop(n, row)
 
@@ -118,7 +118,7 @@ class About:
         n, one = dims[0], self.expansion[number]
         width, effort = n + dims[2], _part(one, Expansion.effort)
         value, slope, off = _part(one, Expansion.value), _part(one, Expansion.slope), on.scratch(7)
-        on.loop(n, lambda k: _write_entry(off, k, work.e[k] - effort[k]))
+        on.loop(n, lambda k: write_entry(off, k, work.e[k] - effort[k]))
 
         def flow(j: Integer) -> None:
             by_effort = _along(on, slope.part(width * j, n), off)
@@ -130,13 +130,13 @@ class About:
 
     def attach(self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work) -> Integer:
         """Keep a network that was evaluated, whose first efforts are rates, and its derivatives; return a status."""
-        self._depend(on, net, rate, work, lambda k, value: _write_entry(self.met, k, value))
+        self._depend(on, net, rate, work, lambda k, value: write_entry(self.met, k, value))
         copy(on, net.flow.part(0, net.known), self.flow)
         return slopes_of(on, net, self.slope)
 
     def flows(self, on: Evaluator, net: Net, rate: Callable[[Integer], Real], work: Work) -> Vector:
         """Flows of the network."""
-        self._depend(on, net, rate, work, lambda k, value: _write_entry(self.off, k, value - self.met[k]))
+        self._depend(on, net, rate, work, lambda k, value: write_entry(self.off, k, value - self.met[k]))
 
         def each_entry(k: Integer) -> None:
             self.changed[k] = self.flow[k] + _along(on, self.slope.row(k), self.off)
@@ -162,9 +162,9 @@ def memory_about(components: int, known: int, bent: int) -> dict[str, Any]:
     Parameters
     ----------
     components
-        How many components the system has.
+        Number of components of the system.
     known, bent
-        How many efforts of what is attached are known, and how many degrees of freedom it reads.
+        Numbers of known efforts of the attached network, and of degrees of freedom that it reads.
     """
     shapes = {
         "met": (known + bent,), "flow": (known,), "slope": (known, known + bent), "local": (7,), "off": (known + bent,),
@@ -185,10 +185,6 @@ def _along(on: Evaluator, row: Vector, by: Vector) -> Real:
 
     on.loop(row.size, add)
     return total.value
-
-
-def _write_entry(vector: Vector, k: Integer, value: Real) -> None:
-    vector[k] = value
 
 
 ABOUT: Final = members(About)

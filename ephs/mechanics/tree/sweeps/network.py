@@ -301,7 +301,7 @@ class Net:
 
             def read(j: Integer) -> None:
                 at = self.read[it.read + j]
-                on.when(at >= 0, lambda: _write_entry(self.x, j, s[at]), lambda: _write_entry(self.x, j, q[-1 - at]))
+                on.when(at >= 0, lambda: write_entry(self.x, j, s[at]), lambda: write_entry(self.x, j, q[-1 - at]))
 
             on.loop(rows, gather)
             on.loop(it.dims[3], read)
@@ -312,7 +312,7 @@ class Net:
                 self._spread(on, row, self.f[j], self.flow)
                 on.when(self.head[4] > 0, lambda: self._measure(on, row, self.f[j], kept.part(j * width, rows)))
                 place = self.row[3 * row + 2]
-                on.when(place >= 0, lambda: _write_entry(made, place, -self.f[j]))
+                on.when(place >= 0, lambda: write_entry(made, place, -self.f[j]))
 
             on.loop(rows, scatter)
             self.failed(on, status, found, it.component)
@@ -366,5 +366,6 @@ class Net:
         self.each(on, each_component)
 
 
-def _write_entry(vector: Vector, k: Integer, value: Real) -> None:
+def write_entry(vector: Vector, k: Integer, value: Real) -> None:
+    """Write a number to a place of a vector: what a lambda cannot."""
     vector[k] = value
