@@ -145,5 +145,5 @@ def solution_of(
     states = RecordedStates(problem.descriptor, record.x)
     labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
     return Solution(
-        problem.name, record.t, states, ledgers(problem, record), dict(stats), problem, labels, audited=audited
+        problem.name, record.t, states, lambda: ledgers(problem, record), dict(stats), problem, labels, audited=audited
     )

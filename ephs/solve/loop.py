@@ -142,7 +142,7 @@ class _RunLoop(Generic[S]):
         self.production = Production(self.problem, self.sign)
         self.production.start(row.x, row.energies)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
-            self.blocks.append([(self.t0, self.state, 0.0)])
+            self.kept.add(record_of([(self.t0, None, 0.0)], [row]))
             self.saved = 1
         self.samples.add([(self.t0, self.state, 0.0)])
         self.stepper.prepare(self.state, self.sign * self.h)
@@ -334,8 +334,11 @@ class _RunLoop(Generic[S]):
     def _ends(self) -> list[RunRecord]:
         """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
         with suppress(SolveError):  # a failed run may end where evaluation is impossible
-            rows = [(self.t, self.stepper.row(self.state))] if self.first else []
-            return [record_of([(t, None, 0.0)], [row]) for t, row in ((self.t0, self.first), *rows) if row]
+            if self.first is not None:
+                last = self.kept.last
+                if last is None or last.t != self.t:
+                    last = record_of([(self.t, None, 0.0)], [self.stepper.row(self.state)])
+                return [record_of([(self.t0, None, 0.0)], [self.first]), last]
         return []
 
     def _settle(self) -> None:
@@ -392,7 +395,7 @@ class _RunLoop(Generic[S]):
         if self.policy is not None:
             self.policy.restore(found["policy"])
         self.watch.restore(found["watch"])
-        self.blocks.clear()
+        self.kept = RowBlocks()
         self.forecast.restore(found["forecast"])
         self.samples.restore(found["samples"], self.state)
         if self.journal.rows is not None:

@@ -40,7 +40,7 @@ def sound() -> ephs.Solution:
 def bent(sol: ephs.Solution, **ledgers) -> ephs.Solution:
     """The solution with other ledgers."""
     return ephs.Solution(
-        sol.name, sol.t, sol.states, replace(sol.ledgers, **ledgers), sol.stats, sol.problem, sol.labels
+        sol.name, sol.t, sol.states, lambda: replace(sol.ledgers, **ledgers), sol.stats, sol.problem, sol.labels
     )
 
 
@@ -57,7 +57,7 @@ def opened(sol: ephs.Solution, by: float) -> ephs.Solution:
     pose = next(path for path in states if str(path) == "bodies.rod.pe.q")
     states[pose] = states[pose].copy()
     states[pose][10, 4] += by
-    return ephs.Solution(sol.name, sol.t, states, sol.ledgers, sol.stats, sol.problem, sol.labels)
+    return ephs.Solution(sol.name, sol.t, states, lambda: sol.ledgers, sol.stats, sol.problem, sol.labels)
 
 
 def broken(law: str, sol: ephs.Solution, times: float) -> ephs.Solution:
@@ -69,12 +69,18 @@ def broken(law: str, sol: ephs.Solution, times: float) -> ephs.Solution:
     if law == "entropy":
         least = -times * PRODUCTION * entropies
         return ephs.Solution(
-            sol.name, sol.t, sol.states, ledgers, {**sol.stats, "least_production": least}, sol.problem, sol.labels
+            sol.name,
+            sol.t,
+            sol.states,
+            lambda: ledgers,
+            {**sol.stats, "least_production": least},
+            sol.problem,
+            sol.labels,
         )
     if law == "input":
         found = [{"t": 0.1, "input": "joints.pin"}] * int(times * MOST_FOUND)
         stats = {**sol.stats, "jumps": {"declared": 0, "found": found, "divided_steps": 0}}
-        return ephs.Solution(sol.name, sol.t, sol.states, ledgers, stats, sol.problem, sol.labels)
+        return ephs.Solution(sol.name, sol.t, sol.states, lambda: ledgers, stats, sol.problem, sol.labels)
     if law == "constraint":
         length = Snapshot.of(sol.scene).scale(sol.scene.world.gravity).length
         return opened(sol, times * CLOSED * length)

@@ -58,6 +58,6 @@ def own_motion(solution: Solution, make: Callable[[Scene, Solution], Any]) -> Ow
     sizes = units_of_states(own.descriptor, units, read=True)
     states = {path: value / sizes[path] for path, value in solution.states.items()}
     there = Solution(
-        solution.name, solution.t / units.time, states, solution.ledgers, solution.stats, own, solution.labels
+        solution.name, solution.t / units.time, states, lambda: solution.ledgers, solution.stats, own, solution.labels
     )
     return OwnMotion(make(own.scene, there), problem.scene, units)

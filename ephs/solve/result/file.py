@@ -92,7 +92,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         labels = {path: each.labels for path, each in states.items()}
     known, books = {path: each.values for path, each in states.items()}, _ledgers(groups, temperature)
     if problem is not None and problem.motion is not None:
-        short = Solution(attributes["name"], t, known, books, {}, problem, labels, inputs)
+        short = Solution(attributes["name"], t, known, lambda: books, {}, problem, labels, inputs)
         if rest:
             try:
                 known = restored(known, rest, problem.motion(short).contact_poses())
@@ -101,11 +101,11 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         known = {slot.path: known[slot.path] for slot in problem.descriptor.states if slot.path in known}
         books = with_zeros(books, problem, t.size)
     elif problem is not None and t.size:  # a mechanism is read as it was solved: by its first instant
-        first = Solution(attributes["name"], t, known, books, {}, problem, labels, inputs).state_at(0)
+        first = Solution(attributes["name"], t, known, lambda: books, {}, problem, labels, inputs).state_at(0)
         problem = replace(problem, initial=first)
     stats = _stats(json.loads(attributes["stats"]), problem)
     found = Audit.of_record(stats.pop("audit", Audit().record()))
-    return Solution(attributes["name"], t, known, books, stats, problem, labels, inputs, lambda: found)
+    return Solution(attributes["name"], t, known, lambda: books, stats, problem, labels, inputs, lambda: found)
 
 
 @final

@@ -73,6 +73,13 @@ class RowBlocks:
         if written:
             self._written = len(self._blocks)
 
+    @property
+    def last(self) -> RunRecord | None:
+        """The last instant; None of none."""
+        if not (self._blocks and self._blocks[-1].t.size):
+            return None
+        return RunRecord(*(getattr(self._blocks[-1], f.name)[-1:] for f in fields(RunRecord)))
+
     def fresh(self) -> RunRecord | None:
         """Instants since the last call."""
         found = joined(self._blocks[self._written :])

@@ -43,7 +43,7 @@ class Solution:
         Path of each storage port -> (n,) of scalars, (n, 7) of poses (quaternion, position), (n, 6) of body momenta,
         (n, d) coordinates of relative poses.
     ledgers
-        Energies, heat, work and entropies.
+        Makes or reads the energies, heat, work and entropies.
     stats
         Counts and times of the run.
     problem
@@ -61,14 +61,14 @@ class Solution:
         name: str,
         t: Array,
         states: Mapping[Path, Array],
-        ledgers: Ledgers,
+        ledgers: Callable[[], Ledgers],
         stats: Mapping[str, Any],
         problem: Problem | None,
         labels: Mapping[Path, Labels],
         inputs: Mapping[Path, DatasetVariable] | None = None,
         audited: Callable[[], Audit] | None = None,
     ) -> None:
-        self.name, self.t, self.states, self.ledgers = name, t, states, ledgers
+        self.name, self.t, self.states, self._ledgers = name, t, states, ledgers
         self.stats, self.problem, self.labels, self._inputs = stats, problem, labels, inputs
         self._audited = audited
 
@@ -104,7 +104,7 @@ class Solution:
         states = {path: values[where] for path, values in self.states.items()}
         ledgers = replace(self.ledgers, **totals)
         data = self.stats, self.problem, self.labels, inputs, self._audited
-        return Solution(self.name, self.t[where], states, ledgers, *data)
+        return Solution(self.name, self.t[where], states, lambda: ledgers, *data)
 
     def __len__(self) -> int:
         return int(self.t.size)
@@ -125,6 +125,11 @@ class Solution:
     def events(self) -> tuple[Crossing, ...]:
         """The events in order of time: name, time in s, states."""
         return tuple(map(Crossing.of_record, self.stats.get("events", ())))
+
+    @cached_property
+    def ledgers(self) -> Ledgers:
+        """Energies, heat, work and entropies."""
+        return self._ledgers()
 
     @cached_property
     def audit(self) -> Audit:

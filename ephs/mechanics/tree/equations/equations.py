@@ -368,7 +368,7 @@ class ReducedEquations:
         """
         q, r, s = self._paper.initial()
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(2 + len(self.reduced.made))))
-        self.led.start(self.row(state).energies)
+        self.led.start(lambda: self.row(state).energies)
         state = self.accounts.opened(state)
         self._paper.check(state.q, state.r, self.heats.entropies(state.heats))
         if self.careful:

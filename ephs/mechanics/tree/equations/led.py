@@ -6,7 +6,8 @@ grows without bound near dead centres, where a quadrature of its power fails. Ho
 all the same: where a mechanism takes the other way out of a dead centre, velocities jump, and the two part.
 """
 
-from collections.abc import Container
+from collections.abc import Callable, Container
+from functools import cached_property
 from typing import Any, final
 
 import numpy as np
@@ -35,13 +36,16 @@ class Led:
         self._from: float | None = None
         self.apart = 0.0, 0.0
         """By how many J work and quadrature differ most, and the time in s."""
-        self.mechanical = np.array(
-            [
-                float(isinstance(slot.primitive, Storage) and not any(s.path in booked for s in slot.reads))
-                for slot in problem.descriptor.components
-            ]
-        )
+        self._booked = booked
+
+    @cached_property
+    def mechanical(self) -> Array:
         """(components,) 1 for storages of energy that is not booked as heat."""
+        components, booked = self._problem.descriptor.components, self._booked
+        kept = [
+            isinstance(one.primitive, Storage) and not any(s.path in booked for s in one.reads) for one in components
+        ]
+        return np.array(kept, dtype=float)
 
     @property
     def holds(self) -> bool:
@@ -54,9 +58,9 @@ class Led:
         """Whether work is computed from the energies."""
         return self._from is not None
 
-    def start(self, energies: Array) -> None:
-        """Count from here, where no degree of freedom is left; energies (components,) in J."""
-        self._from = float(self._mechanical(energies)) if self.holds else None
+    def start(self, energies: Callable[[], Array]) -> None:
+        """Count from here, where no degree of freedom is left; energies (components,) in J are evaluated only there."""
+        self._from = float(self._mechanical(energies())) if self.holds else None
 
     def work(self, times: Array, energies: Array, totals: Array) -> Array:
         """(rows,) the work in J since the start by energies (rows, components) and the heat, the first of the totals;

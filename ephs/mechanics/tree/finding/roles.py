@@ -9,6 +9,7 @@ from ephs.operad import Path, quantity
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.primitives.pullback import pulled_ports
+from ephs.semantics.systems.kept import once
 from ephs.solve.heats import exponential_law
 
 
@@ -47,10 +48,14 @@ class Role(Enum):
 
 def strikes(descriptor: Descriptor) -> Path | None:
     """The first component that has impulses; None where none has."""
-    n = descriptor.numbering
-    struck = [isinstance(one, Irreversible) and one.impulse is not None for one in n.primitives]
-    found = np.flatnonzero(np.array(struck, dtype=bool)[n.primitive])
-    return descriptor.components[int(found[0])].path if found.size else None
+
+    def first() -> Path | None:
+        n = descriptor.numbering
+        struck = [isinstance(one, Irreversible) and one.impulse is not None for one in n.primitives]
+        found = np.flatnonzero(np.array(struck, dtype=bool)[n.primitive])
+        return descriptor.components[int(found[0])].path if found.size else None
+
+    return once(descriptor, "strikes", first)
 
 
 @final
