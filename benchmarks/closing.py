@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks import families
 from benchmarks.report import Report, table_of
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 
 SIZES = (1, 4, 16)

@@ -21,7 +21,7 @@ from benchmarks.peers.mujoco import mujoco_model, silent
 from benchmarks.peers.pinocchio import PinModel
 from benchmarks.peers.scene import PeerError, peer_scene
 from benchmarks.report import Report, table_of
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 

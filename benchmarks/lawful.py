@@ -13,7 +13,7 @@ import numpy as np
 import ephs
 from benchmarks import families
 from ephs.mechanics.methods.explicit import Explicit, tableau
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.stepping import Span

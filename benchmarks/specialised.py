@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks import families
 from benchmarks.report import Report, table_of
 from ephs.mechanics.road.programs import sweeps
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import Program

@@ -19,7 +19,7 @@ from ephs.mechanics.elements.components import holonomic
 from ephs.mechanics.rewrite.frames import CONSTRAINED, joint_at
 from ephs.mechanics.rewrite.rewrite import SystemDraft
 from ephs.mechanics.rewrite.stabilised import stabilised
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.bundles.bundle import Array
 
 __all__ = ["report"]

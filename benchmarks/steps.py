@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.cases import CASES, Case
 from benchmarks.report import Report, table_of
 from ephs.mechanics.rewrite.folded import folded_problem
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Evaluation, compile_model

@@ -88,3 +88,22 @@ def test_import_loads_nothing_heavy():
     script = f"import sys, ephs; print(*[name for name in {HEAVY!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+SYSTEM = "from examples.oscillator import damped_oscillator as model"
+SCENE = "model = ephs.load('scenes/heavy-top.toml')"
+
+
+def loaded(model):
+    """Names of the modules that a process has loaded which runs a model."""
+    script = f"import sys, ephs; {model}; ephs.simulate(model, 0.1, step=0.05, audit='off'); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(("model", "known"), [(SYSTEM, False), (SCENE, True)])
+def test_a_system_without_bodies_is_run_without_scenes(model, known):
+    found = loaded(model)
+    scenes = [name for name in found if within(name, "ephs.mechanics.scene") or within(name, "ephs.mechanics.tree")]
+    assert bool(scenes) == ("pydantic" in found) == known
+    assert known or len([name for name in found if within(name, "ephs")]) <= 245

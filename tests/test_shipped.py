@@ -15,7 +15,7 @@ from benchmarks import families
 from ephs.mechanics.elements.shell.edges import SIZE
 from ephs.mechanics.road.loops import ARGUMENTS as LOOPS
 from ephs.mechanics.road.programs import ARGUMENTS as SWEEPS
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces.differentials import DIMENSIONS
 from ephs.semantics.stage import llvm

@@ -34,7 +34,7 @@ def info(scene: str, /, *, loading: LoadOptions = AS_GIVEN) -> int:
 
 def _of_scene(scene: "Scene") -> list[str]:
     from ephs.mechanics.motion.readout import freedoms_of
-    from ephs.mechanics.runs.simulate import problem_of_scene
+    from ephs.mechanics.runs.scene_problem import problem_of_scene
     from ephs.mechanics.scene.build import element_inputs
     from ephs.mechanics.scene.own_units import mobility_of
 

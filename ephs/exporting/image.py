@@ -11,7 +11,9 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.outputs import outputs_program
 from ephs.exporting.parameters import ParameterPolynomial, dependence
 from ephs.mechanics.methods.explicit import Explicit, tableau
-from ephs.mechanics.runs.simulate import control_of, problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.simulate import control_of
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path, tension_port
 from ephs.mechanics.scene.model import Scene

@@ -15,7 +15,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Joint, Scene

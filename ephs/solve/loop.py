@@ -153,10 +153,8 @@ class _RunLoop(Generic[S]):
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
-        alone = not (
-            self.watch.events or self.production.active or self.breakpoints.active
-        )  # no step has to be looked at
-        compiled = alone and (self.journal is None or self.journal.snapshot is None or stood is not None)
+        each = self.watch.events or self.production.active or self.breakpoints.active  # step has to be looked at
+        compiled = not each and (self.journal is None or self.journal.snapshot is None or stood is not None)
         while compiled and not self.ended and self.t != self.until:  # leg after leg, while the method has one
             counts = Counts(self.steps, self.rejected, self.shortest, self.longest, self.least, self.h)
             here = self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
@@ -334,10 +332,8 @@ class _RunLoop(Generic[S]):
     def _ends(self) -> list[RunRecord]:
         """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
         with suppress(SolveError):  # a failed run may end where evaluation is impossible
-            if self.first is not None:
-                last = self.kept.last
-                if last is None or last.t != self.t:
-                    last = record_of([(self.t, None, 0.0)], [self.stepper.row(self.state)])
+            if self.first:
+                last = self.kept.ending_at(self.t) or record_of([(self.t, None, 0.0)], [self.stepper.row(self.state)])
                 return [record_of([(self.t0, None, 0.0)], [self.first]), last]
         return []
 

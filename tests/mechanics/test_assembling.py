@@ -9,7 +9,7 @@ import ephs
 from benchmarks.hard.four_bars import wired, wired_poses
 from ephs.mechanics.motion.links import LinkMotion
 from ephs.mechanics.runs.check import check_model
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state, scene_inputs
 from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.sensitivity.family import relation_of
 from ephs.mechanics.tree.engine.residuals import ACTIVE, point_program
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents

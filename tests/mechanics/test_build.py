@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 
 import ephs
 from ephs.mechanics.runs.check import check_model
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.build import (
     component_path,
     drive_ports,

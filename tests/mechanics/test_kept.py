@@ -10,7 +10,8 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path, Pattern, junction

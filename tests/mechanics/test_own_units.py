@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.own_units import NEAR, SI, OwnUnits, mobility_of
 from ephs.mechanics.scene.rescaled import rescaled
 

@@ -10,7 +10,8 @@ import pytest
 import ephs
 from benchmarks.hard import CASES
 from ephs.mechanics.runs.pace import TIMES, TURN, longest_step
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from examples.failing import four_bar
 from tests.mechanics.methods.test_by_hand import four_bar as four_bar_by_hand
 from tests.written import scene_of_text

@@ -11,7 +11,7 @@ from benchmarks.hard.loops import stretched
 from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.plausible import doubts
 from ephs.mechanics.constraints.redundancy import dependences, explain
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = [*sorted(ROOT.glob("scenes/*.toml")), *sorted(ROOT.glob("examples/*.toml"))]

@@ -11,7 +11,8 @@ import ephs
 from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.redundancy import dependences, explain, indeterminate, wrenches_in_words
 from ephs.mechanics.runs.check import check_model
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import component_path, scene_inputs
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import GROUND

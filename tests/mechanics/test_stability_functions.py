@@ -16,7 +16,7 @@ from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.control import Control, Tolerance
 from ephs.solve.methods.collocation import radau as coefficients
 from ephs.solve.model import compile_model

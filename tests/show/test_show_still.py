@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import ephs
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.show.lines import lines_of
 from ephs.show.sketch import sketch
 from ephs.show.solids import Solid, coarse

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.differentials import DIMENSIONS, differentials
 from ephs.semantics.stage import Program

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 
 import ephs
 from benchmarks import families
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.solve import instant
 from ephs.solve.mobility import mobility
 from ephs.testing import mechanisms

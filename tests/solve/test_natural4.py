@@ -7,7 +7,7 @@ import pytest
 
 import ephs
 from ephs import library
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import SE3
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import compile_model

@@ -9,7 +9,7 @@ import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.auditing.production import Production
 from ephs.solve.errors import Outcome, SolveError
 from examples.failing import driving

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.stage import Entry, Program, vector
 from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of

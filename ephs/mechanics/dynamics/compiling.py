@@ -6,7 +6,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ephs.mechanics.dynamics.model import Dynamics
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.systems.system import System

@@ -18,7 +18,7 @@ from ephs.mechanics.dynamics.results import Constraints, Derivatives, Energies, 
 from ephs.mechanics.dynamics.state import State
 from ephs.mechanics.dynamics.stepping import Steps
 from ephs.mechanics.motion.views import BodyState
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.following import has_stretches
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.paper import PaperStates

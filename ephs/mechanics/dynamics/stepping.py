@@ -12,7 +12,7 @@ from ephs.mechanics.methods.explicit import Tableau, tableau
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import Setting, chosen
 from ephs.mechanics.runs.pushes import sum_of
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.operad import Path

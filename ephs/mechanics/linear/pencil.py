@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.primitives.primitives import Storage

@@ -5,8 +5,6 @@ from typing import Any
 from warnings import warn
 
 from ephs.mechanics.methods.registry import REPLACED, MethodEntry
-from ephs.mechanics.tree.equations.accounts import KEEP
-from ephs.mechanics.tree.finding.roles import strikes
 from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.problem import Problem
 
@@ -31,9 +29,12 @@ def options_of(method: MethodEntry, problem: Problem, given: Mapping[str, Any] |
         raise OptionError(
             "options", unknown[0], f"options of {method.name}: {known}{nearest_of(unknown[0], method.options)}"
         )
-    energy, both = KEEP
-    hard = strikes(problem.descriptor)
-    if hard is not None and given.get("keep") == both:
-        expected = f"{energy!r}: {hard} acts by impulses, beside which steps keep no momenta"
-        raise OptionError("options['keep']", both, expected)
+    hard = problem.descriptor.strikes
+    if hard is not None and given:
+        from ephs.mechanics.tree.equations.accounts import KEEP  # only mechanisms have impulses
+
+        energy, both = KEEP
+        if given.get("keep") == both:
+            expected = f"{energy!r}: {hard} acts by impulses, beside which steps keep no momenta"
+            raise OptionError("options['keep']", both, expected)
     return dict(given)

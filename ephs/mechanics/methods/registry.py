@@ -6,8 +6,6 @@ from types import MappingProxyType
 from typing import Any, final
 from warnings import warn
 
-from ephs.mechanics.tree.finding.frames import Unplaced
-from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.control import Control, Symmetric
@@ -102,11 +100,11 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
     """
 
     def made(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
-        from ephs.mechanics.tree.equations.equations import (
-            ReducedEquations,  # its kernels take a quarter of a second to load
-        )
+        # systems without bodies need none of these, whose kernels take a quarter of a second to load
+        from ephs.mechanics.tree.equations.equations import ReducedEquations
+        from ephs.mechanics.tree.finding.frames import Unplaced
 
-        hard = strikes(setting.problem.descriptor)
+        hard = setting.problem.descriptor.strikes
         try:
             equations = setting.equations or ReducedEquations(setting.problem, setting.t0, pushed=hard is not None)
         except Unplaced as error:
@@ -333,7 +331,7 @@ def chosen(name: str | own.Method | MethodEntry, problem: Problem, *, step: floa
     OptionError
         There is no such method, or it does not serve this problem.
     """
-    hard = strikes(problem.descriptor)
+    hard = problem.descriptor.strikes
     if name == "auto":
         if hard is not None:
             return (AUTO, "a mechanism with hard contacts") if step is None else (METHODS["rk54"], "hard contacts")
@@ -367,6 +365,7 @@ def _for_all(problem: Problem, step: float | None) -> tuple[MethodEntry, str]:
         return METHODS["natural"], "a constant step is given"
     if _flat(problem):
         return METHODS["radau"], "a system on vector spaces without a constant step"
+    from ephs.mechanics.tree.finding.frames import Unplaced
     from ephs.mechanics.tree.finding.parts import parts_of
 
     try:

@@ -16,7 +16,6 @@ from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.stages import evaluated
-from ephs.mechanics.tree.finding.roles import strikes
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
@@ -139,7 +138,7 @@ def cheap(equations: ReducedEquations) -> bool:
     """Whether the masses of a tree are factorised in little time, and no contact is hard."""
     reach = chains(links_of(equations.reduced).parts)["reach"]
     narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
-    return bool(narrow) and strikes(equations.problem.descriptor) is None
+    return bool(narrow) and equations.problem.descriptor.strikes is None
 
 
 def _programs(equations: ReducedEquations) -> dict[int, int]:

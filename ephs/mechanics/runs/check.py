@@ -8,7 +8,8 @@ import numpy as np
 from ephs.mechanics.constraints.plausible import doubts
 from ephs.mechanics.constraints.redundancy import dependences, in_words, indeterminate, wrenches_in_words
 from ephs.mechanics.runs.running import by_constant_steps
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.runs.touching import run_of_touching, without_contacts
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.own_units import in_own_units, mobility_of

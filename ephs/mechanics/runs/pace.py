@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ephs.mechanics.scene.contacts import contact_points
 from ephs.semantics.spaces.pairs import PAIRS, pair
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.errors import SolveError
@@ -41,6 +40,8 @@ def _contact_step(scene: "Scene") -> float:
 
     A step that begins before a thin surface and ends behind it sees no contact; behind a plane it does.
     """
+    from ephs.mechanics.scene.contacts import contact_points  # systems are run without scenes
+
     surfaces, bodies = dict(scene.all_surfaces()), dict(scene.all_bodies())
     thick = np.inf
     for _, contact in scene.all_contacts():

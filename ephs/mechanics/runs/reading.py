@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics.rewrite.folded import folded_problem
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.runs.system_text import is_system_text, read_system_text
 from ephs.mechanics.scene.build import drive_ports, scene_inputs, wrench_port
 from ephs.mechanics.scene.document import scene_from_text

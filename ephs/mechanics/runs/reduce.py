@@ -4,7 +4,7 @@ from ephs.mechanics.rewrite.coordinates import coordinate_steps
 from ephs.mechanics.rewrite.rewrite import rewrite
 from ephs.mechanics.rewrite.rules import RULES
 from ephs.mechanics.rewrite.steps import Reduction, Step, listed
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.systems.system import System
 from ephs.solve.threads import in_one_thread

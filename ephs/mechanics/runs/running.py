@@ -18,7 +18,7 @@ from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.events import Event
 from ephs.solve.journal import Written
 from ephs.solve.loop import integrate
-from ephs.solve.problem import Problem
+from ephs.solve.problem import Problem, State
 from ephs.solve.result.solution import Solution
 from ephs.solve.watching import Progress
 
@@ -122,3 +122,21 @@ def by_constant_steps(problem: Problem, until: float, step: float) -> Solution:
     tolerance = Tolerance(RTOL, {})
     control = Control(tolerance, tolerance, step, 0.0, np.inf, None)
     return Course(problem, METHODS["natural"], 0.0, until, control, {}).run(Breakpoints(0.0, until))
+
+
+def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | None) -> tuple[Any, Any]:
+    """Events and progress in times and states of the original problem."""
+    given, seconds, view = problem.given, problem.seconds, problem.view
+
+    def seen(event: Event) -> Event:
+        function = event.function
+
+        def read(t: float, state: State) -> float:
+            return function(t * seconds, view(state if given is None else given(state)))
+
+        return replace(event, function=read)
+
+    if given is None:
+        return tuple(map(seen, events)), progress
+    told = None if progress is None else lambda t, until, stats: progress(t * seconds, until * seconds, stats)
+    return tuple(map(seen, events)), told

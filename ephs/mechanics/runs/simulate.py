@@ -1,48 +1,21 @@
 """`simulate`: from a system or a scene to its motion."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cache
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.mechanics.constraints.holding import ConfiguredMechanism
-from ephs.mechanics.constraints.redundancy import dependences, explain, in_words
 from ephs.mechanics.methods.options import options_of
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, chosen
-from ephs.mechanics.motion.links import LinkMotion
-from ephs.mechanics.motion.motion import SceneMotion
-from ephs.mechanics.motion.views import view_of
-from ephs.mechanics.rewrite.folded import folded_problem
-from ephs.mechanics.runs.assembling import check_closed, constraints_of, flat_joints, start_of
 from ephs.mechanics.runs.journaling import journaled
 from ephs.mechanics.runs.pace import longest_step
-from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
-from ephs.mechanics.runs.running import Course
-from ephs.mechanics.runs.signals import asked_of, check_mappings, jumps_of, signal, times_of
-from ephs.mechanics.runs.system_text import system_text
-from ephs.mechanics.scene.build import (
-    drive_ports,
-    initial_state,
-    scene_inputs,
-    scene_names,
-    scene_system,
-    wrench_port,
-)
-from ephs.mechanics.scene.document import scene_to_text
-from ephs.mechanics.scene.meant import is_shaky
-from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.own_units import in_own_units, seen_from
-from ephs.mechanics.scene.state import Snapshot
-from ephs.operad import Path, Pattern
-from ephs.operad.collector import paused_collector
-from ephs.semantics.bundles import extents
+from ephs.mechanics.runs.running import Course, seen_from
+from ephs.mechanics.runs.signals import asked_of, check_mappings, jumps_of, times_of
+from ephs.mechanics.runs.system_problem import problem_of_system
+from ephs.operad import Pattern
 from ephs.semantics.bundles.bundle import Reference
-from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.primitives.primitives import Irreversible
-from ephs.semantics.systems.kept import once
 from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import random_efforts
 from ephs.solve.auditing.audit import Bounds
@@ -53,7 +26,7 @@ from ephs.solve.errors import OptionError, count_of, failing_at, nearest_of, num
 from ephs.solve.events import events_of
 from ephs.solve.journal import Journal
 from ephs.solve.methods.own import Method, coefficients_of
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.problem import Problem
 from ephs.solve.result.solution import Solution
 from ephs.solve.sampled import Sampling, holding
 from ephs.solve.threads import in_one_thread
@@ -62,12 +35,14 @@ from ephs.solve.watching import guarded
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from ephs.mechanics.scene.model import Scene
+
 FORMS = ("paper", "folded", "reduced")
 
 
 @in_one_thread
 def simulate(
-    model: System | Scene,
+    model: "System | Scene",
     until: float,
     *,
     t0: float = 0.0,
@@ -162,16 +137,21 @@ def simulate(
     check_mappings(inputs=inputs, initial=initial)
     given = inputs or {}
     inputs, held = holding(given, start, end)
-    if isinstance(model, Scene):
+    if isinstance(model, System | Pattern):
+        problem = problem_of_system(model, initial, inputs, reference)
+    else:
+        from ephs.mechanics.runs.scene_problem import problem_of_scene  # systems are run without scenes
+        from ephs.mechanics.scene.own_units import in_own_units
+
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
         problem = in_own_units(problem_of_scene(model, initial, inputs))
-    else:
-        problem = problem_of_system(model, initial, inputs, reference)
     method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
     chosen_method, reason = (method_of, f"the {form} form") if method_of else chosen(method, problem, step=step)
     _fits(form, chosen_method)
     if form == "folded":
+        from ephs.mechanics.rewrite.folded import folded_problem
+
         problem = folded_problem(problem)
     if end < start:
         _reversible(problem, end)
@@ -283,95 +263,3 @@ def _reversible(problem: Problem, until: float) -> None:
             if slot.primitive.impulse or np.any(slot.primitive.flow(d.point(slot, x), e, problem.reference)):
                 expected = f"a time after t0: {slot.path} produces entropy, which does not run backward"
                 raise OptionError("until", until, expected)
-
-
-@paused_collector()
-def problem_of_system(
-    system: System,
-    initial: Mapping[str, "ArrayLike"] | None = None,
-    inputs: Mapping[str, Any] | None = None,
-    reference: Reference | None = None,
-    *,
-    name: str = "system",
-    assemble: bool = True,
-) -> Problem:
-    """The initial value problem of a system.
-
-    ``assemble``: bodies and joints whose poses are not given are put where the others want them.
-    """
-    if isinstance(system, Pattern):
-        raise AssemblyError("unfilled", "model")
-    descriptor = system.descriptor()
-    signals: dict[Path, Signal] = {}
-    for port, given in (inputs or {}).items():
-        if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= {"effort", "flow"}:
-            raise AssemblyError("input", port, found=given, expected="{'effort': f} or {'flow': f}")
-        ((side, value),) = given.items()
-        path = Path.of(port)
-        size = system.interface[path].quantity.space.dim if path in system.interface else None
-        signals[path] = signal(value, effort=side == "effort", name=str(path), size=size)
-    state = system.state(initial)
-    counters = {slot.path for slot in descriptor.components if slot.primitive.kind == "environment"}
-    for slot in descriptor.states:
-        given, of = state[slot.path], slot.quantity
-        if not extents.inside(of, given) and Path(slot.path[:-1]) not in counters:
-            found = float(given[0]) if given.size == 1 else given
-            raise AssemblyError("outside", slot.path, quantity=of.kind, found=found, expected=extents.expected(of))
-    joints = flat_joints(descriptor)
-    if assemble and joints.links:
-        state = start_of(joints, system, {path: state[path] for path in map(Path.of, initial or {})})
-    gaps = joints.gaps if joints.links else None
-    linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
-    given = reference or Reference()
-    document = cache(lambda: system_text(system, signals, given))
-    made = Problem(name, system, descriptor, state, signals, given, gaps=gaps, linked=linked, document=document)
-    if not joints.holding:
-        return made
-    held = cache(lambda: constraints_of(joints, made))
-    return replace(made, constraints=held, dependences=lambda: in_words(dependences(held())))
-
-
-@paused_collector()
-def problem_of_scene(
-    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
-) -> Problem:
-    """The initial value problem of a scene."""
-    view = view_of(scene)
-    forces, wrenches, others = scene_signals(scene, inputs or {}, view)
-    system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
-    state = initial_state(scene)
-    if initial:
-        changed = system.state(initial)
-        state |= {Path.of(path): changed[Path.of(path)] for path in initial}
-    signals = dict(scene_inputs(scene))
-    for name, force in forces.items():
-        for port, where in drive_ports(scene.joint(name)):
-            extra = part_of(force, where)
-            if port in signals and signals[port].effort:
-                raise AssemblyError(
-                    "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
-                )
-            signals[port] = sum_of(signals[port], extra) if port in signals else extra
-    signals |= others
-    signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
-    world = scene.world
-    problem = Problem(
-        scene.name,
-        system,
-        system.descriptor(),
-        state,
-        signals,
-        Reference(world.temperature, world.pressure),
-        motion=lambda solution: SceneMotion(scene, solution),
-        scene=scene,
-        document=lambda: once(scene, "text", lambda: scene_to_text(scene)),
-        constraints=lambda: ConfiguredMechanism.of(scene),
-        dependences=lambda: explain(scene),
-        shaky=lambda: is_shaky(scene),
-        length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
-        view=view,
-        names=once(scene, "names", lambda: scene_names(scene)),
-    )
-    if initial:
-        check_closed(problem)
-    return problem

@@ -9,7 +9,7 @@ from ephs.mechanics.motion.batch import compose, inverse
 from ephs.mechanics.motion.batch import gap as change
 from ephs.mechanics.motion.motion import SceneMotion
 from ephs.mechanics.motion.moving import Moving
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import Scene
 from ephs.solve.errors import SolveError

@@ -22,13 +22,11 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.spaces import Pair, pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.events import Event
 from ephs.solve.instant import Mobility
 from ephs.solve.mobility import mobility
 from ephs.solve.motion_law import MotionLaw
 from ephs.solve.problem import Problem, Signal, State
 from ephs.solve.result.record import RunRecord
-from ephs.solve.watching import Progress
 
 NEAR = 16, 20, 20
 """Powers of two that one unit of length, mass and time is from the next: within the first ones from m, kg and s, runs
@@ -125,24 +123,6 @@ def in_own_units(problem: Problem) -> Problem:
         given=given,
         seconds=units.time,
     )
-
-
-def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | None) -> tuple[Any, Any]:
-    """Events and progress in times and states of the original problem."""
-    given, seconds, view = problem.given, problem.seconds, problem.view
-
-    def seen(event: Event) -> Event:
-        function = event.function
-
-        def read(t: float, state: State) -> float:
-            return function(t * seconds, view(state if given is None else given(state)))
-
-        return replace(event, function=read)
-
-    if given is None:
-        return tuple(map(seen, events)), progress
-    told = None if progress is None else lambda t, until, stats: progress(t * seconds, until * seconds, stats)
-    return tuple(map(seen, events)), told
 
 
 def mobility_of(problem: Problem) -> Mobility:

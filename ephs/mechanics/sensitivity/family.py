@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.runs.simulate import problem_of_scene, problem_of_system
+from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.errors import SceneError
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import read, varied
-from ephs.mechanics.tree.finding.roles import strikes
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import StructureError
@@ -116,7 +116,7 @@ class ParameterFamily:
                 self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
         self._neighbours: dict[tuple[str, float], Problem] = {}
         self.problem = self._made({})
-        if (path := strikes(self.problem.descriptor)) is not None:
+        if (path := self.problem.descriptor.strikes) is not None:
             raise OptionError("model", str(path), "a contact with a stiffness: impulses have no derivative")
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
         idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in RESISTING}

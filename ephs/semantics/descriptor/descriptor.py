@@ -17,9 +17,9 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.descriptor.numbering import Index, Numbering, bearing_junctions, number_flat, starts
 from ephs.semantics.primitives.behaviour import ContinuousBehaviour, NaturalBehaviour, Relating, Storing
-from ephs.semantics.primitives.primitives import Point, Primitive, Reversible, Storage
+from ephs.semantics.primitives.primitives import Irreversible, Point, Primitive, Reversible, Storage
 from ephs.semantics.spaces import Pair, manifold
-from ephs.semantics.systems.kept import Kept
+from ephs.semantics.systems.kept import Kept, once
 from ephs.semantics.systems.system import System
 
 
@@ -148,6 +148,18 @@ class Descriptor:
             JunctionSlot(path, n.quantities[n.junctions[i]], int(efforts[i]), True)
             for path, i in zip(ports, n.outer.tolist(), strict=True)
         )
+
+    @property
+    def strikes(self) -> Path | None:
+        """The first component that has impulses; None where none has."""
+
+        def first() -> Path | None:
+            n = self.numbering
+            struck = [isinstance(one, Irreversible) and one.impulse is not None for one in n.primitives]
+            found = np.flatnonzero(np.array(struck, dtype=bool)[n.primitive])
+            return self.components[int(found[0])].path if found.size else None
+
+        return once(self, "strikes", first)
 
     @property
     def point_size(self) -> int:

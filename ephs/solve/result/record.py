@@ -73,12 +73,12 @@ class RowBlocks:
         if written:
             self._written = len(self._blocks)
 
-    @property
-    def last(self) -> RunRecord | None:
-        """The last instant; None of none."""
-        if not (self._blocks and self._blocks[-1].t.size):
+    def ending_at(self, t: float) -> RunRecord | None:
+        """The last instant; None where there is none, or it is at another time."""
+        last = self._blocks[-1] if self._blocks else None
+        if last is None or not last.t.size or last.t[-1] != t:
             return None
-        return RunRecord(*(getattr(self._blocks[-1], f.name)[-1:] for f in fields(RunRecord)))
+        return RunRecord(*(getattr(last, f.name)[-1:] for f in fields(RunRecord)))
 
     def fresh(self) -> RunRecord | None:
         """Instants since the last call."""

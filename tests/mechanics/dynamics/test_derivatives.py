@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 
 from ephs.mechanics.methods.jacobian import Jacobian
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces import SE3

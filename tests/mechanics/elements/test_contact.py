@@ -14,7 +14,7 @@ import ephs
 from ephs.mechanics.elements.contact import contact_energy, contact_loss
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs import pace
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.shapes.gap import (
     edges,

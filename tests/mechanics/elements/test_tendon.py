@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from ephs.mechanics.elements.springs import point_stretch
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.tendons import Tendon
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path

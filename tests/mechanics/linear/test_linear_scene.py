@@ -13,7 +13,7 @@ import xarray
 from hypothesis import assume, given, settings
 
 import ephs
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.parameters import varied

@@ -5,7 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.runs.assembling import flat_joints
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.auditing.growth import apart
 from examples.failing import scene
 

@@ -10,7 +10,7 @@ from ephs.mechanics.methods import auto
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.radau import Implicit
 from ephs.mechanics.methods.stages import KeptJacobian, scheme_of
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.solve.control import Control, Tolerance

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.solve.model import compile_model
 from ephs.testing import mechanisms

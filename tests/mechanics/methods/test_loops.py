@@ -5,7 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 
 BODY = """

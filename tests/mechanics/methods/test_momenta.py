@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods import registry
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve import loop
 from tests.mechanics.momenta import floating, momenta

@@ -14,7 +14,7 @@ from ephs import Pattern, junction, quantity
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.offset import frame_change
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.finding.frames import Unplaced, inertia_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path

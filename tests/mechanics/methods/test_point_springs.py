@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from tests.written import scene_of_text
 

@@ -7,7 +7,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.method import ReducedMethod
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing import rounding
 from ephs.solve.stepping import Taken

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.drags import Drags, resisting
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.equations.equations import ReducedEquations

@@ -8,7 +8,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS, Setting
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.control import Control, Tolerance
 from tests.written import scene_of_text

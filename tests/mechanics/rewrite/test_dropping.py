@@ -16,7 +16,7 @@ from ephs.mechanics.rewrite.folding import FOLD
 from ephs.mechanics.rewrite.rewrite import Strength, rewrite, sites_of
 from ephs.mechanics.rewrite.rules import RULES
 from ephs.mechanics.runs.running import by_constant_steps
-from ephs.mechanics.runs.simulate import problem_of_system
+from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.model import frozen
 from ephs.semantics import Reference

@@ -13,7 +13,7 @@ from ephs import library
 from ephs.cli import main
 from ephs.mechanics.rewrite import coordinates
 from ephs.mechanics.rewrite.rewrite import Strength
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.build import component_path, initial_state
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system

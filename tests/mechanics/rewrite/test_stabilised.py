@@ -10,7 +10,7 @@ import pytest
 import ephs
 from benchmarks.stabilised import drifting
 from ephs.mechanics.rewrite.stabilised import stabilised
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference

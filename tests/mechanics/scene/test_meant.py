@@ -10,7 +10,7 @@ import ephs
 from benchmarks.hard.four_bars import PINS, four_bar
 from benchmarks.hard.loops import stretched
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.own_units import mobility_of

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs import quantity as Q
 from ephs.mechanics import Element, key, register_element, rule
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.custom import ElementError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.own_units import OwnUnits, mobility_of

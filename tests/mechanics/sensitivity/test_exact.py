@@ -7,7 +7,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sensitivity import explicit
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 
 import ephs
 from ephs import Pattern, junction, library, quantity
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.operad import Path
 from ephs.semantics.descriptor.descriptor import Input
 from ephs.solve.instant import instant

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks import families
 from ephs.mechanics.road.programs import sweeps
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised

@@ -5,11 +5,9 @@ from typing import final
 
 import numpy as np
 
-from ephs.operad import Path, quantity
-from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.operad import quantity
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.primitives.pullback import pulled_ports
-from ephs.semantics.systems.kept import once
 from ephs.solve.heats import exponential_law
 
 
@@ -44,18 +42,6 @@ class Role(Enum):
     """Takes up heat at the temperature of the reference."""
     OTHER = auto()
     """Components that may be attached."""
-
-
-def strikes(descriptor: Descriptor) -> Path | None:
-    """The first component that has impulses; None where none has."""
-
-    def first() -> Path | None:
-        n = descriptor.numbering
-        struck = [isinstance(one, Irreversible) and one.impulse is not None for one in n.primitives]
-        found = np.flatnonzero(np.array(struck, dtype=bool)[n.primitive])
-        return descriptor.components[int(found[0])].path if found.size else None
-
-    return once(descriptor, "strikes", first)
 
 
 @final

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods import jacobian
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.apart import directions
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 

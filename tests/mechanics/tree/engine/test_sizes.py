@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import Program, real, vector

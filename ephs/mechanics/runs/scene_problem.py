@@ -1,0 +1,78 @@
+"""The initial value problem of a scene."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ephs.mechanics.constraints.holding import ConfiguredMechanism
+from ephs.mechanics.constraints.redundancy import explain
+from ephs.mechanics.motion.motion import SceneMotion
+from ephs.mechanics.motion.views import view_of
+from ephs.mechanics.runs.assembling import check_closed
+from ephs.mechanics.runs.pushes import part_of, scene_signals, sum_of
+from ephs.mechanics.scene.build import (
+    drive_ports,
+    initial_state,
+    scene_inputs,
+    scene_names,
+    scene_system,
+    wrench_port,
+)
+from ephs.mechanics.scene.document import scene_to_text
+from ephs.mechanics.scene.meant import is_shaky
+from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.state import Snapshot
+from ephs.operad import Path
+from ephs.operad.collector import paused_collector
+from ephs.semantics.bundles.bundle import Reference
+from ephs.semantics.bundles.errors import AssemblyError
+from ephs.semantics.systems.kept import once
+from ephs.solve.problem import Problem
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+@paused_collector()
+def problem_of_scene(
+    scene: Scene, initial: Mapping[str, "ArrayLike"] | None = None, inputs: Mapping[Any, Any] | None = None
+) -> Problem:
+    """The initial value problem of a scene."""
+    view = view_of(scene)
+    forces, wrenches, others = scene_signals(scene, inputs or {}, view)
+    system = scene_system(scene, driven=frozenset(forces), wrenches=frozenset(wrenches))
+    state = initial_state(scene)
+    if initial:
+        changed = system.state(initial)
+        state |= {Path.of(path): changed[Path.of(path)] for path in initial}
+    signals = dict(scene_inputs(scene))
+    for name, force in forces.items():
+        for port, where in drive_ports(scene.joint(name)):
+            extra = part_of(force, where)
+            if port in signals and signals[port].effort:
+                raise AssemblyError(
+                    "input", f"joints.{name}", found="a force", expected="none: its motion is prescribed"
+                )
+            signals[port] = sum_of(signals[port], extra) if port in signals else extra
+    signals |= others
+    signals |= {wrench_port(body): wrench for body, wrench in wrenches.items()}
+    world = scene.world
+    problem = Problem(
+        scene.name,
+        system,
+        system.descriptor(),
+        state,
+        signals,
+        Reference(world.temperature, world.pressure),
+        motion=lambda solution: SceneMotion(scene, solution),
+        scene=scene,
+        document=lambda: once(scene, "text", lambda: scene_to_text(scene)),
+        constraints=lambda: ConfiguredMechanism.of(scene),
+        dependences=lambda: explain(scene),
+        shaky=lambda: is_shaky(scene),
+        length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
+        view=view,
+        names=once(scene, "names", lambda: scene_names(scene)),
+    )
+    if initial:
+        check_closed(problem)
+    return problem
