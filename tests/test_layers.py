@@ -96,7 +96,7 @@ SCENE = "model = ephs.load('scenes/heavy-top.toml')"
 
 def loaded(model):
     """Names of the modules that a process has loaded which runs a model."""
-    script = f"import sys, ephs; {model}; ephs.simulate(model, 0.1, step=0.05, audit='off'); print(*sys.modules)"
+    script = f"import sys, ephs; {model}; ephs.simulate(model, 0.01, step=0.005, audit='off'); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
     return done.stdout.split()
 
