@@ -134,8 +134,8 @@ def _draw(rows: list[dict[str, Any]], out: Path) -> None:
     """Steps, time and distance from the rigid slider over Young's modulus, a line a method."""
     from matplotlib import rc_context
 
-    from ephs.show.figures import new_figure
-    from ephs.show.plots import STYLE
+    from ephs.show.plots.curves import STYLE
+    from ephs.show.shared.figures import new_figure
 
     out.mkdir(parents=True, exist_ok=True)
     shown = {"steps": "steps", "seconds": "time [s]", "error": "from the rigid slider [m]"}

@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT))
 import ephs  # noqa: E402 - the package lies beside the pages
 from ephs import Scene  # noqa: E402
 from ephs.mechanics.scene.parameters import varied  # noqa: E402
-from ephs.show.page import Page  # noqa: E402
+from ephs.show.shared.page import Page  # noqa: E402
 from examples.gallery import entries  # noqa: E402
 
 UNTIL = 4.0

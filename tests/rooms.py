@@ -50,7 +50,9 @@ STOREYS: tuple[tuple[frozenset[str], ...], ...] = tuple(
         ([".mechanics", ".mechanics.runs"],),
         ([".mechanics.dynamics"], [".mechanics.sweep"]),
         ([".mechanics.linear"], [".mechanics.sensitivity"]),
-        ([".show", ".show.charts"], [".testing"]),
+        ([".show.shared"],),
+        ([".show.diagrams"], [".show.motions"], [".show.plots"], [".testing"]),
+        ([".show", ".show.charts"],),
         ([".exporting"],),
         (["", ".cli"],),
     )

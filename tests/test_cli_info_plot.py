@@ -9,7 +9,7 @@ import pytest
 import ephs
 from ephs.cli import main
 from ephs.mechanics.sweep.outputs import known_outputs
-from ephs.show.chosen import plot_signals
+from ephs.show.plots.chosen import plot_signals
 
 ROOT = Path(__file__).resolve().parents[1]
 CRANK = str(ROOT / "scenes/slider-crank.toml")

@@ -55,8 +55,8 @@ def test_every_door_is_used():
         ("ephs.mechanics.elements.bodies", "from ephs import show"),
         ("ephs.mechanics.elements.bodies", "import importlib\nimportlib.import_module('ephs.show')"),
         ("ephs.testing.systems", "from ephs.show import draw"),
-        ("ephs.show.plots", "from ephs.cli import main"),
-        ("ephs.show.plots", "from ephs import Solution"),
+        ("ephs.show.plots.curves", "from ephs.cli import main"),
+        ("ephs.show.plots.curves", "from ephs import Solution"),
     ],
 )
 def test_an_import_upwards_is_seen(module, source):
@@ -71,7 +71,7 @@ def test_an_import_upwards_is_seen(module, source):
         ("ephs.mechanics.elements.bodies", "from .solve.model import Model"),
         ("ephs.mechanics.tree.engine.build", "from ephs.mechanics.tree.finding.tables import Table"),
         ("ephs.operad.pattern", "def f():\n    from ephs.show import draw"),
-        ("ephs.show.plots", "from ephs.solve.result.solution import Solution"),
+        ("ephs.show.plots.curves", "from ephs.solve.result.solution import Solution"),
         ("ephs.cli.input", "import ephs\nfrom ephs.testing import patterns"),
     ],
 )

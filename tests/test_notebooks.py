@@ -8,7 +8,7 @@ import pytest
 import ephs
 from ephs.show import draw
 from ephs.show.notebook import MANY
-from ephs.show.palette import RED
+from ephs.show.shared.palette import RED
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -44,7 +44,7 @@ def animate(
 
     from ephs.show import animate as animated
     from ephs.show import write_video
-    from ephs.show.video import VIDEOS
+    from ephs.show.motions.video import VIDEOS
 
     if output.suffix not in (".html", *VIDEOS):
         expected = ", ".join((".html", *VIDEOS))

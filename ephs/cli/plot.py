@@ -28,7 +28,7 @@ def plot(
     output
         Figure to write, .svg, .png or .pdf. Default: signals.svg in the result folder or beside the file.
     """
-    from ephs.show.chosen import plot_signals, signal_names
+    from ephs.show.plots.chosen import plot_signals, signal_names
 
     target = output or (folder.parent if folder.suffix == ".nc" else folder) / "signals.svg"
     if target.suffix not in _FIGURES:

@@ -36,7 +36,7 @@ def view(
 
     model = loaded(scene)
     with addressed(scene):
-        from ephs.show.viewer import Posed, served
+        from ephs.show.motions.viewer import Posed, served
 
         server = served(Posed(model, lambda file: loaded(str(file))), port=port)
     address = f"http://127.0.0.1:{server.server_address[1]}/"

@@ -17,10 +17,10 @@ from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import names, read
-from ephs.show.page import Page
-from ephs.show.palette import CYCLE
-from ephs.show.player import player
-from ephs.show.stage import stage_of
+from ephs.show.motions.player import player
+from ephs.show.motions.stage import stage_of
+from ephs.show.shared.page import Page
+from ephs.show.shared.palette import CYCLE
 
 KEYS: Final = ("mass", "friction", "stiffness", "damping", "gravity[2]")
 """Default numbers for sliders, in this order."""

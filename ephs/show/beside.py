@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ephs.show.diagram_png import draw_placement
-from ephs.show.errors import ShowError
-from ephs.show.figures import new_figure
-from ephs.show.layout import place
-from ephs.show.motion import best_side, between_instants, film
-from ephs.show.plots import STYLE
-from ephs.show.still import draw_still
+from ephs.show.diagrams.layout import place
+from ephs.show.diagrams.png import draw_placement
+from ephs.show.motions.motion import best_side, between_instants, film
+from ephs.show.motions.still import draw_still
+from ephs.show.plots.curves import STYLE
+from ephs.show.shared.errors import ShowError
+from ephs.show.shared.figures import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 from ephs.mechanics.scene.errors import did_you_mean
 from ephs.show.beside import plot_mechanism
-from ephs.show.chosen import plot_signals
-from ephs.show.efforts import plot_wrenches
-from ephs.show.errors import ShowError
-from ephs.show.flows import plot_exergy_flow
-from ephs.show.plots import plot_constraints, plot_energy, plot_entropy, plot_exergy, plot_motion
-from ephs.show.portraits import plot_phase
+from ephs.show.plots.chosen import plot_signals
+from ephs.show.plots.curves import plot_constraints, plot_energy, plot_entropy, plot_exergy, plot_motion
+from ephs.show.plots.efforts import plot_wrenches
+from ephs.show.plots.flows import plot_exergy_flow
+from ephs.show.plots.portraits import plot_phase
+from ephs.show.shared.errors import ShowError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,8 +7,8 @@ import numpy as np
 
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.systems.markup import table
-from ephs.show.palette import BLUE, GREY, INK, RED
-from ephs.show.still import still_svg
+from ephs.show.motions.still import still_svg
+from ephs.show.shared.palette import BLUE, GREY, INK, RED
 from ephs.solve.result.tables import solution_table
 
 WIDTH, HEIGHT, MARGIN, DOT = 260.0, 200.0, 24.0, 4.0

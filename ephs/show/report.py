@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ephs.show.balances import balances
-from ephs.show.kept import pattern_svg
-from ephs.show.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
-from ephs.show.player import player
-from ephs.show.signals import PanelGroup, packed
-from ephs.show.stage import stage_of
-from ephs.show.still import still_svg
-from ephs.show.touching import contact_panels, contact_table
+from ephs.show.diagrams.kept import pattern_svg
+from ephs.show.motions.player import player
+from ephs.show.motions.stage import stage_of
+from ephs.show.motions.still import still_svg
+from ephs.show.plots.balances import balances
+from ephs.show.plots.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
+from ephs.show.plots.signals import PanelGroup, packed
+from ephs.show.plots.touching import contact_panels, contact_table
 
 ZERO = 1e-12
 """SI number below which a report writes 0."""

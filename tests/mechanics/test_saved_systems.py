@@ -6,7 +6,7 @@ import pytest
 import ephs
 from ephs import Pattern
 from ephs import library as lib
-from ephs.show.panels import motion_panels
+from ephs.show.plots.panels import motion_panels
 from ephs.show.report import write_report
 from tests.mechanics.methods.test_by_hand import four_bar
 

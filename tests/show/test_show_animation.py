@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs.show import ShowError, animate
-from ephs.show.motion import (
+from ephs.show.motions.motion import (
     between,
     equivalent_box,
     film,
@@ -19,8 +19,8 @@ from ephs.show.motion import (
     point_of,
     rotate,
 )
-from ephs.show.solids import solid_of
-from ephs.show.symbols import add_body
+from ephs.show.motions.solids import solid_of
+from ephs.show.motions.symbols import add_body
 from tests.show.conftest import Altered
 
 UNIT = st.floats(-1.0, 1.0)

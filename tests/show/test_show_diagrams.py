@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from ephs.operad import Pattern
 from ephs.show import Drawing, ShowError, draw, place
-from ephs.show.geometry import Placement, Wire, crossings, faults, gap, overlaps, trespasses
-from ephs.show.graph import short_names, subscripted
-from ephs.show.legend import legend, title
-from ephs.show.palette import FILLS
-from ephs.show.positions import _networkx, _spread
+from ephs.show.diagrams.geometry import Placement, Wire, crossings, faults, gap, overlaps, trespasses
+from ephs.show.diagrams.graph import short_names, subscripted
+from ephs.show.diagrams.legend import legend, title
+from ephs.show.diagrams.positions import _networkx, _spread
+from ephs.show.shared.palette import FILLS
 from ephs.testing import nestings, patterns
 from tests.show.baselines import FOLDER, drawings
 from tests.show.pictures_of_patterns import KINDS, PICTURES, flat, joint, kinds_of
@@ -213,7 +213,7 @@ def test_symbols_have_subscripts_and_words_have_none():
 
 
 def test_a_layout_that_takes_too_long_is_taken_without_a_word(monkeypatch, capfd):
-    monkeypatch.setattr("ephs.show.positions.ITERATIONS", 2)
+    monkeypatch.setattr("ephs.show.diagrams.positions.ITERATIONS", 2)
     assert place(flat()).boxes
     assert "iterations" not in capfd.readouterr().err
 
@@ -275,7 +275,7 @@ def test_tikz_names_all_and_escapes_what_tex_would_read(drawn):
 
 
 def test_layout_without_graphviz_keeps_nodes_apart():
-    from ephs.show.graph import read
+    from ephs.show.diagrams.graph import read
 
     graph = read(flat())
     points = _spread(graph, _networkx(graph, 1), wires=True)

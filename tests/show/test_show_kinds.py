@@ -12,7 +12,7 @@ from ephs.operad import Pattern
 from ephs.semantics import library as lib
 from ephs.show import ShowError, plot, plot_mechanism, plot_motion, plot_phase, plot_wrenches
 from ephs.show.kinds import KINDS
-from ephs.show.palette import CYCLE, dashes
+from ephs.show.shared.palette import CYCLE, dashes
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.show import Page, animate
-from ephs.show.motion import between_instants, film, nearest
-from ephs.show.overlays import heat_of, loads_of, tint
-from ephs.show.solids import Solid, box, cylinder, solid_of, sphere
-from ephs.show.stage import stage_of
+from ephs.show.motions.motion import between_instants, film, nearest
+from ephs.show.motions.overlays import heat_of, loads_of, tint
+from ephs.show.motions.solids import Solid, box, cylinder, solid_of, sphere
+from ephs.show.motions.stage import stage_of
 
 BENT = """
 format = 1

@@ -21,9 +21,9 @@ from ephs.show import (
     plot_motion,
     write_report,
 )
-from ephs.show.panels import Curve, Panel
-from ephs.show.series import ANGLE, motion_lines, thinned, within_a_turn
-from ephs.show.signals import MOST, PanelGroup, packed
+from ephs.show.plots.panels import Curve, Panel
+from ephs.show.plots.series import ANGLE, motion_lines, thinned, within_a_turn
+from ephs.show.plots.signals import MOST, PanelGroup, packed
 from tests.show.conftest import Altered
 
 ROOT = Path(__file__).resolve().parents[2]

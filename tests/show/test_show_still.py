@@ -11,11 +11,11 @@ from scipy.spatial import ConvexHull
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.show.lines import lines_of
-from ephs.show.sketch import sketch
-from ephs.show.solids import Solid, coarse
-from ephs.show.stage import stage_of
-from ephs.show.still import HIGHEST, WIDTH, still_svg
+from ephs.show.motions.lines import lines_of
+from ephs.show.motions.sketch import sketch
+from ephs.show.motions.solids import Solid, coarse
+from ephs.show.motions.stage import stage_of
+from ephs.show.motions.still import HIGHEST, WIDTH, still_svg
 
 SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.show.plots.touching import contact_panels, contact_table
 from ephs.show.report import write_report
-from ephs.show.touching import contact_panels, contact_table
 
 SCENE = """
 format = 1

@@ -8,7 +8,7 @@ from PIL import Image
 
 import ephs
 from ephs.show import ShowError, write_video
-from ephs.show.video import VIDEOS
+from ephs.show.motions.video import VIDEOS
 
 SCENE = """
 format = 1

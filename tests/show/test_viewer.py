@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.show.viewer import Posed, served
+from ephs.show.motions.viewer import Posed, served
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF = """<robot name="arm"><link name="base"/>

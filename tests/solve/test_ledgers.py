@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.show.flows import exergy_bands
+from ephs.show.plots.flows import exergy_bands
 from examples import oscillator, physics
 from examples.failing import pendulum
 

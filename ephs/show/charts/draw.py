@@ -19,9 +19,9 @@ from ephs.show.charts.outcomes import SILENT, ChartOutcome
 from ephs.show.charts.reasons import Key, Reason, letter_of, reasons, reasons_table
 from ephs.show.charts.runs import RunEnding, RunSetting
 from ephs.show.charts.stability import Cell
-from ephs.show.figures import new_figure, plain
-from ephs.show.palette import BLACK, BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY
-from ephs.show.plots import STYLE
+from ephs.show.plots.curves import STYLE
+from ephs.show.shared.figures import new_figure, plain
+from ephs.show.shared.palette import BLACK, BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.state import Snapshot
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.show.charts.runs import Array, RunEnding, RunSetting, attempt
-from ephs.show.errors import ShowError
+from ephs.show.shared.errors import ShowError
 from ephs.solve.result.solution import Solution
 
 TIGHT = ((1e-13, 1e-12), (1e-12, 1e-11), (1e-10, 1e-9))

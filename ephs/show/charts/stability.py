@@ -12,7 +12,7 @@ from ephs.show.charts.families import Family
 from ephs.show.charts.outcomes import CONDITION, SILENT, ChartOutcome, horizon, judge, right
 from ephs.show.charts.reference import PosesInTime, ReferenceMotion, condition, resting_reference, tight_reference
 from ephs.show.charts.runs import Array, ChartRun, RunEnding, RunSetting, attempt
-from ephs.show.errors import ShowError
+from ephs.show.shared.errors import ShowError
 
 if TYPE_CHECKING:
     from ephs.show.charts.keeping import KeptCells

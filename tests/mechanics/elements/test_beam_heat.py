@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.show.stage import stage_of
+from ephs.show.motions.stage import stage_of
 from tests.written import scene_of_text
 
 ELEMENTS, LENGTH, CAPACITY, CONDUCTION, COLD = 6, 0.6, 40.0, 5.0, 300.0

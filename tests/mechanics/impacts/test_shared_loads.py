@@ -88,7 +88,7 @@ def test_corners_of_a_box_share_its_weight_and_their_sum_is_determinate():
 
 
 def test_reports_name_contacts_that_share_a_load():
-    from ephs.show.touching import contact_table
+    from ephs.show.plots.touching import contact_table
 
     assert "indeterminate" not in contact_table(stood(TRIPOD))
     assert "indeterminate forces" in contact_table(stood(CHAIR))

@@ -24,7 +24,7 @@ from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import json_schema
 from ephs.mechanics.scene.soundness import check_scene
-from ephs.show.lines import lines_of
+from ephs.show.motions.lines import lines_of
 from ephs.solve import instant
 from ephs.solve.instant import Mobility
 
