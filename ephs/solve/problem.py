@@ -129,6 +129,15 @@ class Linked(Protocol):
         """The motion of a joint."""
         ...
 
+    def length_errors(self) -> Iterable[tuple[Path, int, float]]:
+        """Lengths that states integrate: path, instant at which one is farthest from that of its points, difference as
+        a part of the mechanism's length."""
+        ...
+
+    def leaps(self, h: float) -> Iterable[tuple[Path, int, float]]:
+        """Contacts passed in a step of at most h s: path, instant after it, distance of the step in thicknesses."""
+        ...
+
 
 class Outlined(Linked, Protocol):
     """The same of a system."""
@@ -176,15 +185,6 @@ class MechanicalMotion(Linked, Protocol):
 
     def contact_poses(self) -> Iterable[tuple[Path, Path | None, Array]]:
         """States that follow from others up to rounding: path, a path before with the same rotation, place (n, 3)."""
-        ...
-
-    def leaps(self, h: float) -> Iterable[tuple[Path, int, float]]:
-        """Contacts passed in a step of at most h s: path, instant after it, distance of the step in thicknesses."""
-        ...
-
-    def length_errors(self) -> Iterable[tuple[Path, int, float]]:
-        """Lengths that states integrate: path, instant at which one is farthest from that of its points, difference as
-        a part of the mechanism's length."""
         ...
 
     def velocity_error(self) -> Array:

@@ -38,17 +38,19 @@ def ball(tmp_path):
     return scene
 
 
+@pytest.mark.parametrize("by_hand", [False, True])
 @pytest.mark.parametrize("kept", [None, 5])
-def test_a_ball_that_passes_a_plate_in_a_step_is_found(kept, ball):
+def test_a_ball_that_passes_a_plate_in_a_step_is_found(kept, by_hand, ball):
     """0.1 m a step through 0.04 m: the motion is that of a free body, and every balance is kept.
 
     The stage of such a step of `natural` does not lie inside the plate.
     """
     step, until = 0.0097, 0.06
     times = None if kept is None else np.linspace(0.0, until, kept)
-    run = ephs.simulate(ball(), until, method="natural", step=step, save_at=times, audit="off")
-    assert run.body("ball").position[-1, 2] == pytest.approx(START - SPEED * until), "the control: it went through"
-    (path, _, size) = max(run.motion.leaps(step), key=lambda leap: leap[2])
+    model, name = (ball().system(), "bodies.ball") if by_hand else (ball(), "ball")
+    run = ephs.simulate(model, until, method="natural", step=step, save_at=times, audit="off")
+    assert run.body(name).position[-1, 2] == pytest.approx(START - SPEED * until), "the control: it went through"
+    (path, _, size) = max(run.linked.leaps(step), key=lambda leap: leap[2])
     assert str(path) == "contacts.ball_plate" and size == pytest.approx(SPEED * step / WAY, rel=1e-6)
     (finding,) = run.audit.findings
     assert finding.law == "accuracy"
@@ -118,3 +120,23 @@ def test_a_ball_that_bounces_is_not_where_few_instants_are_kept(ball):
     run = ephs.simulate(ball(), 0.06, method="rk54", rtol=1e-4, save_at=np.linspace(0.0, 0.06, 4))
     assert run.audit.passed
     assert run.body("ball").velocity[-1, 2] > 0.0
+
+
+@pytest.mark.parametrize("method", ["auto", "rk54", "rk87", "radau", "semi", "natural"])
+def test_chosen_steps_of_a_system_meet_a_plate_as_those_of_its_scene(method, ball):
+    """Nothing but the plate limits steps before they meet; a system had no such limit, and the ball fell through."""
+    scene = ball()
+    ends = [
+        ephs.simulate(model, 0.06, method=method, rtol=1e-6, atol=1e-9).body(name).position[-1]
+        for model, name in ((scene, "ball"), (scene.system(), "bodies.ball"))
+    ]
+    assert ends[0][2] > 0.0
+    assert ends[1] == pytest.approx(ends[0], abs=1e-3)
+
+
+def test_hard_surfaces_are_passed_neither(ball, tmp_path):
+    """By a system made by hand, at a speed at which one step would lead through."""
+    text = SCENE.replace("SIDE", "0.0").replace("START", repr(START)).replace("stiffness = 1e7", "restitution = 0.5")
+    (tmp_path / "hard.toml").write_text(text)
+    run = ephs.simulate(ephs.load(tmp_path / "hard.toml").system(), 0.06)
+    assert run.body("bodies.ball").velocity[-1, 2] == pytest.approx(0.5 * SPEED, rel=1e-6)

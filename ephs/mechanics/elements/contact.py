@@ -61,7 +61,7 @@ def contact(touches: Sequence[Touch], law: ConstitutiveLaw | Impact, *, heat: bo
 
 def _parts(gap: Gap, law: ConstitutiveLaw | Impact) -> tuple[Storage, Irreversible]:
     if isinstance(law, Impact):
-        return replace(no_potential(RELATIVE, "q_r"), name="wall"), impact(gap, law)
+        return replace(no_potential(RELATIVE, "q_r"), name="wall", gap=gap), impact(gap, law)
     return contact_energy(gap, law), contact_loss(gap, law)
 
 
@@ -117,6 +117,7 @@ def contact_energy(gap: Gap, law: ConstitutiveLaw) -> Storage:
         ),
         trusted=True,
         support=gap.support,
+        gap=gap,
     )
 
 

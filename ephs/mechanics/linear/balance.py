@@ -5,9 +5,9 @@ import numpy as np
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.continuation import StaticPath, follow
 from ephs.mechanics.linear.freedoms import freedoms_of, unbalanced
-from ephs.mechanics.runs.assembling import tendon_lengths
 from ephs.mechanics.tree.finding.frames import frames_of
 from ephs.mechanics.tree.finding.spanning import Edge
+from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import metric_eigen
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
@@ -90,7 +90,7 @@ def _followed(model: Dynamics, state: State, lengths: list[int]) -> State:
     q, r, s = model.layout.split(state.array)
     found = tendon_lengths(frames_of(model.problem.descriptor), model.states(state))
     for place, (_, length) in zip(lengths, found, strict=True):
-        s[place] = length[0]
+        s[place] = length
     return model.unpack(np.concatenate([q, r, s]))
 
 

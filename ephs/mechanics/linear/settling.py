@@ -6,8 +6,9 @@ import numpy as np
 
 from ephs.mechanics.linear.balance import STALLED, balanced, lengths_of, restless
 from ephs.mechanics.linear.pencil import Pencil, mechanism_of
-from ephs.mechanics.runs.assembling import FlatJoints, assembled, flat_joints, tendon_lengths
+from ephs.mechanics.runs.assembling import FlatJoints, assembled, flat_joints
 from ephs.mechanics.tree.finding.frames import frames_of
+from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError

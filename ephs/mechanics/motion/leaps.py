@@ -7,19 +7,22 @@ where they are not, an overlap beyond the depth at which a contact has no direct
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from ephs.mechanics.motion.batch import compose, inverse
-from ephs.mechanics.motion.batch import gap as change
-from ephs.mechanics.motion.moving import Moving
-from ephs.mechanics.scene.contacts import contact_points
-from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.shapes.gap import PENETRATED, Gap
+from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
+from ephs.semantics.primitives.primitives import Storage
+from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.control import SLIVER
+from ephs.solve.result.states import RecordedStates
+
+if TYPE_CHECKING:
+    from ephs.solve.result.solution import Solution
 
 THIRDS = 48
 """Iterations of the search, each reducing the interval by two thirds: (2/3)⁴⁸ is 4e-9."""
@@ -27,46 +30,59 @@ THIRDS = 48
 
 @final
 @dataclass(frozen=True, slots=True)
-class Leap:
-    """A contact that a step passed.
+class ThinContact:
+    """A contact with its points at which a surface may be passed.
 
     Parameters
     ----------
-    name, instant
-        The contact, and the index of the instant after it.
-    size
-        The step's way in thicknesses; through the middle of an overlap in parts of the layer beyond the depth, times
-        `LEAP`.
+    path
+        Of the box that its points lie in.
+    states, gaps
+        Relative pose of each point, and its gap.
     """
 
-    name: str
-    instant: int
-    size: float
+    path: Path
+    states: tuple[StateSlot, ...]
+    gaps: tuple[Gap, ...]
 
 
-def leaps(scene: Scene, read: Moving, t: Array, h: float) -> Iterator[Leap]:
-    """The longest leap over each contact between instants t (n,) in s of a run whose steps are at most h s long.
+def thin_contacts(descriptor: Descriptor) -> tuple[ThinContact, ...]:
+    """The contacts of a flat system that steps may pass: those of surfaces behind which there is room."""
+
+    def read() -> tuple[ThinContact, ...]:
+        found: dict[Path, list[tuple[StateSlot, Gap]]] = {}
+        for slot in descriptor.components:
+            gap = slot.primitive.gap if isinstance(slot.primitive, Storage) else None
+            if isinstance(gap, Gap) and gap.thickness < np.inf:
+                whole = Path(slot.path[: max(1, len(slot.path) - 2)])
+                found.setdefault(whole, []).append((slot.reads[0], gap))
+        return tuple(ThinContact(path, *zip(*points, strict=True)) for path, points in found.items())
+
+    return once(descriptor, "thin contacts", read)
+
+
+def leaps(solution: "Solution", h: float) -> Iterator[tuple[Path, int, float]]:
+    """Contacts that a step of at most h s passed: path of the box, instant after the longest such step, and its size.
+
+    The size is the step's way in thicknesses; through the middle of an overlap it is in parts of the layer beyond the
+    depth, times `LEAP`.
 
     Where fewer instants are kept than steps, the way between two is divided among its steps.
     """
+    t, problem = solution.t, solution.problem
+    if len(t) < 2 or problem is None:
+        return
     share = np.minimum(1.0, h / np.maximum(np.abs(np.diff(t)), float(np.finfo(float).tiny)))
-    for name, contact in scene.all_contacts():
-        bodies, touches = contact_points(scene, contact)
-        longest, thin = Leap(name, 0, 0.0), [touch for touch in touches if touch[2].thickness < np.inf]
-        if not thin or len(t) < 2:
-            continue
-        one, other = (read.poses(body) for body in bodies)
-        relative = compose(inverse(one), other)
-        turned, moved = change(relative[:-1].T, relative[1:].T)
-        arm = max(float(np.linalg.norm(frame[4:])) for _, frame, _ in thin)
-        if np.all(share * (moved + arm * turned) <= min(min(LEAP * gap.thickness, _middle(gap)) for _, _, gap in thin)):
-            continue
-        for frame1, frame2, gap in thin:
-            pose = compose(compose(inverse(frame1[None]), relative), frame2[None])
+    whole = share > 1.0 - SLIVER  # of a way that several steps went the middle is not known
+    for contact in thin_contacts(problem.descriptor):
+        longest = contact.path, 0, 0.0
+        for slot, gap in zip(contact.states, contact.gaps, strict=True):
+            pose = _poses(solution, slot)
             ways = np.linalg.norm(np.diff(pose[:, 4:], axis=0), axis=1)
+            if np.all(share * ways <= min(LEAP * gap.thickness, _middle(gap))):
+                continue
             outside = np.asarray(gap.distance(pose.T))
             near = np.minimum(outside[:-1], outside[1:])
-            whole = share > 1.0 - SLIVER  # of a way that several steps went the middle is not known
             for possible, limit, long in (
                 ((near >= 0.0) & (near <= ways), 0.0, share * ways / gap.thickness),
                 (whole & (near >= -gap.support.depth) & (near < 0.0), -gap.support.depth, LEAP * ways / _middle(gap)),
@@ -75,9 +91,16 @@ def leaps(scene: Scene, read: Moving, t: Array, h: float) -> Iterator[Leap]:
                 passed = at[_least(gap.distance, pose[at], pose[at + 1]) < limit]
                 if passed.size:
                     worst = int(passed[np.argmax(long[passed])])
-                    longest = max(longest, Leap(name, worst + 1, float(long[worst])), key=lambda leap: leap.size)
-        if longest.size:
+                    longest = max(longest, (contact.path, worst + 1, float(long[worst])), key=lambda leap: leap[2])
+        if longest[2]:
             yield longest
+
+
+def _poses(solution: "Solution", slot: StateSlot) -> Array:
+    """(n, 7) relative poses that a solution has as elements, or as the coordinates that users read."""
+    if isinstance(solution.states, RecordedStates):
+        return solution.states.x[:, slot.point]
+    return np.array([slot.element(value) for value in solution[slot.path]]).reshape(-1, 7)
 
 
 def _middle(gap: Gap) -> float:

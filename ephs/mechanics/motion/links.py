@@ -1,12 +1,13 @@
 """Motion of the bodies and joints of a system without scene, by the paths of their boxes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
 from ephs.mechanics.motion.batch import compose
+from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion
 from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.readout import ends
@@ -15,6 +16,7 @@ from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
+from ephs.mechanics.tree.finding.tendons import length_errors
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -101,6 +103,14 @@ class LinkMotion:
     def wrench(self, name: str) -> Array:
         """(n, 6) of a joint."""
         return self._found.wrench(self._joints[name].path)
+
+    def leaps(self, h: float) -> Iterator[tuple[Path, int, float]]:
+        """Contacts that a step of at most h s passed: path, instant after it, the step's way in thicknesses."""
+        return leaps(self._solution, h)
+
+    def length_errors(self) -> Iterator[tuple[Path, int, float]]:
+        """Tendons: path, instant at which the state is farthest from the points' distances, part of the length."""
+        return length_errors(self._solution)
 
     def velocity_error(self) -> Array:
         """(n,) largest component of the velocity residual of any joint between bodies and the ground, m/s or rad/s."""

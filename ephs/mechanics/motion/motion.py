@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, included, rotations
 from ephs.mechanics.motion.beams import BeamMotion, beam_motion
 from ephs.mechanics.motion.contacts import ContactMotion, contact_motion, contact_poses
-from ephs.mechanics.motion.gaps import open_by, span_of
+from ephs.mechanics.motion.gaps import open_by
 from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
@@ -22,6 +22,7 @@ from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
+from ephs.mechanics.tree.finding.tendons import length_errors
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
@@ -247,18 +248,11 @@ class SceneMotion:
 
     def leaps(self, h: float) -> Iterator[tuple[Path, int, float]]:
         """Contacts that a step of at most h s passed: path, instant after it, the step's way in thicknesses."""
-        for leap in leaps(self._scene, self, self._solution.t, h):
-            yield component_path("contacts", leap.name), leap.instant, leap.size
+        return leaps(self._solution, h)
 
     def length_errors(self) -> Iterator[tuple[Path, int, float]]:
         """Tendons: path, instant at which the state is farthest from the points' distances, part of the length."""
-        problem = self._solution.problem
-        for name, tendon in self._scene.all_tendons():
-            if tendon.stiffness:
-                path = component_path("tendons", name) / "spring" / "q"
-                apart = np.abs(self._solution[path].ravel() - span_of(tendon, self))
-                worst = int(np.argmax(apart))
-                yield path, worst, float(apart[worst]) / (1.0 if problem is None else problem.length)
+        return length_errors(self._solution)
 
     def velocity_error(self) -> Array:
         """(n,) largest component of any joint's velocity residual."""

@@ -6,7 +6,7 @@ poses from relative poses where they are not given; a joint that stays open is r
 follow from both.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -15,11 +15,12 @@ import numpy as np
 from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.motion.batch import compose, inverse
 from ephs.mechanics.scene.adjust import mass_roots
+from ephs.mechanics.scene.assembly import gyration
 from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.scene.kinematics import AssemblyJoint, extent
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
-from ephs.mechanics.tree.finding.wiring import Incidence
+from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
@@ -33,8 +34,6 @@ from ephs.solve.problem import Problem
 from ephs.solve.result.record import RunRecord
 from ephs.solve.result.solution import Solution
 
-TENSION_SPRINGS = ("tension_spring", "slack_spring")
-"""Storages of the length of a tendon."""
 OPEN = 1e-6
 """Largest joint residual of given initial states, in m or rad."""
 OFF = 1e-3
@@ -132,39 +131,7 @@ def start_of(joints: FlatJoints, system: System, given: Mapping[Path, Array]) ->
     if not (placed and places.isdisjoint(given)):
         out = assembled(joints, out, given)
     known = {*carried, *given}
-    return out | {path: length for path, length in tendon_lengths(joints.frames, out) if path not in known}
-
-
-def tendon_lengths(frames: Frames, state: Mapping[Path, Array]) -> Iterator[tuple[Path, Array]]:
-    """Lengths (1,) that springs of tendons store, from the relative poses of their points.
-
-    All segments share a junction, a gyrator leads from there to the rate of the whole length, and another one from that
-    to what stores it.
-    """
-    wiring = frames.wiring
-    whole: dict[int, float] = {}
-    for number, slot in enumerate(wiring.components):
-        if slot.primitive.kernel is not None and slot.primitive.kernel.name == "point_stretch":
-            at = wiring.ports(number)["e"]
-            whole[at] = whole.get(at, 0.0) + float(np.linalg.norm(state[slot.reads[0].path][4:]))
-    for at, length in whole.items():
-        for rate, turn in _coupled(wiring, at):
-            for end, back in _coupled(wiring, rate):
-                found = wiring.stored(end)
-                if found is not None and wiring.components[found[0]].primitive.name in TENSION_SPRINGS:
-                    yield found[1].path, np.array([length * back / turn])
-
-
-def _coupled(wiring: Incidence, junction: int) -> Iterator[tuple[int, float]]:
-    """Other junctions of constant gyrators of two scalar ports on a junction, each with its flow by the effort here."""
-    for number, port in wiring.on(junction):
-        primitive, ports = wiring.components[number].primitive, wiring.ports(number)
-        if isinstance(primitive, Reversible) and not primitive.reads and primitive.bundle.size == 2 == len(ports):
-            skew, rows = primitive.structure({})
-            (other,) = (name for name in ports if name != port)
-            flow = float(skew[list(ports).index(other), list(ports).index(port)])
-            if flow and not rows.size:
-                yield ports[other], flow
+    return out | {path: length[None] for path, length in tendon_lengths(joints.frames, out) if path not in known}
 
 
 def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection[Path]) -> dict[Path, Array]:
@@ -213,18 +180,30 @@ def constraints_of(joints: FlatJoints, problem: Problem) -> ConfiguredMechanism:
         moved = signal is not None and signal.effort and joint.pair.dim == 1
         motion = float(signal.at(0.0, state)[0]) if signal is not None and moved else None
         links.append(replace(link, motion=motion, near=np.array(state[joint.state.path])))
-    poses = np.array([SE3.identity() if path is None else state[path] for path in joints.poses]).reshape(-1, 7)
-    for hop in spanning_hops(joints.links, len(poses), ()):
-        if joints.poses[hop.body] is None:  # a frame is where the joint before it puts it
-            x = state[joints.relative[hop.link]]
-            link = links[hop.link]
-            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+    poses = _placed(joints, state)
     inertias = [link.inertia for link in joints.frames.links]
     heaviest = max(inertias, key=lambda inertia: float(inertia[5, 5]), default=np.eye(6))
     whole = [heaviest if inertia[5, 5] == 0.0 else inertia for inertia in inertias]  # some metric: frames have no mass
     roots = mass_roots(np.array([i[5, 5] for i in whole]), np.array([i[:3, :3] for i in whole]).reshape(-1, 3, 3))
     names = [link.name for link in links if link.coupling.dim < 6]
     return ConfiguredMechanism.between(names, links, poses, roots, _gears(joints))
+
+
+def _placed(joints: FlatJoints, state: Mapping[Path, Array]) -> Array:
+    """(links, 7) poses of bodies, and of frames without one: where the joint before puts them."""
+    poses = np.array([SE3.identity() if path is None else state[path] for path in joints.poses]).reshape(-1, 7)
+    for hop in spanning_hops(joints.links, len(poses), ()):
+        if joints.poses[hop.body] is None:
+            link, x = joints.links[hop.link], state[joints.relative[hop.link]]
+            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+    return poses
+
+
+def length_of(joints: FlatJoints, state: Mapping[Path, Array]) -> float:
+    """The mechanism's own length in m: see `ephs.mechanics.scene.kinematics.Scale`; 1 m of a point."""
+    holding = [link for link in joints.links if link.coupling.dim < 6]
+    turned = gyration((float(link.inertia[5, 5]), link.inertia[:3, :3]) for link in joints.frames.links)
+    return max(extent(holding, _placed(joints, state))[1], turned) or 1.0
 
 
 def _gears(joints: FlatJoints) -> dict[str, dict[str, float]]:

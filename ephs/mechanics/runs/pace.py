@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import PAIRS, pair
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.errors import SolveError
 from ephs.solve.problem import NO_STATE
 
 if TYPE_CHECKING:
-    from ephs.mechanics.scene.model import Scene
     from ephs.operad import Quantity
     from ephs.semantics.bundles.bundle import Array
     from ephs.solve.problem import Problem, Signal
@@ -31,40 +31,48 @@ def longest_step(problem: "Problem", order: int, rtol: float, span: tuple[float,
 
     ``span`` is the run's; all times are in the problem's unit. See `_driven_step`.
     """
-    contact = np.inf if problem.scene is None else _contact_step(problem.scene)
-    return min(_driven_step(problem, order, rtol, span), contact)
+    return min(_driven_step(problem, order, rtol, span), _contact_step(problem))
 
 
-def _contact_step(scene: "Scene") -> float:
+def _contact_step(problem: "Problem") -> float:
     """Time in which no body passes more than `LEAP` of a surface, at the speeds of the start and of a fall.
 
     A step that begins before a thin surface and ends behind it sees no contact; behind a plane it does.
     """
-    from ephs.mechanics.scene.contacts import contact_points  # systems are run without scenes
+    gaps = [one.gap for one in problem.descriptor.numbering.primitives if isinstance(one, Storage) and one.gap]
+    if not gaps:
+        return np.inf
+    from ephs.mechanics.shapes.gap import Gap  # most systems have no surfaces
+    from ephs.mechanics.tree.finding.frames import frames_of
 
-    surfaces, bodies = dict(scene.all_surfaces()), dict(scene.all_bodies())
-    thick = np.inf
-    for _, contact in scene.all_contacts():
-        _, points = contact_points(scene, contact)
-        thick = min(thick, *(gap.thickness for _, _, gap in points))
+    thick = min(gap.thickness for gap in gaps if isinstance(gap, Gap))
     if thick == np.inf:
         return np.inf
-    reach = max((float(np.linalg.norm(s.frame[4:])) for s in surfaces.values()), default=0.0)
-    twists = [body.twist for body in bodies.values()]
-    start = sum(sorted((_speed(twist, reach) for twist in twists), reverse=True)[:2])
-    fall = np.sqrt(
-        2.0 * float(np.linalg.norm(scene.world.gravity)) * _spread([body.pose[4:] for _, body in scene.all_bodies()])
-    )
-    return float(LEAP * thick / (start + fall)) if start + fall > 0.0 else np.inf
-
-
-def _speed(twist: "Array", reach: float) -> float:
-    return float(np.linalg.norm(twist[3:]) + reach * np.linalg.norm(twist[:3]))
+    found = frames_of(problem.descriptor)
+    components = found.wiring.components
+    reach = 0.0
+    for joint in found.joints:
+        stored = components[joint.potential].primitive
+        if isinstance(stored, Storage) and stored.gap:
+            ends = (end.offset[4:] for end in (joint.first, joint.second) if end.link >= 0)
+            reach = max(reach, *(float(np.linalg.norm(at)) for at in ends))
+    speeds, pull, places = [0.0], 0.0, [np.zeros(3)]
+    for link in found.links:
+        if link.momentum is not None and not link.light:
+            twist = np.linalg.solve(link.inertia, problem.initial[link.momentum.path])
+            speeds.append(float(np.linalg.norm(twist[3:]) + reach * np.linalg.norm(twist[:3])))
+        if link.pose is not None:
+            places.append(problem.initial[link.pose.path][4:])
+        if link.potential >= 0 and not link.light:
+            weight = dict(components[link.potential].primitive.parameters).get("weight", 0.0)
+            pull = max(pull, float(np.linalg.norm(np.asarray(weight, dtype=float))) / float(link.inertia[5, 5]))
+    fast = sum(sorted(speeds)[-2:]) + np.sqrt(2.0 * pull * _spread(places))
+    return float(LEAP * thick / fast) if fast > 0.0 else np.inf
 
 
 def _spread(places: "Sequence[Array]") -> float:
-    """Diagonal of the box around the origin and some places."""
-    return float(np.linalg.norm(np.ptp(np.array([np.zeros(3), *places]), axis=0)))
+    """Diagonal of the box around some places."""
+    return float(np.linalg.norm(np.ptp(np.array(places), axis=0))) if len(places) else 0.0
 
 
 def _driven_step(problem: "Problem", order: int, rtol: float, span: tuple[float, float]) -> float:
@@ -88,7 +96,7 @@ def _driven_step(problem: "Problem", order: int, rtol: float, span: tuple[float,
     if not moved:
         return np.inf
     places = [problem.initial[slot.path][4:] for slot in problem.descriptor.states if slot.quantity.kind == "pose"]
-    extent = _spread(places)
+    extent = _spread([np.zeros(3), *places])
     turn = min(TURN, (TIMES * rtol) ** (1.0 / order)) if rtol else TURN
     fastest = 0.0
     for signal, twists in moved:

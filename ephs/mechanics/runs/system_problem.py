@@ -77,13 +77,14 @@ def _of_mechanism(problem: Problem, given: Mapping[Path, Array], *, assemble: bo
     """A problem with bodies: assembled, with the motion of its links and what its joints hold."""
     from ephs.mechanics.constraints.redundancy import dependences, in_words
     from ephs.mechanics.motion.links import LinkMotion
-    from ephs.mechanics.runs.assembling import constraints_of, flat_joints, start_of
+    from ephs.mechanics.runs.assembling import constraints_of, flat_joints, length_of, start_of
 
     joints = flat_joints(problem.descriptor)
     state = start_of(joints, problem.system, given) if assemble and joints.links else problem.initial
     gaps = joints.gaps if joints.links else None
     linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
-    made = replace(problem, initial=state, gaps=gaps, linked=linked)
+    length = length_of(joints, state) if linked else 1.0
+    made = replace(problem, initial=state, gaps=gaps, linked=linked, length=length)
     if not joints.holding:
         return made
     held = cache(lambda: constraints_of(joints, made))

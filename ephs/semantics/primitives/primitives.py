@@ -161,6 +161,8 @@ class Storage(_Structure):
         where the energy of a storage beside it is, which has the same support.
     initial
         (port, numbers) of states in which a run starts, where these are not the identity of their space.
+    gap
+        Of surfaces whose relative pose it stores: steps must not pass where it is negative. None of others.
     """
 
     name: str
@@ -178,6 +180,7 @@ class Storage(_Structure):
     trusted: bool = field(default=False, compare=False, repr=False)
     support: Support | None = field(default=None, compare=False, repr=False)
     initial: Initial = ()
+    gap: object = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -164,11 +164,11 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
         scale = solution.ledgers.scale
         yield Breach(plain["largest"] / scale, lambda: rounded(solution) / scale, instant)
     longest = abs(float(solution.stats.get("longest_step", bounds.step or 0.0)))
-    for path, instant, size in solution.motion.leaps(longest) if solution.motion is not None else ():
+    for path, instant, size in solution.linked.leaps(longest) if solution.linked is not None else ():
         short = f"{0.9 * longest * LEAP / size:.2g} s: a contact was passed"
         hint = f" of {short}" if bounds.step else f", or max_step = {short}"
         yield Breach(size, lambda: LEAP - min(LEAP, bounds.accuracy), instant, path, hint)
-    for path, instant, size in solution.motion.length_errors() if solution.motion is not None else ():
+    for path, instant, size in solution.linked.length_errors() if solution.linked is not None else ():
         yield Breach(size, _nothing, instant, path, ": segments of tendons must not pass the length zero")
     if isinstance(trials, Missed):
         yield Breach(trials.size * bounds.tolerance, _nothing, int(np.argmin(np.abs(solution.t - trials.at))))

@@ -227,14 +227,15 @@ class Solution:
         TypeError
             There are no bodies.
         """
-        return (self._linked or self._moving("bodies")).body(name)
+        return (self.linked or self._moving("bodies")).body(name)
 
     def joint(self, name: str) -> Any:
         """The motion of a joint: coordinate, rate, wrench."""
-        return (self._linked or self._moving("joints")).joint(name)
+        return (self.linked or self._moving("joints")).joint(name)
 
     @cached_property
-    def _linked(self) -> Linked | None:
+    def linked(self) -> Linked | None:
+        """The motion of bodies and joints, of a scene or of a system that has them; None where there are none."""
         if self.motion is not None:
             return self.motion
         return None if self.problem is None or self.problem.linked is None else self.problem.linked(self)
@@ -261,7 +262,7 @@ class Solution:
     @property
     def freedoms(self) -> Mapping[str, Labels]:
         """Names and units of the coordinates of each joint, by its name, or in a system by the path of its box."""
-        return {} if self._linked is None else self._linked.freedoms
+        return {} if self.linked is None else self.linked.freedoms
 
     def thermal(self, name: str) -> Any:
         """The temperature of a thermal node."""
