@@ -122,12 +122,12 @@ def test_a_ball_that_bounces_is_not_where_few_instants_are_kept(ball):
     assert run.body("ball").velocity[-1, 2] > 0.0
 
 
-@pytest.mark.parametrize("method", ["auto", "rk54", "rk87", "radau", "semi", "natural"])
+@pytest.mark.parametrize("method", ["auto", "rk54", "rk87", "radau", "semi"])
 def test_chosen_steps_of_a_system_meet_a_plate_as_those_of_its_scene(method, ball):
     """Nothing but the plate limits steps before they meet; a system had no such limit, and the ball fell through."""
     scene = ball()
     ends = [
-        ephs.simulate(model, 0.06, method=method, rtol=1e-6, atol=1e-9).body(name).position[-1]
+        ephs.simulate(model, 0.06, method=method, audit="off").body(name).position[-1]
         for model, name in ((scene, "ball"), (scene.system(), "bodies.ball"))
     ]
     assert ends[0][2] > 0.0
