@@ -16,10 +16,10 @@ CEILINGS = {
     "ephs/operad": 30_400,
     "ephs/semantics": 188_900,
     "ephs/show": 62_600,
-    "ephs/solve": 124_400,
+    "ephs/solve": 124_000,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 543_500,
+    "tests": 543_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

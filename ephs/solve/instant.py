@@ -4,7 +4,7 @@ Dense and plain: an oracle for integrators, and what reports forces. Constraints
 their rate C ė + Ċ e = 0 determines multipliers and rates (Lohmayer, Capobianco, Leyendecker, section 5).
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -16,17 +16,8 @@ from ephs.semantics.bundles.extents import room
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
-from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
-from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Mobility:
-    """Number of independent motions and of redundant constraint equations at a configuration."""
-
-    mobility: int
-    redundant: int
+from ephs.semantics.spaces.decompositions import least_squares, svd
+from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
 
 @final
@@ -94,28 +85,6 @@ def rate_balances(d: Descriptor, x: Array) -> list[dict[int, float]]:
                 rows[effort][other] = rows[effort].get(other, 0.0) + by
     found = ({other: by for other, by in row.items() if by} for row in rows.values())
     return [row for row in found if row and row.keys() <= velocities]
-
-
-def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
-    """Count motions and redundant constraints at a state.
-
-    Motions are velocities (`is_velocity`) that satisfy all constraints and vanish at ports whose effort is prescribed.
-    """
-    rows = [constraints_of(descriptor, x)]
-    for slot in descriptor.outer:
-        if slot.path in prescribed:
-            rows.append(np.eye(descriptor.effort_size)[slot.efforts])
-    for balance in rate_balances(descriptor, x):
-        row = np.zeros((1, descriptor.effort_size))
-        row[0, list(balance)] = list(balance.values())
-        rows.append(row)
-    velocities = np.zeros(descriptor.effort_size, dtype=bool)
-    for slot in descriptor.junctions:
-        velocities[slot.efforts] = is_velocity(slot.quantity)
-    matrix = np.vstack(rows)
-    matrix = matrix[np.abs(matrix[:, velocities]).max(axis=1, initial=0.0) > 0.0][:, velocities]
-    rank = _rank(matrix)
-    return Mobility(int(velocities.sum()) - rank, matrix.shape[0] - rank)
 
 
 def instant(
@@ -301,11 +270,3 @@ def _turned_constraints(d: Descriptor, x: Array, rates: Array) -> Array:
             / (12.0 * h),
         )
     return out
-
-
-def _rank(matrix: Array) -> int:
-    if not matrix.size:
-        return 0
-    norms = np.linalg.norm(matrix, axis=1)
-    sigma = singular_values(matrix / norms[:, None])
-    return rank_of(sigma, CONSTRAINT)

@@ -77,9 +77,8 @@ def _finite(model: Model, chunk: Chunk) -> Chunk:
     if sound.all():
         return chunk
     first = int(np.argmin(sound))
-    entry = int(np.argmin(np.abs(chunk.x[first]) < LARGEST))
-    state = next(s for s in model.descriptor.states if s.point.start <= entry < s.point.stop)
-    failure = SolveError(Outcome.RANGE, str(state.path), "")
+    path = model.state_path(int(np.argmin(np.abs(chunk.x[first]) < LARGEST)))
+    failure = SolveError(Outcome.RANGE, path, "")
     return replace(
         chunk, x=chunk.x[:first], energies=chunk.energies[:first], ledgers=chunk.ledgers[:first], failure=failure
     )

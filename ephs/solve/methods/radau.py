@@ -142,7 +142,9 @@ class Radau:
         jumps = [_size(end - y, allowed) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
             entry = int(np.argmax(np.abs(second - y) / allowed))
-            raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
+            raise SolveError(
+                Outcome.INCONSISTENT, self.model.state_path(entry), "the constraints do not hold at the start"
+            )
         stages = self._solved(start, 0.5 * PROBE * h)[0]
         self._matrices = None
         return replace(start, z=values(self.scheme.nodes, 0.0) @ stages)
@@ -163,7 +165,7 @@ class Radau:
         """
         stages, y, iterations = self._solved(state, h)
         if not np.abs(y).max(initial=0.0) < LARGEST:
-            raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(y) < LARGEST))), "")
+            raise SolveError(Outcome.RANGE, self.model.state_path(int(np.argmin(np.abs(y) < LARGEST))), "")
         totals = self._totals(state, h, stages)
         error = self._error(state, h, stages, y)
         end, missed = self._end(state, h, 1.0, y, stages[-1].copy(), totals)
@@ -352,7 +354,7 @@ class Radau:
             self._slow = not found.fast
             return stages, int(found.tries)
         entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
-        raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
+        raise SolveError(Outcome.DIVERGED, self.model.state_path(entry), "its rate at the stages")
 
     def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
         """Whether rounding, of the equations' terms and of the numbers' sums, alone changes the stages' rates so much.
@@ -367,11 +369,6 @@ class Radau:
         terms = abs(m.unknowns) @ largest + abs(m.states)[:, :rates] @ summed
         allowed = ROUNDING * np.abs(real(terms)[:rates])
         return bool(np.all(np.abs(change[:, :rates]) <= allowed))
-
-    def _path(self, entry: int) -> str:
-        """The state that an entry of x belongs to."""
-        states = self.model.descriptor.states
-        return str(next(slot.path for slot in states if slot.point.start <= entry < slot.point.stop))
 
     def _error(self, state: RadauState, h: float, stages: Array, y: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
