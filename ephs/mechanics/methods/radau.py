@@ -79,11 +79,11 @@ class Implicit(ReducedMethod):
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""
-        return self._stages.snapshot(state)
+        return self._stages.kept.snapshot(state)
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        self._stages.restore(own, state)
+        self._stages.kept.restore(own, state)
 
     def _closed(
         self, state: ReducedState, end: ReducedState, y0: Array, y1: Array, first: Array, stages: Array, h: float
@@ -91,7 +91,7 @@ class Implicit(ReducedMethod):
         """The end with its loops closed, and the difference to the embedded method, filtered by the equations as its
         stiff part must be, relative to what is allowed."""
         eq, size, heat = self.equations, stages.shape[1], self._stages.heat
-        real = self._stages.solvers(state, h)[0]
+        real = self._stages.kept.solvers(h)[0]
         rough = self._embedded @ stages / h
         allowed = self._stages.allowed(y0, y1)
         found = real(first[:size] + rough)
