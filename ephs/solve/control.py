@@ -10,7 +10,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.snapshot import Resumable
 
 SLIVER = 1e-9
 """Fraction of a step, or of a time, that is rounding of sums of steps."""
@@ -170,6 +170,12 @@ class Control:
         if self.least > self.most:
             raise OptionError("min_step", self.least, f"at most max_step = {self.most!r}")
 
+    @property
+    def tolerance(self) -> float:
+        """The largest relative tolerance, or the largest absolute one where that is 0."""
+        rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (self.rtol, self.atol))
+        return rtol or atol
+
     def allowed(self, h: float, latest: float, cause: SolveError | None, finest: float = 0.0) -> float:
         """A shorter step h, at times up to ``latest``.
 
@@ -235,7 +241,7 @@ class Advance:
 
 
 @final
-class Symmetric:
+class Symmetric(Resumable):
     """The next step follows from the error of the last step alone.
 
     Each is tried again until its error is within a factor of what was aimed at: to that factor the step's length is a
@@ -247,6 +253,7 @@ class Symmetric:
         The power of the step with which the estimate falls.
     """
 
+    changing = ("_tries",)
     AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
     finest = FINEST
     """Least fraction of the tolerance: below it are rounding of states and excessive step counts."""
@@ -276,11 +283,3 @@ class Symmetric:
 
     def _wanted(self, h: float, error: float) -> float:
         return h * (self.AIM / max(error, EXACT)) ** (1.0 / self._exponent)
-
-    def snapshot(self) -> Snapshot:
-        """Memory of earlier steps."""
-        return {"tries": self._tries}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot."""
-        self._tries = snapshot["tries"]

@@ -70,7 +70,7 @@ def test_a_step_is_pure_and_a_chunk_is_so_many_steps(damped):
     many, chunk = method.advance(start, 0.1, 3)
     single = method.step(method.step(once, 0.1), 0.1)
     assert np.array_equal(many.x, single.x)
-    assert np.array_equal(chunk.x[-1], many.x)
+    assert np.array_equal(chunk.rows.x[-1], many.x)
     assert np.array_equal(start.x, descriptor.pack(damped.state(START)))
 
 

@@ -166,7 +166,7 @@ class Paced:
 
     def _single(self, state: PacedState, h: float) -> tuple[PacedState, float]:
         inner, chunk = self.chunk(state, h, 1)
-        return _end(chunk, inner, state.t + h), float(chunk.ledgers[-1, 4])
+        return _end(chunk, inner, state.t + h), float(chunk.rows.ledgers[-1, 4])
 
     def _sums(self, row: Row) -> Array:
         """(4 + components,) counts of a method's state at a row."""
@@ -200,17 +200,16 @@ def _end(chunk: Chunk, inner: NaturalState, t: float) -> PacedState:
     """
     if chunk.failure is not None:
         raise chunk.failure
-    return PacedState(t, inner, Row(chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1, :4]))
+    return PacedState(t, inner, chunk.rows.row(-1))
 
 
-def _taken(times: Array, chunk: Chunk, last: NaturalState) -> Taken[PacedState]:
-    """Instants at the ends of a chunk's steps, from whose states steps may start anew."""
+def _taken(rows: RunRecord, last: NaturalState) -> Taken[PacedState]:
+    """Instants at the ends of steps, from whose states steps may start anew."""
 
     def state(k: int) -> PacedState:
-        row = Row(chunk.x[k], chunk.energies[k], chunk.ledgers[k, :4])
-        return PacedState(float(times[k]), replace(last, x=row.x), row)
+        return PacedState(float(rows.t[k]), replace(last, x=rows.x[k]), rows.row(k))
 
-    return Taken(times, chunk.ledgers[:, 4], (chunk.x, chunk.energies, chunk.ledgers), state)
+    return Taken(rows.t, rows.ledgers[:, 4], (rows.x, rows.energies, rows.ledgers), state)
 
 
 @final
@@ -243,12 +242,12 @@ class _FixedSteps:
         ended = done + count == grid.count
         if ended and chunk.steps == count:
             times[-1] = span.until
-        taken = _taken(times, chunk, inner)
+        taken = _taken(replace(chunk.rows, t=times), inner)
         if chunk.steps:
             self._rows = taken if span.save_at is None else self._between(taken, span.save_at)
             self.state = replace(taken.state(chunk.steps - 1), inner=inner)
             shortest, longest = min(self.counts.shortest, h), max(self.counts.longest, h)
-            least = min(self.counts.least, float(chunk.ledgers[:, 4].min()))
+            least = min(self.counts.least, float(taken.least.min()))
             self.counts = Counts(done + chunk.steps, 0, shortest, longest, least, grid.h)
         if chunk.failure is not None:
             raise chunk.failure
