@@ -62,8 +62,8 @@ class Model:
         values = [self.inputs[slot.path].value for slot in self.descriptor.outer]
         return np.concatenate([*values, np.zeros(1)])
 
-    def memory(self, fill: int = 1) -> Memory:
-        """Scratch memory for the loop, for factors of ``fill`` entries."""
+    def memory(self) -> Memory:
+        """Scratch memory for the loop, but for factors."""
         t = self.tables
         n, k, nv, nx = (int(t.dims[:, i].max(initial=0)) for i in range(4))
         size, rows = int(t.row.size), self.unknowns
@@ -77,7 +77,7 @@ class Model:
             jac=np.zeros((n + k) * (n + k + nv) + 1),
             work=np.zeros(4096),
             data=np.zeros(size),
-            factors=np.zeros(fill),
+            factors=np.zeros(1),
             residual=np.zeros(rows),
             scale=np.zeros(rows),
             block=np.zeros(t.group.size),

@@ -129,16 +129,16 @@ class Linked(Protocol):
         """The motion of a joint."""
         ...
 
+    def velocity_error(self) -> Array:
+        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
+        ...
+
 
 class Outlined(Linked, Protocol):
     """The same of a system."""
 
     def outline(self) -> Any:
         """Bodies and joints as a scene, to be drawn."""
-        ...
-
-    def velocity_error(self) -> Array:
-        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
 
 
@@ -185,10 +185,6 @@ class MechanicalMotion(Linked, Protocol):
     def length_errors(self) -> Iterable[tuple[Path, int, float]]:
         """Lengths that states integrate: path, instant at which one is farthest from that of its points, difference as
         a part of the mechanism's length."""
-        ...
-
-    def velocity_error(self) -> Array:
-        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
 
     def variables(self, *, wrenches: bool) -> "dict[str, DatasetVariable]":

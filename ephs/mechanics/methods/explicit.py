@@ -103,7 +103,6 @@ class Explicit(ReducedMethod):
         self.lagged = lagged
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
-        self._known: tuple[Array, Array] | None = None
         self._low: tuple[ReducedState, float, Array] | None = None
         compiled = STEPS.compiled()
         self._fine, self._coarse, self._allowed = np.zeros((3, self.atol.size))
@@ -136,9 +135,7 @@ class Explicit(ReducedMethod):
         y0, y1 = eq.vector(state), np.empty(eq.size)
         k = np.zeros((scheme["a"].shape[0], eq.size))
         if self.lagged is None:
-            if self._known is None or self._known[0] is not state.q:
-                self._known = state.q, eq.rates(state.t, state.q, y0)
-            k[0] = self._known[1]
+            k[0] = self.first(state, y0)
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
         y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=self.lagged is not None)

@@ -12,6 +12,8 @@ from ephs.solve.exchange.errors import ExchangeError
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd")
 """Base units by their names in model descriptions; radians count as numbers."""
+LISTED = 12
+"""Names that a message lists at most."""
 
 
 @final
@@ -255,6 +257,6 @@ def _told(variable: UnitVariable) -> str:
     return f"{variable.name} in {variable.measure.name if variable.measure else 'no unit'}"
 
 
-def _listed(names: Iterable[str], most: int = 12) -> str:
+def _listed(names: Iterable[str]) -> str:
     names = list(names)
-    return ", ".join(names[:most]) + (f" … ({len(names)} in all)" if len(names) > most else "") or "none"
+    return ", ".join(names[:LISTED]) + (f" … ({len(names)} in all)" if len(names) > LISTED else "") or "none"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 from ephs.solve.march.account import WHOLE, WORTH, RunAccount, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
@@ -325,10 +325,7 @@ class _TrialStep:
         copy(on, m.q1, m.q)
         copy(on, m.carry1, m.carry)
 
-        def clear(j: Integer) -> None:
-            m.y[j] = 0.0
-
-        on.loop(nv, clear)
+        clear(on, m.y.part(0, nv))
         copy(on, m.y1.part(nv, size - nv), m.y.part(nv, size - nv))
         c.rough = 0
         c.fresh = 0 if motion.closes else 1

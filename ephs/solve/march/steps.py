@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import (
     Entry,
@@ -144,10 +144,7 @@ def book(
         motion.hold(on, totals.change, totals.whole, totals.whole)
         absorb()
         copy(on, totals.change, totals.whole)
-        on.loop(totals.low.size, clear)
-
-    def clear(j: Integer) -> None:
-        totals.low[j] = 0.0
+        clear(on, totals.low)
 
     def grow(j: Integer) -> None:
         totals.end[at + j], totals.after[j] = grown(totals.start[at + j], totals.before[j], totals.change[j])
@@ -172,9 +169,6 @@ def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vec
 def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:
     """h Σ weights·k of the counted coordinates, without components transverse to the constraints."""
 
-    def clear(j: Integer) -> None:
-        out[j] = 0.0
-
     def add(s: Integer) -> None:
         weight = h * weights[s]
 
@@ -183,7 +177,7 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
 
         on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(out.size, entry))
 
-    on.loop(out.size, clear)
+    clear(on, out)
     on.loop(k.rows, add)
     if motion.closes:
         n = motion.freedoms
