@@ -4,7 +4,7 @@ Dense and plain: an oracle for integrators, and what reports forces. Constraints
 their rate C ė + Ċ e = 0 determines multipliers and rates (Lohmayer, Capobianco, Leyendecker, section 5).
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -232,8 +232,13 @@ def compliance_of(slot: ComponentSlot, d: Descriptor, x: Array, reference: Refer
             def effort(steps: float, along: Array = along) -> Array:
                 return storage.effort(storage.retract(point, steps * along), reference)
 
-            out[:, i] = (8.0 * (effort(1.0) - effort(-1.0)) - (effort(2.0) - effort(-2.0))) / (12.0 * h)
+            out[:, i] = _difference(effort, h)
     return out
+
+
+def _difference(function: Callable[[float], Array], h: float) -> Array:
+    """The derivative at 0 of a function of numbers of steps h, by differences of fourth order."""
+    return (8.0 * (function(1.0) - function(-1.0)) - (function(2.0) - function(-2.0))) / (12.0 * h)
 
 
 def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
@@ -260,13 +265,12 @@ def _turned_constraints(d: Descriptor, x: Array, rates: Array) -> Array:
             continue
         h = 1e-3 / fastest
 
-        def constraints_at(step: float, slot: ComponentSlot = slot, primitive: Reversible = primitive) -> Array:
-            return primitive.structure(d.point(slot, d.advance(x, step * rates)))[1]
+        along = h * rates
 
-        _place(
-            out,
-            slot,
-            (8.0 * (constraints_at(h) - constraints_at(-h)) - (constraints_at(2.0 * h) - constraints_at(-2.0 * h)))
-            / (12.0 * h),
-        )
+        def constraints_at(
+            steps: float, slot: ComponentSlot = slot, primitive: Reversible = primitive, along: Array = along
+        ) -> Array:
+            return primitive.structure(d.point(slot, d.advance(x, steps * along)))[1]
+
+        _place(out, slot, _difference(constraints_at, h))
     return out

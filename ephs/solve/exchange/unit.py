@@ -116,12 +116,15 @@ class Unit:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the input signals."""
-        return tuple(name for name, each in self.variables.items() if each.causality == "input" and each.real)
+        return self._signals("input")
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the output signals."""
-        return tuple(name for name, each in self.variables.items() if each.causality == "output" and each.real)
+        return self._signals("output")
+
+    def _signals(self, causality: str) -> tuple[str, ...]:
+        return tuple(name for name, each in self.variables.items() if each.causality == causality and each.real)
 
     @property
     def keeps_state(self) -> bool:

@@ -8,11 +8,12 @@ from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 from ephs.solve.march.account import WHOLE, WORTH, RunAccount, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
+from ephs.solve.march.evaluating import allow
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
 from ephs.solve.march.records import Ending, MarchControl, Motion, Status, TableauRecord
-from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
+from ephs.solve.march.steps import attempt, book, drift, error_of, first, stiffness_of
 from ephs.solve.march.stiff import Stiff
 
 GOING = -1

@@ -18,7 +18,7 @@ from ephs.semantics.stage import (
     staged,
 )
 from ephs.solve.march.control import judge
-from ephs.solve.march.evaluating import combine, evaluate, place
+from ephs.solve.march.evaluating import allow, combine, evaluate, place
 from ephs.solve.march.lagged import Lagged, lag
 from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
@@ -154,16 +154,6 @@ def book(
     status = motion.book(on, totals.start, totals.change, totals.size, on.select(h >= 0.0, 1.0, -1.0))
     on.loop(totals.change.size, grow)
     return status
-
-
-def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vector) -> None:
-    """Write what errors of a step from ``start`` to ``end`` may be, atol + rtol · size, to ``allowed``."""
-    motion.sizes(on, start, end, errors.allowed)
-
-    def each_entry(j: Integer) -> None:
-        errors.allowed[j] = errors.atol[j] + errors.rtol[j] * errors.allowed[j]
-
-    on.loop(motion.counted, each_entry)
 
 
 def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:

@@ -28,7 +28,7 @@ from ephs.solve.methods.analysis import (
     entries_at,
     null_unknown,
 )
-from ephs.solve.methods.blame import Blame
+from ephs.solve.methods.blame import contradicted, diverged
 from ephs.solve.methods.collocation import moments
 from ephs.solve.methods.guesses import BEFORE
 from ephs.solve.methods.newton import natural_program
@@ -294,12 +294,12 @@ class Natural:
 
     def _failure(self, status: int, o: Order, x: Array, z: Array, h: float) -> SolveError:
         """Why a step has no solution, by the compiled loop's status."""
-        blame = Blame(self.model, o.dropped[: self.model.unknowns])
+        given = self.model, o.dropped[: self.model.unknowns]
         if status == INCONSISTENT:
-            return blame.contradicted(x, z[-1], h)
+            return contradicted(*given, x, z[-1], h)
         if status == DIVERGED:
             held = self._memory if self.stages == 1 else self._scratch
-            return blame.diverged(held.residual, held.scale)
+            return diverged(*given, held.residual, held.scale)
         return SolveError(Outcome.SINGULAR, "", "")
 
     def _order(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> Order:
