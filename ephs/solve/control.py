@@ -98,39 +98,28 @@ class Tolerance:
 @final
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The times t₀ + k·h, the last step shortened to end on ``until``."""
+    """The times k·h from the start of a run of ``span`` seconds, the last step shortened to end on its end."""
 
-    t0: float
-    until: float
+    span: float
     h: float
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.h) and self.h > 0.0):
-            raise OptionError("step", self.h, "a number of seconds > 0")
-        if not (np.isfinite(self.until) and self.until > self.t0):
-            raise OptionError("until", self.until, f"a time after t0 = {self.t0!r} s")
 
     @property
     def whole(self) -> int:
         """Number of steps of full length."""
-        count = (self.until - self.t0) / self.h
+        count = self.span / self.h
         nearest = round(count)  # no additional tiny step where h divides the time up to rounding
         return int(nearest) if abs(count - nearest) <= SLIVER * max(1.0, count) else int(count)
 
     @property
     def last(self) -> float:
         """Length of the shortened last step, 0 where there is none."""
-        rest = self.until - self.time(self.whole)
+        rest = self.span - self.whole * self.h
         return rest if rest > SLIVER * self.h else 0.0
 
     @property
     def count(self) -> int:
         """Number of steps."""
         return self.whole + bool(self.last)
-
-    def time(self, k: int) -> float:
-        """The time after k full steps."""
-        return self.t0 + k * self.h
 
 
 @final

@@ -53,6 +53,11 @@ class InstantRates:
         return np.where(self.determined[where], self.multipliers[where], np.nan)
 
 
+def rates_read(slot: ComponentSlot) -> list[int]:
+    """Places of the rates of the states that a component reads."""
+    return [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
+
+
 def is_velocity(quantity: Quantity) -> bool:
     """Whether efforts of a quantity are velocities: it is odd under time reversal, and no flux linkage."""
     return quantity.parity < 0 and quantity.kind != "flux_linkage"
@@ -117,7 +122,7 @@ def instant(
     growth = np.zeros((n_w, size))
     for slot in d.components:
         if isinstance(slot.primitive, Storage):
-            rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
+            rates = np.array(rates_read(slot), dtype=int)
             balance[list(slot.efforts), rates] += 1.0
             growth[np.ix_(rates, rates)] -= compliance_of(slot, d, x, reference)
             growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
@@ -247,8 +252,7 @@ def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
     out = np.zeros(d.rate_size)
     for slot in d.components:
         if isinstance(slot.primitive, Storage):
-            rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
-            for rate, effort in zip(rates, slot.efforts, strict=True):
+            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
                 out[rate] = 0.0 if touched[effort] else -flows[effort]
     return out
 

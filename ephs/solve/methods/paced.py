@@ -12,6 +12,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.breakpoints import NEAR
 from ephs.solve.control import Control, Grid
+from ephs.solve.instant import rates_read
 from ephs.solve.methods.driven import advance_driven, advance_whole
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
@@ -221,7 +222,7 @@ class _FixedSteps:
     def __init__(self, method: Paced, span: Span[PacedState], step: float) -> None:
         self.state, self.counts = span.state, replace(span.counts, h=step)
         self._method, self._span = method, span
-        self._grid, self._sign = Grid(0.0, abs(span.until - span.t0), step), 1.0 if span.until > span.t0 else -1.0
+        self._grid, self._sign = Grid(abs(span.until - span.t0), step), 1.0 if span.until > span.t0 else -1.0
         self._saved, self._most = span.saved, FIRST
         self._rows: Instants[PacedState] = []
 
@@ -300,8 +301,7 @@ def _counted(problem: Problem) -> Array:
     out = np.ones(d.rate_size, dtype=bool)
     for slot in d.components:
         if slot.primitive.kind == "storage":
-            rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
-            for rate, effort in zip(rates, slot.efforts, strict=True):
+            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
                 out[rate] = not bound[effort]
     odd = {i for s in d.states if s.quantity.parity < 0 for i in range(s.rates.start, s.rates.stop)}
     out[[i for i in range(d.rate_size) if i not in odd]] = True

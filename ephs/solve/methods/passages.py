@@ -52,20 +52,18 @@ class Passages:
     def __init__(self, model: Model, stores: HeatStores, conduction: ConductionMatrix | None) -> None:
         t, d = model.tables, model.descriptor
         self._stores, self._conduction = stores, conduction
-        store = np.full(int(t.counts[1]), -1)
-        store[stores.efforts] = np.arange(stores.efforts.size)
         makers = np.flatnonzero(t.kind == IRREVERSIBLE)
         owners, flows = np.repeat(makers, t.dims[makers, 0]), spans(t.e_at[makers], t.dims[makers, 0])
         efforts = t.e_index[flows]
         thermal = t.entropy[efforts] == 1.0
         count = np.bincount(owners[thermal], minlength=t.kind.size)
-        chosen = np.flatnonzero(thermal & (store[efforts] >= 0))
+        chosen = np.flatnonzero(thermal & (stores.at[efforts] >= 0))
         self._makers, self._flows, effort = owners[chosen], flows[chosen], efforts[chosen]
         frictions = (count[self._makers] == 1) & (t.dims[self._makers, 0] > 1)
         self._effort, self._intensive = int(t.counts[0]) + effort, t.intensive[effort]
         self._conducting = np.searchsorted(self._flows, conduction.ports) if conduction is not None else None
         self.called = chosen.size > (0 if conduction is None else conduction.ports.size)
-        at = store[effort]
+        at = stores.at[effort]
         self._heats = Heats(
             tuple(d.components[number].path for number in stores.components.tolist()),
             np.where(stores.hot, stores.components, -1), lambda: (stores.c1, stores.c2),
