@@ -14,6 +14,7 @@ from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.marching import Leave, March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
+from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
@@ -24,13 +25,8 @@ from ephs.solve.stepping import Attempt, Leg, Span
 
 def tableau(scheme: Collocation) -> Mapping[str, Any]:
     """A method as `ephs.solve.march.Tableau`: after the start, the stages; the last leads to the end."""
-    stages = scheme.nodes.size
-    return {
-        "a": np.pad(np.vstack([np.zeros(stages), scheme.coefficients, scheme.coefficients[-1]]), ((0, 0), (1, 0))),
-        "error": np.array([1.0, *(scheme.defect / scheme.gamma), 0.0]),
-        "coarse": np.zeros(stages + 2),
-        "eighth": np.zeros(1, dtype=np.int64),
-    }
+    stages = np.vstack([np.zeros(scheme.nodes.size), scheme.coefficients, scheme.coefficients[-1]])
+    return arrays(np.pad(stages, ((0, 0), (1, 0))), np.array([1.0, *(scheme.defect / scheme.gamma), 0.0]))
 
 
 @final

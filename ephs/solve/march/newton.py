@@ -19,7 +19,6 @@ from ephs.solve.march.stiff import Solver, Stiff, whole
 def newton(
     on: Evaluator,
     motion: Motion,
-    tableau: TableauRecord,
     control: MarchControl,
     base: Vector,
     start: Vector,

@@ -85,7 +85,7 @@ def attempt(
         on.when(on.same(count, 1), lambda: copy(on, start, last))
     elif errors is not None:
         allow(on, motion, errors, start, start)
-        status.value = newton(on, motion, tableau, control, base, start, h, k, errors, stiff, y, q)
+        status.value = newton(on, motion, control, base, start, h, k, errors, stiff, y, q)
         copy(on, y, last)
         stage.value = count
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(once))
