@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -88,32 +87,36 @@ def integrate(
     return run.solution()
 
 
-@dataclass(eq=False)
 class _RunLoop(Generic[S]):
     """One run in progress."""
 
-    problem: Problem
-    t0: float
-    until: float
-    stepper: Stepper[S]
-    policy: Policy | None
-    control: Control
-    events: tuple[Event, ...]
-    save_at: Array | None
-    progress: Progress | None
-    remarks: Mapping[str, Any]
-    begin: float
-    journal: Written | None
-    bounds: Bounds | None
-    breakpoints: Breakpoints
-    state: S = field(init=False)
+    state: S
 
-    def __post_init__(self) -> None:
-        t0, until, policy, bounds = self.t0, self.until, self.policy, self.bounds
-        self.t = t0
-        self.grid = None if policy else Grid(abs(until - t0), float(self.control.step or 0.0))
+    def __init__(
+        self,
+        problem: Problem,
+        t0: float,
+        until: float,
+        stepper: Stepper[S],
+        policy: Policy | None,
+        control: Control,
+        events: tuple[Event, ...],
+        save_at: Array | None,
+        progress: Progress | None,
+        remarks: Mapping[str, Any],
+        begin: float,
+        journal: Written | None,
+        bounds: Bounds | None,
+        breakpoints: Breakpoints,
+    ) -> None:
+        self.breakpoints = breakpoints
+        self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
+        self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
+        self.remarks, self.journal, self.bounds, self.save_at = remarks, journal, bounds, save_at
+        self.t = self.t0 = t0
+        self.grid = None if policy else Grid(abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
-        self.setup, self.looked, self.ended = 0.0, self.begin, False
+        self.setup, self.looked, self.ended = 0.0, begin, False
         self.steps = self.rejected = self.saved = 0
         self.way = Advance(t0, abs(until - t0) if policy else 0.0)
         self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
@@ -123,7 +126,7 @@ class _RunLoop(Generic[S]):
         self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
         self.watch = Watch((), t0, {})
         order, serves = (bounds.order, bounds.serves) if bounds else (1, serves_not)
-        self.forecast = Forecast(self.stepper.name, order, until, serves)
+        self.forecast = Forecast(stepper.name, order, until, serves)
         self.leg: Leg[S] | None = None
         self.first: Row | None = None
         self.cause: SolveError | None = None  # reason of rejecting the longer step
