@@ -1,6 +1,5 @@
 """Heat from irreversible components to stores of heat of a system, booked as energy; see `Heats`."""
 
-from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -14,29 +13,6 @@ from ephs.solve.methods.continuous import AccumulatorRates
 from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.methods.stores import HeatStores
 from ephs.solve.model import Model
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class Booked:
-    """The heat of a step.
-
-    Parameters
-    ----------
-    numbers
-        (stores,) of the stores at the end.
-    made
-        (components,) by how much more entropy each made than its quadrature says, in J/K.
-    heat
-        By how much more heat of friction there is than its quadrature says, in J.
-    passed
-        Heat that went to the stores, in J.
-    """
-
-    numbers: Array
-    made: Array
-    heat: float
-    passed: float
 
 
 @final
@@ -92,7 +68,7 @@ class Passages:
     def booked(
         self, y: Array, passed: Array | None, conducted: tuple[Array, float], missed: Array | None,
         energies: Array | None, work: float,
-    ) -> Booked:  # fmt: skip
+    ) -> tuple[Array, Array, float, float]:  # fmt: skip
         """The heat of a step from the numbers y.
 
         Parameters
@@ -106,6 +82,13 @@ class Passages:
             (2, components) stored before and after, in J, where there is friction.
         work
             What was supplied, in J.
+
+        Returns
+        -------
+        tuple
+            (stores,) numbers of the stores at the end; (components,) by how much more entropy each component made than
+            its quadrature says, in J/K; by how much more heat of friction there is than its quadrature says, and heat
+            that went to the stores, in J.
 
         Raises
         ------
@@ -125,4 +108,4 @@ class Passages:
         change, made = self._heats.taken(before, flows)
         out = np.bincount(self._makers, made - entropy, self._rest.size).astype(float)
         more = float((flows - heat)[frictions].sum())
-        return Booked((before + change) / stores.units, out, more, float(flows.sum()))
+        return (before + change) / stores.units, out, more, float(flows.sum())

@@ -278,14 +278,12 @@ class Radau:
                 energies = np.array([self._known(state).energies, self._instant(t, y, z).energies])
                 missed = self.scheme.gamma * totals.passed[0, 0] + self.scheme.defect @ totals.passed[1:, 0]
                 missed = theta * h * missed
-            booked = passages.booked(
+            y[stored], made, friction, heat = passages.booked(
                 state.y, passed, (weights @ totals.numbers, theta * h), missed, energies, sums[1] - state.sums[1]
             )
-            y[stored] = booked.numbers
-            sums[0] += booked.heat
-            sums[3] += booked.made.sum()
-            sums[4:] += booked.made
-            heat = booked.passed
+            sums[0] += friction
+            sums[3] += made.sum()
+            sums[4:] += made
         if account.size:
             rest = theta * h * z[: self._rates] - changed
             y, account, error = self._settling.settled(
