@@ -54,7 +54,7 @@ def advance_whole(
     rows = joined([chunk.rows for chunk in chunks])
     assert rows is not None
     rows = replace(rows, t=h * np.arange(1.0, rows.t.size + 1.0))
-    iterations, cut = (sum(counts) for counts in zip(*((chunk.iterations, chunk.cut) for chunk in chunks), strict=True))
+    iterations, cut = sum(chunk.iterations for chunk in chunks), sum(chunk.cut for chunk in chunks)
     return state, Chunk(rows, iterations, chunks[-1].failure, cut)
 
 
