@@ -10,7 +10,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.snapshot import Resumable
 
 SLIVER = 1e-9
 """Fraction of a step, or of a time, that is rounding of sums of steps."""
@@ -98,39 +98,28 @@ class Tolerance:
 @final
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The times t₀ + k·h, the last step shortened to end on ``until``."""
+    """The times k·h from the start of a run of ``span`` seconds, the last step shortened to end on its end."""
 
-    t0: float
-    until: float
+    span: float
     h: float
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.h) and self.h > 0.0):
-            raise OptionError("step", self.h, "a number of seconds > 0")
-        if not (np.isfinite(self.until) and self.until > self.t0):
-            raise OptionError("until", self.until, f"a time after t0 = {self.t0!r} s")
 
     @property
     def whole(self) -> int:
         """Number of steps of full length."""
-        count = (self.until - self.t0) / self.h
+        count = self.span / self.h
         nearest = round(count)  # no additional tiny step where h divides the time up to rounding
         return int(nearest) if abs(count - nearest) <= SLIVER * max(1.0, count) else int(count)
 
     @property
     def last(self) -> float:
         """Length of the shortened last step, 0 where there is none."""
-        rest = self.until - self.time(self.whole)
+        rest = self.span - self.whole * self.h
         return rest if rest > SLIVER * self.h else 0.0
 
     @property
     def count(self) -> int:
         """Number of steps."""
         return self.whole + bool(self.last)
-
-    def time(self, k: int) -> float:
-        """The time after k full steps."""
-        return self.t0 + k * self.h
 
 
 @final
@@ -169,6 +158,12 @@ class Control:
             raise OptionError("min_step", self.least, "a number of seconds ≥ 0")
         if self.least > self.most:
             raise OptionError("min_step", self.least, f"at most max_step = {self.most!r}")
+
+    @property
+    def tolerance(self) -> float:
+        """The largest relative tolerance, or the largest absolute one where that is 0."""
+        rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (self.rtol, self.atol))
+        return rtol or atol
 
     def allowed(self, h: float, latest: float, cause: SolveError | None, finest: float = 0.0) -> float:
         """A shorter step h, at times up to ``latest``.
@@ -235,7 +230,7 @@ class Advance:
 
 
 @final
-class Symmetric:
+class Symmetric(Resumable):
     """The next step follows from the error of the last step alone.
 
     Each is tried again until its error is within a factor of what was aimed at: to that factor the step's length is a
@@ -247,6 +242,7 @@ class Symmetric:
         The power of the step with which the estimate falls.
     """
 
+    changing = ("_tries",)
     AIM, NEAR, TRIES, GROWTH = 0.5, 1.6, 4, 4.0
     finest = FINEST
     """Least fraction of the tolerance: below it are rounding of states and excessive step counts."""
@@ -276,11 +272,3 @@ class Symmetric:
 
     def _wanted(self, h: float, error: float) -> float:
         return h * (self.AIM / max(error, EXACT)) ** (1.0 / self._exponent)
-
-    def snapshot(self) -> Snapshot:
-        """Memory of earlier steps."""
-        return {"tries": self._tries}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot."""
-        self._tries = snapshot["tries"]

@@ -133,7 +133,7 @@ class Watch:
             rising = (b > a) == (t1 > t0)
             crossed = a != 0.0 and (b == 0.0 or (a < 0.0) != (b < 0.0))
             if crossed and (event.direction == 0 or (event.direction > 0) == rising):
-                found.append((t1 if b == 0.0 else self._locate(event, t0, t1, a, b, end, inside), i))
+                found.append((t1 if b == 0.0 else _located(event, t0, t1, a, b, inside), i))
         self._before = after
         found.sort(key=lambda pair: abs(pair[0] - t0))
         for t, i in found:
@@ -162,23 +162,18 @@ class Watch:
         self._before = list(snapshot["before"])
         self.crossings = [Crossing.of_record(record) for record in snapshot["crossings"]]
 
-    @staticmethod
-    def _locate(
-        event: Event,
-        t0: float,
-        t1: float,
-        a: float,
-        b: float,
-        end: Mapping[Path, Array],
-        inside: Callable[[float], Mapping[Path, Array]],
-    ) -> float:
-        from scipy.optimize import brentq
 
-        def value(t: float) -> float:
-            if t == t0:
-                return a
-            return b if t == t1 else event.value(t, inside(t))
+def _located(
+    event: Event, t0: float, t1: float, a: float, b: float, inside: Callable[[float], Mapping[Path, Array]]
+) -> float:
+    """The zero of an event's function, whose values at both times are a and b, between them."""
+    from scipy.optimize import brentq
 
-        precision = 4.0 * float(np.spacing(max(abs(t0), abs(t1))))
-        root: Any = brentq(value, t0, t1, xtol=precision, maxiter=200)
-        return float(root)
+    def value(t: float) -> float:
+        if t == t0:
+            return a
+        return b if t == t1 else event.value(t, inside(t))
+
+    precision = 4.0 * float(np.spacing(max(abs(t0), abs(t1))))
+    root: Any = brentq(value, t0, t1, xtol=precision, maxiter=200)
+    return float(root)

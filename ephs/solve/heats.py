@@ -181,13 +181,8 @@ class Heats:
     def most(self, heats: Array, flows: Array) -> Array:
         """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
         cold = 1.0 / self.temperatures(heats)
-        made = np.zeros(flows.size)
-        np.add.at(
-            made,
-            self._owners,
-            np.abs(flows) * (_end_values(cold, self._sink) + _end_values(cold, self._source) + self._loose),
-        )
-        return made
+        carried = np.abs(flows) * (_end_values(cold, self._sink) + _end_values(cold, self._source) + self._loose)
+        return np.bincount(self._owners, carried, flows.size).astype(float)
 
     def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
         """Changes of energies in J by the flows of a step, those of other states not at all; and the entropy that each
@@ -210,11 +205,8 @@ class Heats:
         small = np.abs(share) < LINEAR  # θ̄/θ = x / log(1 + x)
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
-        made = np.zeros(flows.size)
-        np.add.at(
-            made, self._owners, flows * (_end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose)
-        )
-        return change, made
+        made = flows * (_end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose)
+        return change, np.bincount(self._owners, made, flows.size).astype(float)
 
 
 def _end_values(values: Array, ends: Index) -> Array:

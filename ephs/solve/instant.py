@@ -4,7 +4,7 @@ Dense and plain: an oracle for integrators, and what reports forces. Constraints
 their rate C ė + Ċ e = 0 determines multipliers and rates (Lohmayer, Capobianco, Leyendecker, section 5).
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -16,17 +16,8 @@ from ephs.semantics.bundles.extents import room
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
-from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
-from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class Mobility:
-    """Number of independent motions and of redundant constraint equations at a configuration."""
-
-    mobility: int
-    redundant: int
+from ephs.semantics.spaces.decompositions import least_squares, svd
+from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
 
 @final
@@ -60,6 +51,11 @@ class InstantRates:
         slot = next(s for s in self.descriptor.components if s.path == component)
         where = slice(slot.multiplier, slot.multiplier + slot.multipliers)
         return np.where(self.determined[where], self.multipliers[where], np.nan)
+
+
+def rates_read(slot: ComponentSlot) -> list[int]:
+    """Places of the rates of the states that a component reads."""
+    return [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
 
 
 def is_velocity(quantity: Quantity) -> bool:
@@ -96,28 +92,6 @@ def rate_balances(d: Descriptor, x: Array) -> list[dict[int, float]]:
     return [row for row in found if row and row.keys() <= velocities]
 
 
-def mobility(descriptor: Descriptor, x: Array, prescribed: Collection[Path] = ()) -> Mobility:
-    """Count motions and redundant constraints at a state.
-
-    Motions are velocities (`is_velocity`) that satisfy all constraints and vanish at ports whose effort is prescribed.
-    """
-    rows = [constraints_of(descriptor, x)]
-    for slot in descriptor.outer:
-        if slot.path in prescribed:
-            rows.append(np.eye(descriptor.effort_size)[slot.efforts])
-    for balance in rate_balances(descriptor, x):
-        row = np.zeros((1, descriptor.effort_size))
-        row[0, list(balance)] = list(balance.values())
-        rows.append(row)
-    velocities = np.zeros(descriptor.effort_size, dtype=bool)
-    for slot in descriptor.junctions:
-        velocities[slot.efforts] = is_velocity(slot.quantity)
-    matrix = np.vstack(rows)
-    matrix = matrix[np.abs(matrix[:, velocities]).max(axis=1, initial=0.0) > 0.0][:, velocities]
-    rank = _rank(matrix)
-    return Mobility(int(velocities.sum()) - rank, matrix.shape[0] - rank)
-
-
 def instant(
     descriptor: Descriptor,
     reference: Reference,
@@ -148,7 +122,7 @@ def instant(
     growth = np.zeros((n_w, size))
     for slot in d.components:
         if isinstance(slot.primitive, Storage):
-            rates = np.array([i for s in slot.reads for i in range(s.rates.start, s.rates.stop)], dtype=int)
+            rates = np.array(rates_read(slot), dtype=int)
             balance[list(slot.efforts), rates] += 1.0
             growth[np.ix_(rates, rates)] -= compliance_of(slot, d, x, reference)
             growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
@@ -263,8 +237,13 @@ def compliance_of(slot: ComponentSlot, d: Descriptor, x: Array, reference: Refer
             def effort(steps: float, along: Array = along) -> Array:
                 return storage.effort(storage.retract(point, steps * along), reference)
 
-            out[:, i] = (8.0 * (effort(1.0) - effort(-1.0)) - (effort(2.0) - effort(-2.0))) / (12.0 * h)
+            out[:, i] = _difference(effort, h)
     return out
+
+
+def _difference(function: Callable[[float], Array], h: float) -> Array:
+    """The derivative at 0 of a function of numbers of steps h, by differences of fourth order."""
+    return (8.0 * (function(1.0) - function(-1.0)) - (function(2.0) - function(-2.0))) / (12.0 * h)
 
 
 def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
@@ -273,8 +252,7 @@ def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
     out = np.zeros(d.rate_size)
     for slot in d.components:
         if isinstance(slot.primitive, Storage):
-            rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
-            for rate, effort in zip(rates, slot.efforts, strict=True):
+            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
                 out[rate] = 0.0 if touched[effort] else -flows[effort]
     return out
 
@@ -291,21 +269,12 @@ def _turned_constraints(d: Descriptor, x: Array, rates: Array) -> Array:
             continue
         h = 1e-3 / fastest
 
-        def constraints_at(step: float, slot: ComponentSlot = slot, primitive: Reversible = primitive) -> Array:
-            return primitive.structure(d.point(slot, d.advance(x, step * rates)))[1]
+        along = h * rates
 
-        _place(
-            out,
-            slot,
-            (8.0 * (constraints_at(h) - constraints_at(-h)) - (constraints_at(2.0 * h) - constraints_at(-2.0 * h)))
-            / (12.0 * h),
-        )
+        def constraints_at(
+            steps: float, slot: ComponentSlot = slot, primitive: Reversible = primitive, along: Array = along
+        ) -> Array:
+            return primitive.structure(d.point(slot, d.advance(x, steps * along)))[1]
+
+        _place(out, slot, _difference(constraints_at, h))
     return out
-
-
-def _rank(matrix: Array) -> int:
-    if not matrix.size:
-        return 0
-    norms = np.linalg.norm(matrix, axis=1)
-    sigma = singular_values(matrix / norms[:, None])
-    return rank_of(sigma, CONSTRAINT)

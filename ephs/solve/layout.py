@@ -16,7 +16,7 @@ from ephs.semantics.descriptor.kernel_table import Callback, address_of, prototy
 from ephs.semantics.descriptor.numbering import Index, spans, starts
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.verdicts.checks import random_efforts, random_point
-from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKING, Tables
+from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKING, Tables, efforts_of, rates_of
 
 LINEAR = frozenset({"constant_structure", "quadratic"})
 """Kernels whose Jacobian's entries are their parameters, so that zeros depend on the parameters."""
@@ -100,9 +100,8 @@ def _numbered(keys: Index) -> tuple[Index, Index]:
 
 def _constant_entries(t: Tables, size: int) -> tuple[Index, Array]:
     """Places, row · size + column, and values of the entries that never change."""
-    n_rate, storing = t.counts[0], t.kind == STORING
-    rates = t.read_w[spans(t.read_w_at[storing], t.dims[storing, 2])]
-    efforts = n_rate + t.e_index[spans(t.e_at[storing], t.dims[storing, 0])]
+    n_rate, storing = t.counts[0], np.flatnonzero(t.kind == STORING)
+    rates, efforts = rates_of(t, storing), n_rate + efforts_of(t, storing)
     stored = np.stack([rates * size + efforts, efforts * size + rates], axis=1).ravel()
     at, dim, _, unknown = t.outer[t.outer[:, 2] == 1].T
     junctions, flows = n_rate + spans(at, dim), spans(unknown, dim)

@@ -114,7 +114,7 @@ class _RunLoop(Generic[S]):
         self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
         self.remarks, self.journal, self.bounds, self.save_at = remarks, journal, bounds, save_at
         self.t = self.t0 = t0
-        self.grid = None if policy else Grid(0.0, abs(until - t0), float(control.step or 0.0))
+        self.grid = None if policy else Grid(abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
         self.setup, self.looked, self.ended = 0.0, begin, False
         self.steps = self.rejected = self.saved = 0
@@ -197,7 +197,7 @@ class _RunLoop(Generic[S]):
             if control.max_steps is not None and self.steps >= control.max_steps:
                 raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
             if grid:
-                self.h = grid.time(self.steps - self.breakpoints.split + 1) - abs(self.t - self.t0)
+                self.h = (self.steps - self.breakpoints.split + 1) * grid.h - abs(self.t - self.t0)
             end = self.breakpoints.end(self.t, self.h, self._here)
             rest = abs(end - self.t)
             if grid and rest - self.h <= SLIVER * grid.h:

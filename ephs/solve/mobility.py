@@ -1,9 +1,8 @@
 """Mobility and redundant constraints of large systems: propagation along the constraints, dense for loop closures.
 
-`instant.mobility` counts the same on one dense matrix, for tests. Here a constraint that has as many rows as one of its
-ports has efforts gives this port's effort from the others'; that is a block of full rank. What is left over are the
-constraints that close loops: only they are written in the efforts that remained free, and their rank is computed, group
-by group of those that have free efforts in common.
+A constraint that has as many rows as one of its ports has efforts gives this port's effort from the others'; that is a
+block of full rank. What is left over are the constraints that close loops: only they are written in the efforts that
+remained free, and their rank is computed, group by group of those that have free efforts in common.
 """
 
 from collections.abc import Collection, Mapping
@@ -20,11 +19,20 @@ from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.instant import Mobility, is_velocity, rate_balances
+from ephs.solve.instant import is_velocity, rate_balances
 from ephs.solve.sparse import Index
 
 SOUND = 1e-3
 """Least singular value of an invertible block, as a fraction of its row norms."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Mobility:
+    """Number of independent motions and of redundant constraint equations at a configuration."""
+
+    mobility: int
+    redundant: int
 
 
 @final

@@ -62,8 +62,8 @@ class Model:
         values = [self.inputs[slot.path].value for slot in self.descriptor.outer]
         return np.concatenate([*values, np.zeros(1)])
 
-    def memory(self, fill: int = 1) -> Memory:
-        """Scratch memory for the loop, for factors of ``fill`` entries."""
+    def memory(self) -> Memory:
+        """Scratch memory for the loop, but for factors."""
         t = self.tables
         n, k, nv, nx = (int(t.dims[:, i].max(initial=0)) for i in range(4))
         size, rows = int(t.row.size), self.unknowns
@@ -77,7 +77,7 @@ class Model:
             jac=np.zeros((n + k) * (n + k + nv) + 1),
             work=np.zeros(4096),
             data=np.zeros(size),
-            factors=np.zeros(fill),
+            factors=np.zeros(1),
             residual=np.zeros(rows),
             scale=np.zeros(rows),
             block=np.zeros(t.group.size),
@@ -122,44 +122,38 @@ class Model:
         support = primitive.support if isinstance(primitive, Storage) else None
         return np.inf if support is None else support.depth
 
+    def state_path(self, entry: int) -> str:
+        """The path of the state that an entry of the state vector belongs to."""
+        return str(next(s.path for s in self.descriptor.states if s.point.start <= entry < s.point.stop))
+
     def unknown_name(self, column: int) -> str:
         """An unknown, in words."""
-        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
-        if column < n_rate:
-            return (
-                f"the rate of {next(s for s in self.descriptor.states if s.rates.start <= column < s.rates.stop).path}"
-            )
-        if column < n_rate + n_effort:
-            at = column - n_rate
-            junctions = self.descriptor.junctions
-            return f"the effort at junction {next(j for j in junctions if j.efforts.start <= at < j.efforts.stop).path}"
-        return self.row_name(column).replace("the constraint of", "a multiplier of")
+        _, unknown, path = self._owner(column)
+        return f"{unknown} {path}".strip()
 
     def row_path(self, row: int) -> str:
         """The path of the state, junction or component that the equation of a row, or its unknown, belongs to."""
-        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
-        d, at = self.descriptor, row - n_rate - n_effort
-        if row < n_rate:
-            return str(next(s for s in d.states if s.rates.start <= row < s.rates.stop).path)
-        if at < 0:
-            return str(next(j for j in d.junctions if j.efforts.start <= row - n_rate < j.efforts.stop).path)
-        return next((str(s.path) for s in d.components if s.multiplier <= at < s.multiplier + s.multipliers), "")
+        return self._owner(row)[2]
 
     def row_name(self, row: int) -> str:
         """The equation of a row, in words."""
-        n_rate, n_effort = int(self.tables.counts[0]), int(self.tables.counts[1])
-        d = self.descriptor
+        equation, _, path = self._owner(row)
+        return f"{equation} {path}".strip()
+
+    def _owner(self, row: int) -> tuple[str, str, str]:
+        """What the equation of a row is, what the unknown of its number is, and the path that both belong to."""
+        d, n_rate = self.descriptor, int(self.tables.counts[0])
+        at = row - n_rate - int(self.tables.counts[1])
         if row < n_rate:
-            state = next(s for s in d.states if s.rates.start <= row < s.rates.stop)
-            return f"the effort of storage {state.path}"
-        if row < n_rate + n_effort:
-            junction = next(j for j in d.junctions if j.efforts.start <= row - n_rate < j.efforts.stop)
-            return f"the balance of flows at junction {junction.path}"
-        at = row - n_rate - n_effort
+            path = next(s.path for s in d.states if s.rates.start <= row < s.rates.stop)
+            return "the effort of storage", "the rate of", str(path)
+        if at < 0:
+            path = next(j.path for j in d.junctions if j.efforts.start <= row - n_rate < j.efforts.stop)
+            return "the balance of flows at junction", "the effort at junction", str(path)
         for slot in d.components:
             if slot.multiplier <= at < slot.multiplier + slot.multipliers:
-                return f"the constraint of {slot.path}"
-        return "the prescribed effort of an outer port"
+                return "the constraint of", "a multiplier of", str(slot.path)
+        return "the prescribed effort of an outer port", "the prescribed effort of an outer port", ""
 
 
 def compile_model(
@@ -341,11 +335,6 @@ class Evaluation:
         self._sums[:] = 0.0
         self._calls["account"](t, self._z, h, self._inputs, m, self._sums)
         return self._sums.copy()
-
-    def measure(self, dropped: Index) -> float:
-        """The largest residual relative to its scale; omitted equations become the unknown itself."""
-        t, m = self._parts
-        return float(self._calls["measure"](t, self._z, dropped, m))
 
 
 def evaluate_at(model: Model, x: Array, z: Array, h: float) -> tuple[int, int, Memory]:

@@ -185,10 +185,14 @@ class TabulatedMotion(MotionLaw):
         return float(_splines(self.times, self.displacements)[0](min(max(t, self.times[0]), self.times[-1])))
 
     def rate(self, t: float) -> float:
-        return float(_splines(self.times, self.displacements)[1](t)) if self.times[0] < t < self.times[-1] else 0.0
+        return self._derivative(1, t)
 
     def acceleration(self, t: float) -> float:
-        return float(_splines(self.times, self.displacements)[2](t)) if self.times[0] < t < self.times[-1] else 0.0
+        return self._derivative(2, t)
+
+    def _derivative(self, order: int, t: float) -> float:
+        within = self.times[0] < t < self.times[-1]
+        return float(_splines(self.times, self.displacements)[order](t)) if within else 0.0
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:

@@ -129,6 +129,10 @@ class Linked(Protocol):
         """The motion of a joint."""
         ...
 
+    def velocity_error(self) -> Array:
+        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
+        ...
+
     def length_errors(self) -> Iterable[tuple[Path, int, float]]:
         """Lengths that states integrate: path, instant at which one is farthest from that of its points, difference as
         a part of the mechanism's length."""
@@ -144,10 +148,6 @@ class Outlined(Linked, Protocol):
 
     def outline(self) -> Any:
         """Bodies and joints as a scene, to be drawn."""
-        ...
-
-    def velocity_error(self) -> Array:
-        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
 
 
@@ -185,10 +185,6 @@ class MechanicalMotion(Linked, Protocol):
 
     def contact_poses(self) -> Iterable[tuple[Path, Path | None, Array]]:
         """States that follow from others up to rounding: path, a path before with the same rotation, place (n, 3)."""
-        ...
-
-    def velocity_error(self) -> Array:
-        """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
 
     def variables(self, *, wrenches: bool) -> "dict[str, DatasetVariable]":

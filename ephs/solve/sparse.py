@@ -134,13 +134,10 @@ def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array,
     """Powers of two that bring the largest entry of each row and column near one."""
     magnitude = np.abs(value)
     scale_r, scale_c = np.ones(n), np.ones(n)
-    for _ in range(2):
+    for scale, at in 2 * ((scale_r, row), (scale_c, column)):
         largest = np.zeros(n)
-        np.maximum.at(largest, row, magnitude * scale_r[row] * scale_c[column])
-        scale_r /= np.where(largest > 0.0, np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0)))), 1.0)
-        largest = np.zeros(n)
-        np.maximum.at(largest, column, magnitude * scale_r[row] * scale_c[column])
-        scale_c /= np.where(largest > 0.0, np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0)))), 1.0)
+        np.maximum.at(largest, at, magnitude * scale_r[row] * scale_c[column])
+        scale /= np.exp2(np.round(np.log2(np.where(largest > 0.0, largest, 1.0))))
     return scale_r, scale_c
 
 

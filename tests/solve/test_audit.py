@@ -23,7 +23,7 @@ from ephs.solve.control import Control, Tolerance
 from examples.failing import oscillator, pendulum
 
 BRAKE = "friction = 20.0"
-TIGHT = Bounds(LAWFUL, COARSE, LEAST, step=0.005)
+TIGHT = Bounds(0.0, 0.005, lawful=True)
 
 
 def brake(rate: float = 6.0) -> ephs.Scene:
@@ -134,7 +134,7 @@ def test_what_is_no_number_does_not_pass_and_can_be_written(sound):
 )
 def test_what_is_allowed_follows_from_method_and_steps(lawful, step, rtol, energy, accuracy):
     control = Control(Tolerance(rtol, {}), Tolerance(1e-9, {}), step, 0.0, np.inf, None)
-    bounds = Bounds.of(control, step, lawful=lawful)
+    bounds = Bounds(control.tolerance, step, lawful)
     assert (bounds.energy, bounds.accuracy, bounds.step) == (pytest.approx(energy), pytest.approx(accuracy), step)
 
 

@@ -17,18 +17,18 @@ from ephs.solve.model import compile_model
 START = {"osc.pe.q": 1.0}
 
 
-@given(st.floats(-10.0, 10.0), st.floats(1e-3, 20.0), st.floats(1e-3, 30.0))
-def test_the_grid_ends_on_until_and_its_steps_are_no_longer_than_the_step(t0, span, h):
-    grid = Grid(t0, t0 + span, h)
+@given(st.floats(1e-3, 20.0), st.floats(1e-3, 30.0))
+def test_the_grid_ends_on_until_and_its_steps_are_no_longer_than_the_step(span, h):
+    grid = Grid(span, h)
     assert grid.whole * h <= span * (1.0 + 1e-8)
     assert grid.last <= h * (1.0 + 1e-8)
-    assert grid.time(grid.whole) + grid.last == pytest.approx(t0 + span, rel=1e-8, abs=1e-8)
+    assert grid.whole * h + grid.last == pytest.approx(span, rel=1e-8)
 
 
 @pytest.mark.parametrize(("until", "h"), [(1.0, 0.0), (1.0, -1.0), (1.0, np.nan), (0.0, 0.1), (np.inf, 0.1)])
-def test_a_grid_that_is_none_is_refused(until, h):
+def test_a_grid_that_is_none_is_refused(until, h, damped):
     with pytest.raises(ValueError, match="expected"):
-        Grid(0.0, until, h)
+        ephs.simulate(damped, until, initial=START, step=h)
 
 
 def test_times_are_multiples_of_the_step_and_the_end(damped):
@@ -70,7 +70,7 @@ def test_a_step_is_pure_and_a_chunk_is_so_many_steps(damped):
     many, chunk = method.advance(start, 0.1, 3)
     single = method.step(method.step(once, 0.1), 0.1)
     assert np.array_equal(many.x, single.x)
-    assert np.array_equal(chunk.x[-1], many.x)
+    assert np.array_equal(chunk.rows.x[-1], many.x)
     assert np.array_equal(start.x, descriptor.pack(damped.state(START)))
 
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 import ephs
 from benchmarks import families
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.solve import instant
 from ephs.solve.mobility import mobility
 from ephs.testing import mechanisms
+from tests.solve.dense import dense_mobility
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted([*ROOT.glob("scenes/*.toml"), *ROOT.glob("benchmarks/scenes/*.toml")])
@@ -19,7 +19,7 @@ FILES = sorted([*ROOT.glob("scenes/*.toml"), *ROOT.glob("benchmarks/scenes/*.tom
 def both(scene):
     problem = problem_of_scene(scene)
     x = problem.descriptor.pack(problem.initial)
-    return tuple(count(problem.descriptor, x, problem.prescribed) for count in (mobility, instant.mobility))
+    return tuple(count(problem.descriptor, x, problem.prescribed) for count in (mobility, dense_mobility))
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

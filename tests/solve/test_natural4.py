@@ -130,4 +130,4 @@ def test_energy_is_kept_and_entropy_made_by_any_number_of_stages(stages):
         state, chunk = method.advance(start, h, 10)
         assert chunk.failure is None
         assert abs(method.energies(state.x).sum() - energy) <= 10 * 8 * 5 * np.finfo(float).eps * energy
-        assert chunk.ledgers[:, 4].min() > 0.0
+        assert chunk.rows.ledgers[:, 4].min() > 0.0

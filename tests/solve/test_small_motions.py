@@ -7,7 +7,7 @@ import pytest
 
 import ephs
 from ephs import Pattern, library
-from ephs.solve.auditing.audit import COARSE, LAWFUL, LEAST, Bounds, audit
+from ephs.solve.auditing.audit import Bounds, audit
 from examples.failing import scene, truss
 from tests.solve.test_audit import bent
 
@@ -123,5 +123,5 @@ def test_little_heat_that_is_lost_is_found(method, apart, law):
     ledgers = sol.ledgers
     part = 1e-6 * np.abs(np.diff(next(iter(ledgers.storages.values())))).sum() * np.linspace(0.0, 1.0, len(sol))
     changed = {"thermal": ledgers.thermal + part} if law == "energy" else {"made": ledgers.made + part / ROOM}
-    found = audit(bent(sol, **changed), Bounds(LAWFUL, COARSE, LEAST, step=0.1)).findings
+    found = audit(bent(sol, **changed), Bounds(0.0, 0.1, lawful=True)).findings
     assert law in [one.law for one in found]

@@ -18,6 +18,7 @@ from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.instant import rates_read
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Model, compile_model
@@ -254,7 +255,7 @@ class Pencil:
         return np.array(
             [
                 i for slot in d.components if isinstance(slot.primitive, Storage) and not slot.primitive.environment
-                for state in slot.reads for i in range(state.rates.start, state.rates.stop)
+                    for i in rates_read(slot)
             ],
             dtype=np.int64,
         )  # fmt: skip

@@ -22,6 +22,7 @@ from ephs.semantics.spaces.decompositions import least_squares, pseudoinverse, s
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
 from ephs.semantics.systems.system import System
 from ephs.solve.errors import OptionError, failing_at
+from ephs.solve.instant import rates_read
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Model
 from ephs.solve.problem import Problem
@@ -81,7 +82,7 @@ class LinearSystem:
         self.held = pencil.differentiated(p)
         still = [
             i for slot in d.components if isinstance(slot.primitive, Storage) and slot.primitive.environment
-            for state in slot.reads for i in range(state.rates.start, state.rates.stop)
+            for i in rates_read(slot)
         ]  # fmt: skip
         self.left_out = np.array(still, dtype=np.int64)
         self.which = pencil.independent(p, self.left_out)

@@ -174,7 +174,7 @@ class Auto(ReducedMethod):
             "explicit": self._explicit.taken(state),
             "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
             "nearness": [int(self._nearness[0].held), int(self._nearness[0].free), self._failures],
-            "contest": None if self._contest is None else self._contest.state(),
+            "contest": None if self._contest is None else self._contest.snapshot(),
             "active": self._active.name,
             "name": self.name,
         }

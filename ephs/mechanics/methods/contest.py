@@ -8,11 +8,12 @@ when earlier tries were a small part of the cost of the run; a cheaper method st
 """
 
 from collections.abc import Sequence
-from typing import Any, Final, final
+from typing import Final, final
 
 import numpy as np
 
 from ephs.semantics.spaces.rank import TINY
+from ephs.solve.snapshot import Resumable
 
 SETTLING: Final = 4
 """Steps, rejected ones included, in which a method finds the length of its steps, before a window."""
@@ -27,7 +28,7 @@ GAIN: Final = 0.9
 
 
 @final
-class Contest:
+class Contest(Resumable):
     """The methods of one run, by their numbers; the first one begins.
 
     Parameters
@@ -48,6 +49,11 @@ class Contest:
     tries
         Number of tries so far.
     """
+
+    changing = (
+        "home", "at", "tries", "prices",
+        "_awake", "_settling", "_spent", "_price", "_least", "_rates", "_tried", "_due",
+    )  # fmt: skip
 
     def __init__(self, prices: Sequence[float], change: float, wakes: float = np.inf) -> None:
         self._change, self._wakes = change, wakes
@@ -97,17 +103,6 @@ class Contest:
     def without(self, method: int) -> None:
         """Never try a method."""
         self.prices[method] = np.inf
-
-    def state(self) -> list[Any]:
-        """All that what follows depends on."""
-        flags = [self._awake, self._settling, self.home, self.at, self.tries]
-        return [*flags, self._spent, self._price, self._least, self.prices, self._rates, self._tried, self._due]
-
-    def restore(self, state: Sequence[Any]) -> None:
-        """Go on from a value of `state`."""
-        self._awake, self._settling, self.home, self.at, self.tries = state[:5]
-        self._spent, self._price, self._least, *rest = state[5:]
-        self.prices, self._rates, self._tried, self._due = (list(each) for each in rest)
 
     def _call(self, part: float) -> bool:
         """Try the other methods whose tries cost no more than a part of what was spent; whether there is one."""

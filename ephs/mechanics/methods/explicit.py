@@ -60,22 +60,15 @@ def tableau(method: str | Method, *, chosen: bool = True) -> Tableau:
     if isinstance(method, str):
         return _named(method)
     of = coefficients_of(method, chosen=chosen)
-    arrays = {"a": np.ascontiguousarray(of.extended[:, :-1]), "error": of.error, "coarse": np.zeros(of.error.size)}
-    return Tableau(method.name, of.order, arrays | _combined(False), of.a.sum(axis=1), float(of.power))
+    return Tableau(method.name, of.order, t.arrays(of.extended[:, :-1], of.error), of.a.sum(axis=1), float(of.power))
 
 
 @cache
 def _named(name: str) -> Tableau:
     if name == "rk87":
-        arrays = {"a": _steps(t.A8, t.B8), "error": np.array(t.E8_5), "coarse": np.array(t.E8_3)}
-        return Tableau(name, 8, arrays | _combined(True), np.array(t.C8), 8.0)
-    arrays = {"a": _steps(t.A5, t.B5), "error": np.array(t.E5), "coarse": np.zeros(len(t.B5) + 1)}
-    return Tableau(name, 5, arrays | _combined(False), np.array(t.C5), 5.0)
-
-
-def _combined(two: bool) -> dict[str, Any]:
-    """Whether a scheme has two estimates that are combined."""
-    return {"eighth": np.array([int(two)], dtype=np.int64)}
+        arrays = t.arrays(_steps(t.A8, t.B8), np.array(t.E8_5), np.array(t.E8_3))
+        return Tableau(name, 8, arrays, np.array(t.C8), 8.0)
+    return Tableau(name, 5, t.arrays(_steps(t.A5, t.B5), np.array(t.E5)), np.array(t.C5), 5.0)
 
 
 def _steps(rows: tuple[tuple[float, ...], ...], last: tuple[float, ...]) -> Array:
@@ -103,7 +96,6 @@ class Explicit(ReducedMethod):
         self.lagged = lagged
         self.method, self.name, self.exponent = method, method.name, method.exponent
         self.share, self._worth = (0.5, WORTH) if lagged is None else (0.0, WHOLE)
-        self._known: tuple[Array, Array] | None = None
         self._low: tuple[ReducedState, float, Array] | None = None
         compiled = STEPS.compiled()
         self._fine, self._coarse, self._allowed = np.zeros((3, self.atol.size))
@@ -136,9 +128,7 @@ class Explicit(ReducedMethod):
         y0, y1 = eq.vector(state), np.empty(eq.size)
         k = np.zeros((scheme["a"].shape[0], eq.size))
         if self.lagged is None:
-            if self._known is None or self._known[0] is not state.q:
-                self._known = state.q, eq.rates(state.t, state.q, y0)
-            k[0] = self._known[1]
+            k[0] = self.first(state, y0)
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
         y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=self.lagged is not None)

@@ -1,6 +1,5 @@
-"""The exact Jacobian of the reduced form, reused while it converges."""
+"""The exact Jacobian of the reduced form."""
 
-from dataclasses import replace
 from typing import Any, final
 
 import numpy as np
@@ -14,7 +13,6 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.kept import once
 from ephs.solve.march import Status
-from ephs.solve.snapshot import Snapshot, like, parts
 
 RELATIVE = 6e-6
 """Relative length of the central differences in place of tangents: the cube root of rounding."""
@@ -38,9 +36,7 @@ class Jacobian:
         self._counts["jacobians"] = 0
         self._slopes: RateSlopes | None = None
         self._linear: Linearised | None = None
-        self._at: ReducedState | None = None
         self.holding = equations.holding
-        self._value = np.zeros((self.size, self.size))
 
     @property
     def cost(self) -> int:
@@ -49,20 +45,14 @@ class Jacobian:
             return 0
         return (MADE + TANGENT * self._slopes.calls) * self._counts["jacobians"]
 
-    def fresh(self, state: ReducedState) -> bool:
-        """Whether the matrix was made at this state."""
-        return self._at is not None and self._at.q is state.q
-
-    def at(self, state: ReducedState, *, renew: bool = False) -> Array:
-        """The matrix (size, size), evaluated on request or if there is none.
+    def at(self, state: ReducedState) -> Array:
+        """The matrix (size, size) of a state.
 
         Raises
         ------
         SolveError
             A component cannot be evaluated there, or the mass matrix is singular.
         """
-        if self._at is not None and not renew:
-            return self._value
         self.holding = self.equations.holding
         value = self._by_tangents(state)
         if value is None:
@@ -70,7 +60,6 @@ class Jacobian:
         elif self.holding is not None:
             rates = slice(self.equations.nv, self.equations.nv + self.equations.n)
             value[rates] += self.holding.slopes(state, value[rates])
-        self._value, self._at = value, state
         self._counts["jacobians"] += 1
         return value
 
@@ -130,14 +119,3 @@ class Jacobian:
             rates = [eq.rates(state.t, state.q, moved).copy() for moved in ends]
             value[:, j] = (rates[0] - rates[1])[: self.size] / (ends[0][j] - ends[1][j])
         return value
-
-    def snapshot(self, state: ReducedState) -> Snapshot:
-        """State at which the matrix was made, and whether that is ``state``."""
-        return {"made": parts(self._at), "fresh": self.fresh(state)}
-
-    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
-        """Evaluate the matrix at its former state."""
-        self._at, found = None, snapshot["made"]
-        if found is not None:
-            made = like(state, found)
-            self.at(replace(made, q=state.q) if snapshot["fresh"] else made)

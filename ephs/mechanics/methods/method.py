@@ -57,6 +57,13 @@ class ReducedMethod(ABC):
         self.equations, self.control = equations, control
         self.rtol, self.atol = equations.allowed(control.rtol, control.atol)
         self.counts: dict[str, Any] = {}
+        self._known: tuple[Array, Array] | None = None
+
+    def first(self, state: ReducedState, y: Array) -> Array:
+        """The rates at a state with the vector y, evaluated once where steps from there are tried again."""
+        if self._known is None or self._known[0] is not state.q:
+            self._known = state.q, self.equations.rates(state.t, state.q, y)
+        return self._known[1]
 
     @abstractmethod
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:

@@ -14,6 +14,7 @@ from ephs.mechanics.methods.contest import Contest
 from ephs.mechanics.methods.marching import Leave, March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
+from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.control import Control
@@ -24,13 +25,8 @@ from ephs.solve.stepping import Attempt, Leg, Span
 
 def tableau(scheme: Collocation) -> Mapping[str, Any]:
     """A method as `ephs.solve.march.Tableau`: after the start, the stages; the last leads to the end."""
-    stages = scheme.nodes.size
-    return {
-        "a": np.pad(np.vstack([np.zeros(stages), scheme.coefficients, scheme.coefficients[-1]]), ((0, 0), (1, 0))),
-        "error": np.array([1.0, *(scheme.defect / scheme.gamma), 0.0]),
-        "coarse": np.zeros(stages + 2),
-        "eighth": np.zeros(1, dtype=np.int64),
-    }
+    stages = np.vstack([np.zeros(scheme.nodes.size), scheme.coefficients, scheme.coefficients[-1]])
+    return arrays(np.pad(stages, ((0, 0), (1, 0))), np.array([1.0, *(scheme.defect / scheme.gamma), 0.0]))
 
 
 @final
@@ -42,7 +38,6 @@ class Implicit(ReducedMethod):
     def __init__(self, equations: ReducedEquations, control: Control, counts: dict[str, Any] | None = None) -> None:
         super().__init__(equations, control)
         self.counts = self.counts if counts is None else counts
-        self._known: tuple[Array, Array] | None = None
         self.scheme = scheme_of(equations, control)
         self.exponent = self.scheme.nodes.size + 1.0
         self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
@@ -53,9 +48,7 @@ class Implicit(ReducedMethod):
         """One step of h seconds."""
         eq = self.equations
         y0 = eq.vector(state)
-        if self._known is None or self._known[0] is not state.q:
-            self._known = state.q, eq.rates(state.t, state.q, y0)
-        first = self._known[1]
+        first = self.first(state, y0)
         stages, passed, fast = self._stages.solve(state, y0, h)
         y1 = y0.copy()
         y1[: stages.shape[1]] += stages[-1]
@@ -79,11 +72,11 @@ class Implicit(ReducedMethod):
 
     def taken(self, state: ReducedState) -> Snapshot:
         """State at which the matrix was made, and the step for which it was factorised."""
-        return self._stages.snapshot(state)
+        return self._stages.kept.snapshot(state)
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        self._stages.restore(own, state)
+        self._stages.kept.restore(own, state)
 
     def _closed(
         self, state: ReducedState, end: ReducedState, y0: Array, y1: Array, first: Array, stages: Array, h: float
@@ -91,17 +84,17 @@ class Implicit(ReducedMethod):
         """The end with its loops closed, and the difference to the embedded method, filtered by the equations as its
         stiff part must be, relative to what is allowed."""
         eq, size, heat = self.equations, stages.shape[1], self._stages.heat
-        real = self._stages.solvers(state, h)[0]
-        rough = self._embedded @ stages / h
+        real, rough = self._stages.kept.solvers(h)[0], self._embedded @ stages / h
         allowed = self._stages.allowed(y0, y1)
-        found = real(first[:size] + rough)
-        closed = eq.closed(end)
-        error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
+
+        def estimated(rates: Array) -> tuple[Array, ReducedState, float]:
+            found, closed = real(rates[:size] + rough), eq.closed(end)
+            return found, closed, float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
+
+        found, closed, error = estimated(first)
         if error > 1.0:  # again from the corrected state: the first estimate is far too large for stiff parts
             moved = y0.copy()
             moved[:size] += found
             moved[heat] = np.maximum(moved[heat], eq.heats.coldest(y0[heat]))
-            found = real(eq.rates(state.t, state.q, moved)[:size] + rough)
-            closed = eq.closed(end)
-            error = float(np.max(np.abs(eq.along(found[eq.counted])) / allowed, initial=0.0))
+            _, closed, error = estimated(eq.rates(state.t, state.q, moved))
         return closed, error

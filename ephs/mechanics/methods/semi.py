@@ -11,6 +11,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from ephs.mechanics.methods.explicit import Explicit, Tableau
+from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.engine.drags import chains, frictions, memory_of
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.links import links_of
@@ -37,16 +38,14 @@ those of a tumbling body to some thousand tolerances."""
 ALPHA: Final = (9.0 - 57.0**0.5) / 6.0
 """Diagonal of the implicit coefficients, which makes them L-stable."""
 _LAST = 1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0
-ARRAYS: Final[Mapping[str, Any]] = {
+ARRAYS: Final = arrays(
     # After a first stage without weight that is never evaluated; the first two have the state of the step's start.
-    "a": np.array([
+    np.array([
         [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0],
         [0.0, 0.0, 0.25, 0.25, 0.0], [0.0, 0.0, *_LAST],
     ]),
-    "error": np.array([0.0, 0.0, _LAST[0] - 0.5, _LAST[1] - 0.5, _LAST[2], 0.0]),
-    "coarse": np.zeros(6),
-    "eighth": np.zeros(1, dtype=np.int64),
-}  # fmt: skip
+    np.array([0.0, 0.0, _LAST[0] - 0.5, _LAST[1] - 0.5, _LAST[2], 0.0]),
+)  # fmt: skip
 """The explicit coefficients as `ephs.solve.march.Tableau`; the estimate is by weights of order 2, (0, ½, ½, 0)."""
 SCHEME: Final = np.array([
     [0.0, 0.0, 0.0, 0.0, 0.0],

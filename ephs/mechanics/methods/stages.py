@@ -18,8 +18,8 @@ from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
 from ephs.solve.march.iteration import iterate
 from ephs.solve.methods.collocation import Collocation, radau_for
+from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.solvers import Solver, dense
-from ephs.solve.snapshot import Snapshot
 
 SOLVED = 1e-13
 """Attainable relative accuracy of a step's equations: rounding, times a condition of some hundreds."""
@@ -88,12 +88,12 @@ class Stages:
         else:  # to rounding, and near changes of rank as far as it converges
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
-        self._solvers: tuple[float, list[Solver]] | None = None
-        # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
-        self._separation, self._stale = equations.separation(), False
         self.counts = counts
         counts |= {"iterations": 0, "factorisations": 0}
         self.jacobian = Jacobian(equations, counts)
+        # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
+        self._separation = equations.separation()
+        self.kept: KeptMatrices[ReducedState, Array] = KeptMatrices(scheme, self._made, self._solver, counts)
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
 
     def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
@@ -104,49 +104,16 @@ class Stages:
         SolveError
             The iteration does not converge, or a component cannot be evaluated.
         """
-        if self._stale or self.jacobian.holding is not self.equations.holding:
-            self._renew(state)
-        try:
-            return self._solve(state, y0, h)
-        except SolveError:
-            if self.jacobian.fresh(state):
-                raise
-            self._renew(state)
-            return self._solve(state, y0, h)
+        self.kept.stale = self.kept.stale or self.jacobian.holding is not self.equations.holding
+        return self.kept.solved(state, lambda: self._solve(state, y0, h))
 
     def keep(self, *, fast: bool) -> None:
         """Renew the matrix at the next step's start, if convergence was slow or constraints have rotated."""
-        self._stale = not fast or self._turned()
-
-    def solvers(self, state: ReducedState, h: float) -> list[Solver]:
-        """Solvers with 1/(h μ) − J for the eigenvalues μ of the coefficients, the real one first."""
-        if self._solvers is None or self._solvers[0] != h:
-            matrix, unit = self.jacobian.at(state), np.eye(self.jacobian.size)
-            real, *pairs = self.scheme.values
-            self._solvers = h, [dense(unit / (h * mu) - matrix, _singular) for mu in (real.real, *pairs)]
-            self.counts["factorisations"] += 1
-        return self._solvers[1]
+        self.kept.stale = not fast or self._turned()
 
     def allowed(self, y0: Array, y1: Array) -> Array:
         """Error allowances of a step, for the counted components."""
         return self.atol + self.rtol * self.equations.sizes(y0, y1)
-
-    def snapshot(self, state: ReducedState) -> Snapshot:
-        """State at which the matrix was made, and the step for which it was factorised."""
-        return {
-            "jacobian": self.jacobian.snapshot(state),
-            "separation": self._separation,
-            "step": self._solvers[0] if self._solvers is not None else None,
-            "stale": self._stale,
-        }
-
-    def restore(self, snapshot: Snapshot, state: ReducedState) -> None:
-        """Go on from a snapshot."""
-        self.jacobian.restore(snapshot["jacobian"], state)
-        self._separation, self._stale = snapshot["separation"], snapshot["stale"]
-        self._solvers = None
-        if snapshot["step"] is not None:
-            self.solvers(state, snapshot["step"])
 
     def _turned(self) -> bool:
         """Whether the constraints' distance from dependence has changed since the matrix was made."""
@@ -155,14 +122,14 @@ class Stages:
             return True
         return bool(np.any(np.abs(np.log2(found / self._separation)) > 1.0))
 
-    def _renew(self, state: ReducedState) -> None:
-        self.jacobian.at(state, renew=True)
-        self._separation, self._stale = self.equations.separation(), False
-        self._solvers = None
+    def _made(self, state: ReducedState) -> Array:
+        """The Jacobian at a state, with what its constraints are apart by."""
+        value, self._separation = self.jacobian.at(state), self.equations.separation()
+        return value
 
-    def _change(self, state: ReducedState, h: float, defect: Array) -> Array:
-        """(stages, size) Newton corrections of the stages' increments."""
-        return self.scheme.solved(defect, self.solvers(state, h))
+    def _solver(self, matrix: Array, length: complex) -> Solver:
+        """Solver with 1/(h μ) − J for the eigenvalue μ of the coefficients."""
+        return dense(np.eye(len(matrix)) / length - matrix, _singular)
 
     def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
         eq, size, count = self.equations, self.jacobian.size, self.scheme.nodes.size
@@ -177,7 +144,8 @@ class Stages:
                 y[self.heat] = np.maximum(y[self.heat], coldest)
                 rates[i] = eq.rates(state.t + node * h, state.q, y)
             self.counts["iterations"] += 1
-            change = self._change(state, h, rates[:, :size] - self.inverse @ stages / h)
+            defect = rates[:, :size] - self.inverse @ stages / h
+            change = self.scheme.solved(defect, self.kept.solvers(h))
             reached = np.abs(y0)  # states that start from zero, such as heat, are scaled by their end values
             reached[:size] += np.abs(stages + change).max(axis=0)
             worst[:] = np.max(np.abs(change[:, eq.counted]) / self.allowed(y0, reached), axis=0, initial=0.0)
@@ -229,7 +197,7 @@ class KeptJacobian:
         SolveError
             A component cannot be evaluated there, or the mass matrix is singular.
         """
-        found, f = self._stages.jacobian.at(state, renew=True), self._stages.equations.n
+        found, f = self._stages.kept.renew(state), self._stages.equations.n
         by_rates, by_places, by_heats = found[f : 2 * f, f : 2 * f], found[:f, :f], found[f:, 2 * f :]
         self.memory["matrix"][:] = found
         self.memory["damping"][:] = by_rates + by_places

@@ -5,6 +5,13 @@ Source: J. R. Dormand and P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19-26; E
 same numbers, against which they are tested; loading it takes longer than most runs.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ephs.semantics.bundles.bundle import Array
+
 # fmt: off
 
 A5 = (
@@ -67,3 +74,14 @@ E8_3 = (
     -0.4226823213237919, -0.1521609496625161, 0.20136540080403034, 0.02265179219836082, 0.0,
 )
 """And of order 3."""
+# fmt: on
+
+
+def arrays(a: Array, error: Array, coarse: Array | None = None) -> Mapping[str, Any]:
+    """A method by the names of `ephs.solve.march.TableauRecord`; with a second estimate, where both are combined."""
+    return {
+        "a": np.ascontiguousarray(a),
+        "error": error,
+        "coarse": np.zeros(error.size) if coarse is None else coarse,
+        "eighth": np.array([int(coarse is not None)], dtype=np.int64),
+    }

@@ -180,8 +180,8 @@ def simulate(
     course = Course(problem, chosen_method, start / unit, end / unit, control, own)
     repeatable = not (held or any(each.stateful for each in functions))
     again = course.again(breakpoints) if repeatable else None
-    bounds = Bounds.of(
-        control,
+    bounds = Bounds(
+        control.tolerance,
         step,
         lawful=chosen_method.lawful,
         undamped=chosen_method.undamped,

@@ -166,7 +166,7 @@ class _Runs:
             self._parts.append((array, stacks[number].reshape(most, -1), within, among))
         stepper = ensemble.stepper(eq)
         control, times, step = stepper.control, ensemble.times, stepper.control.step
-        self._bounds = Bounds.of(control, step, lawful=False)
+        self._bounds = Bounds(control.tolerance, step)
         self._legs = [partial(self._leg, control, times, ensemble.first)]
         if step is not None:
             self._legs.append(partial(self._leg, replace(control, step=LONGER * step), np.zeros(0), 0))

@@ -20,7 +20,6 @@ from ephs.solve.auditing.resolution import STILL, StepError, Trials
 from ephs.solve.auditing.retaken import Missed
 from ephs.solve.auditing.rounding import exchanged, isolated, rounded, trembling
 from ephs.solve.breakpoints import MOST_FOUND
-from ephs.solve.control import Control
 from ephs.solve.errors import Other, or_take, serves_not
 from ephs.solve.methods.natural import Natural
 from ephs.solve.model import Model
@@ -53,14 +52,12 @@ class Bounds:
 
     Parameters
     ----------
-    energy
-        Of the gross energies.
-    accuracy
-        Of what moves: the estimated error.
-    ledger
-        Of what is booked.
+    tolerance
+        That chosen steps are held to.
     step
         The length of constant steps in s; None where they are chosen.
+    lawful
+        Whether every step of the method keeps the balance.
     undamped
         Makes the natural method that estimates the error of constant steps, of a method that damps nothing at
         infinity; None of others, which do so by steps of their own.
@@ -68,56 +65,40 @@ class Bounds:
         With which power of the step the method's error falls.
     again
         Further runs of the same problem; None where its inputs cannot be given again.
-    tolerance
-        That chosen steps are held to.
-    retaken
-        Whether some chosen steps are taken again.
+    repeatable
+        Whether inputs may be asked again: then some chosen steps are retaken.
     serves
         Whether a method by its name is another one than that of the run, and accepts the problem.
     """
 
-    energy: float
-    accuracy: float
-    ledger: float
+    tolerance: float
     step: float | None = None
+    lawful: bool = False
     undamped: Callable[[Model], Natural] | None = None
     order: int = 1
     again: Again | None = None
-    tolerance: float = 0.0
-    retaken: bool = False
+    repeatable: bool = False
     serves: Callable[[str], bool] = serves_not
 
-    @classmethod
-    def of(
-        cls,
-        control: Control,
-        step: float | None,
-        *,
-        lawful: bool,
-        undamped: Callable[[Model], Natural] | None = None,
-        order: int = 1,
-        again: Again | None = None,
-        repeatable: bool = False,
-        serves: Callable[[str], bool] = serves_not,
-    ) -> "Bounds":
-        """Limits for a run with these tolerances, and constant steps in s if any.
+    @property
+    def energy(self) -> float:
+        """Of the gross energies."""
+        return LAWFUL if self.lawful else self.accuracy
 
-        Parameters
-        ----------
-        lawful
-            Whether every step of the method keeps the balance.
-        undamped, order, again, serves
-            See `Bounds`.
-        repeatable
-            Whether inputs may be asked again.
-        """
-        rtol, atol = (max(given.value, *given.special.values(), 0.0) for given in (control.rtol, control.atol))
-        tolerance = rtol or atol
-        chosen = max(MANY_TIMES * tolerance, LEAST)
-        error = chosen if step is None else COARSE
-        retaken = step is None and repeatable
-        energy = LAWFUL if lawful else error
-        return cls(energy, error, chosen, step, undamped, order, again, tolerance, retaken, serves)
+    @property
+    def accuracy(self) -> float:
+        """Of what moves: the estimated error."""
+        return self.ledger if self.step is None else COARSE
+
+    @property
+    def ledger(self) -> float:
+        """Of what is booked."""
+        return max(MANY_TIMES * self.tolerance, LEAST)
+
+    @property
+    def retaken(self) -> bool:
+        """Whether some chosen steps are taken again."""
+        return self.step is None and self.repeatable
 
 
 @final
@@ -384,7 +365,7 @@ def audit(solution: "Solution", bounds: Bounds, trials: Tests | None = None) -> 
     if not len(solution):
         return Audit()
     if "plain_defect" in solution.stats:  # steps are corrected: the balance is kept up to the defect
-        bounds = replace(bounds, energy=LAWFUL)
+        bounds = replace(bounds, lawful=True)
     found: list[Finding] = []
     with np.errstate(all="ignore"):
         for name, law in LAWS.items():

@@ -11,7 +11,7 @@ from typing import Any, final
 
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.findings import CostWarning
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.snapshot import Resumable
 
 FIRST = 32
 """Number of steps before the first forecast, which uses the later half; doubled for each further forecast."""
@@ -27,7 +27,7 @@ LOW = 4
 
 
 @final
-class Forecast:
+class Forecast(Resumable):
     """Watches the steps of one run by an implicit method of a low order; others are as fast as there are.
 
     Parameters
@@ -44,6 +44,8 @@ class Forecast:
     long
         What was forecast of a long run: steps, iterations, and after how many steps; empty of others.
     """
+
+    changing = "long", "_next", "_from", "_middle"
 
     def __init__(self, name: str, order: int, until: float, serves: Callable[[str], bool]) -> None:
         self.long: dict[str, int] = {}
@@ -79,15 +81,6 @@ class Forecast:
     def stats(self) -> dict[str, Any]:
         """Statistics of a run with a forecast of a long duration."""
         return {"forecast": self.long} if self.long else {}
-
-    def snapshot(self) -> Snapshot:
-        """Snapshot for `restore`."""
-        return {"long": self.long, "next": self._next, "from": self._from, "middle": self._middle}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot."""
-        self.long, self._next = dict(snapshot["long"]), snapshot["next"]
-        self._from, self._middle = snapshot["from"], snapshot["middle"]
 
 
 def _steps(rest: float, before: float, last: float, steps: int) -> float:

@@ -244,7 +244,7 @@ def _after(problem: Problem, method: Natural, x: Array, t: float, h: float, coun
         state, chunk = advance_driven(problem, method, state, t + k * h / count, h / count)
         if chunk.failure is not None:
             raise chunk.failure
-        energies = chunk.energies[-1]
+        energies = chunk.rows.energies[-1]
     return state.x, energies
 
 

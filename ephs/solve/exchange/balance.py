@@ -15,14 +15,14 @@ bonds in co-simulations (2017), whose corrections are of what units take.
 
 from typing import Final, final
 
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.snapshot import Resumable
 
 PART: Final = 0.2
 """δ as a part of the largest X: a correction is at most D/(2δ)."""
 
 
 @final
-class PortBalance:
+class PortBalance(Resumable):
     """Balance of one power port along a run.
 
     Parameters
@@ -39,6 +39,8 @@ class PortBalance:
     debt
         In J, made so far less what was given back.
     """
+
+    changing = "g", "u", "a", "y", "X", "largest", "debt"
 
     def __init__(self, taken: float, given: float, kept: bool) -> None:
         self._taken, self._given, self._kept = taken, given, kept
@@ -72,15 +74,3 @@ class PortBalance:
             self.g -= self.debt * ahead / (ahead * ahead + (PART * self.largest) ** 2)
         self.y, self.X = y, X
         return made
-
-    def snapshot(self) -> Snapshot:
-        """Snapshot for `restore`."""
-        return {name: getattr(self, name) for name in _CHANGING}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot."""
-        for name in _CHANGING:
-            setattr(self, name, snapshot[name])
-
-
-_CHANGING: Final = ("g", "u", "a", "y", "X", "largest", "debt")

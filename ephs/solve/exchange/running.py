@@ -43,14 +43,15 @@ class Running:
         made.append(self._slave)
 
     def _instantiate(self) -> None:
-        told = self._told
+        told = self._told  # a reference to the unit would keep it alive
+
+        def logged(*given: Any) -> None:  # the message is the last of four by FMI 3, of five by FMI 2
+            told.append((given[-1] or b"").decode("utf-8", "replace"))
+
         if self._three:
             from fmpy.fmi3 import fmi3LogMessageCallback
 
-            def log_message(_environment: Any, _status: int, _category: bytes, message: bytes | None) -> None:
-                told.append((message or b"").decode("utf-8", "replace"))
-
-            self._slave.instantiate(logMessage=fmi3LogMessageCallback(log_message))
+            self._slave.instantiate(logMessage=fmi3LogMessageCallback(logged))
         else:
             from fmpy import calloc, free
             from fmpy.fmi2 import (
@@ -59,9 +60,6 @@ class Running:
                 fmi2CallbackFunctions,
                 fmi2CallbackLoggerTYPE,
             )
-
-            def logged(_environment: Any, _name: bytes, _status: int, _category: bytes, message: bytes | None) -> None:
-                told.append((message or b"").decode("utf-8", "replace"))
 
             callbacks = fmi2CallbackFunctions()
             callbacks.logger = fmi2CallbackLoggerTYPE(logged)

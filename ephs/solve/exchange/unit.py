@@ -12,6 +12,8 @@ from ephs.solve.exchange.errors import ExchangeError
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd")
 """Base units by their names in model descriptions; radians count as numbers."""
+LISTED = 12
+"""Names that a message lists at most."""
 
 
 @final
@@ -114,12 +116,15 @@ class Unit:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the input signals."""
-        return tuple(name for name, each in self.variables.items() if each.causality == "input" and each.real)
+        return self._signals("input")
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the output signals."""
-        return tuple(name for name, each in self.variables.items() if each.causality == "output" and each.real)
+        return self._signals("output")
+
+    def _signals(self, causality: str) -> tuple[str, ...]:
+        return tuple(name for name, each in self.variables.items() if each.causality == causality and each.real)
 
     @property
     def keeps_state(self) -> bool:
@@ -255,6 +260,6 @@ def _told(variable: UnitVariable) -> str:
     return f"{variable.name} in {variable.measure.name if variable.measure else 'no unit'}"
 
 
-def _listed(names: Iterable[str], most: int = 12) -> str:
+def _listed(names: Iterable[str]) -> str:
     names = list(names)
-    return ", ".join(names[:most]) + (f" … ({len(names)} in all)" if len(names) > most else "") or "none"
+    return ", ".join(names[:LISTED]) + (f" … ({len(names)} in all)" if len(names) > LISTED else "") or "none"

@@ -1,7 +1,8 @@
-"""Rates at the stages of a step, and the states at which they are evaluated."""
+"""Rates at the stages of a step, the states at which they are evaluated, and what errors there may be."""
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
+from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import MarchControl, Motion
 
 
@@ -34,3 +35,13 @@ def combine(on: Evaluator, weights: Vector, count: Integer, h: Real, k: Matrix, 
         on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(y.size, entry))
 
     on.loop(count, add)
+
+
+def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vector) -> None:
+    """Write what errors of a step from ``start`` to ``end`` may be, atol + rtol · size, to ``allowed``."""
+    motion.sizes(on, start, end, errors.allowed)
+
+    def each_entry(j: Integer) -> None:
+        errors.allowed[j] = errors.atol[j] + errors.rtol[j] * errors.allowed[j]
+
+    on.loop(motion.counted, each_entry)

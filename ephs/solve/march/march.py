@@ -4,15 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
 from ephs.solve.march.account import WHOLE, WORTH, RunAccount, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
+from ephs.solve.march.evaluating import allow
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
 from ephs.solve.march.records import Ending, MarchControl, Motion, Status, TableauRecord
-from ephs.solve.march.steps import allow, attempt, book, drift, error_of, first, stiffness_of
+from ephs.solve.march.steps import attempt, book, drift, error_of, first, stiffness_of
 from ephs.solve.march.stiff import Stiff
 
 GOING = -1
@@ -325,10 +326,7 @@ class _TrialStep:
         copy(on, m.q1, m.q)
         copy(on, m.carry1, m.carry)
 
-        def clear(j: Integer) -> None:
-            m.y[j] = 0.0
-
-        on.loop(nv, clear)
+        clear(on, m.y.part(0, nv))
         copy(on, m.y1.part(nv, size - nv), m.y.part(nv, size - nv))
         c.rough = 0
         c.fresh = 0 if motion.closes else 1

@@ -8,7 +8,7 @@ from typing import final
 
 from ephs.semantics.linear.dense import clear, copy, dot
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
-from ephs.solve.march.evaluating import evaluate, place
+from ephs.solve.march.evaluating import allow, evaluate, place
 from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import MarchControl, Motion, Status, TableauRecord
@@ -19,7 +19,6 @@ from ephs.solve.march.stiff import Solver, Stiff, whole
 def newton(
     on: Evaluator,
     motion: Motion,
-    tableau: TableauRecord,
     control: MarchControl,
     base: Vector,
     start: Vector,
@@ -197,12 +196,7 @@ class _NewtonParts:
             on.loop(s.stages.rows, stage)
 
         on.loop(s.matrix.rows, reach)
-        self.motion.sizes(on, self.start, y, errors.allowed)
-
-        def allow(j: Integer) -> None:
-            errors.allowed[j] = errors.atol[j] + errors.rtol[j] * errors.allowed[j]
-
-        on.loop(self.motion.counted, allow)
+        allow(on, self.motion, errors, self.start, y)
         on.loop(self.motion.counted, compare)
         return worst.value
 

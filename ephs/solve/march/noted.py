@@ -5,12 +5,14 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.snapshot import Resumable
 
 
 @final
-class Noted:
+class Noted(Resumable):
     """The largest sum in J of what corrections put in, its time in s, and the sum of sizes."""
+
+    changing = "_largest", "_at", "_total"
 
     def __init__(self) -> None:
         self._largest = self._at = self._total = 0.0
@@ -24,14 +26,6 @@ class Noted:
         self._total = float(put[-1, 1])
         if sizes[worst] > self._largest:
             self._largest, self._at = float(sizes[worst]), float(times[worst])
-
-    def snapshot(self) -> Snapshot:
-        """Notes of the run, for a journal."""
-        return {"largest": self._largest, "at": self._at, "total": self._total}
-
-    def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot."""
-        self._largest, self._at, self._total = (snapshot[name] for name in ("largest", "at", "total"))
 
     def stats(self) -> dict[str, Any]:
         """Statistics of corrected steps: by how much the balance would be missed without corrections."""

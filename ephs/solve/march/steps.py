@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import (
     Entry,
@@ -18,7 +18,7 @@ from ephs.semantics.stage import (
     staged,
 )
 from ephs.solve.march.control import judge
-from ephs.solve.march.evaluating import combine, evaluate, place
+from ephs.solve.march.evaluating import allow, combine, evaluate, place
 from ephs.solve.march.lagged import Lagged, lag
 from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
@@ -85,7 +85,7 @@ def attempt(
         on.when(on.same(count, 1), lambda: copy(on, start, last))
     elif errors is not None:
         allow(on, motion, errors, start, start)
-        status.value = newton(on, motion, tableau, control, base, start, h, k, errors, stiff, y, q)
+        status.value = newton(on, motion, control, base, start, h, k, errors, stiff, y, q)
         copy(on, y, last)
         stage.value = count
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(once))
@@ -144,10 +144,7 @@ def book(
         motion.hold(on, totals.change, totals.whole, totals.whole)
         absorb()
         copy(on, totals.change, totals.whole)
-        on.loop(totals.low.size, clear)
-
-    def clear(j: Integer) -> None:
-        totals.low[j] = 0.0
+        clear(on, totals.low)
 
     def grow(j: Integer) -> None:
         totals.end[at + j], totals.after[j] = grown(totals.start[at + j], totals.before[j], totals.change[j])
@@ -159,21 +156,8 @@ def book(
     return status
 
 
-def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vector) -> None:
-    """Write what errors of a step from ``start`` to ``end`` may be, atol + rtol · size, to ``allowed``."""
-    motion.sizes(on, start, end, errors.allowed)
-
-    def each_entry(j: Integer) -> None:
-        errors.allowed[j] = errors.atol[j] + errors.rtol[j] * errors.allowed[j]
-
-    on.loop(motion.counted, each_entry)
-
-
 def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:
     """h Σ weights·k of the counted coordinates, without components transverse to the constraints."""
-
-    def clear(j: Integer) -> None:
-        out[j] = 0.0
 
     def add(s: Integer) -> None:
         weight = h * weights[s]
@@ -183,7 +167,7 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
 
         on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(out.size, entry))
 
-    on.loop(out.size, clear)
+    clear(on, out)
     on.loop(k.rows, add)
     if motion.closes:
         n = motion.freedoms

@@ -31,10 +31,8 @@ class ConductionMatrix:
 
     def __init__(self, model: Model, stores: HeatStores) -> None:
         t, n = model.tables, model.descriptor.numbering
-        store = np.full(int(t.counts[1]), -1)
-        store[stores.efforts] = np.arange(stores.efforts.size)
-        offset = np.full(stores.efforts.size, model.reference.temperature)
-        slope = np.zeros(stores.efforts.size)
+        offset = np.full(stores.states.size, model.reference.temperature)
+        slope = np.zeros(stores.states.size)
         offset[stores.hot], slope[stores.hot] = stores.c1 / stores.c2, 1.0 / stores.c2
         processes = np.flatnonzero(t.kind == IRREVERSIBLE) if stores.warm.size else np.zeros(0, dtype=np.int64)
         order = processes[np.argsort(n.primitive[processes], kind="stable")]
@@ -44,7 +42,7 @@ class ConductionMatrix:
             if k is None:
                 continue
             ports = t.e_at[these][:, None] + np.arange(len(k))
-            at = store[t.e_index[ports]]
+            at = stores.at[t.e_index[ports]]
             among = (at >= 0).all(axis=1)
             at = at[among]
             entries = -k * slope[at][:, None, :]  # (components, port, by the store at each port)

@@ -10,6 +10,7 @@ from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.model import Model, evaluate_at
 from ephs.solve.problem import NO_STATE, Problem, State
+from ephs.solve.result.record import joined
 
 ROUNDED_INPUTS = 1e-13
 """Part of inputs that read the state by which they may change once more: rounding, times a condition of hundreds."""
@@ -45,21 +46,16 @@ def advance_whole(
                 chunks[-1] = replace(chunk, failure=failure.of_iteration())
         if parts.failure is not None:
             break
-        ledgers = parts.ledgers[-1:].copy()
-        ledgers[0, 4] = parts.ledgers[:, 4].min()
+        last = parts.rows[-1:]
+        last.ledgers[0, 4] = parts.rows.ledgers[:, 4].min()
         chunks[-1] = replace(chunk, failure=None)
-        chunks.append(Chunk(parts.x[-1:], parts.energies[-1:], ledgers, parts.iterations, None, 1))
+        chunks.append(Chunk(last, parts.iterations, None, 1))
         state, steps = after, steps - 1
-    if len(chunks) == 1:
-        return state, chunks[0]
-    return state, Chunk(
-        np.concatenate([chunk.x for chunk in chunks]),
-        np.concatenate([chunk.energies for chunk in chunks]),
-        np.concatenate([chunk.ledgers for chunk in chunks]),
-        sum(chunk.iterations for chunk in chunks),
-        chunks[-1].failure,
-        sum(chunk.cut for chunk in chunks),
-    )
+    rows = joined([chunk.rows for chunk in chunks])
+    assert rows is not None
+    rows = replace(rows, t=h * np.arange(1.0, rows.t.size + 1.0))
+    iterations, cut = sum(chunk.iterations for chunk in chunks), sum(chunk.cut for chunk in chunks)
+    return state, Chunk(rows, iterations, chunks[-1].failure, cut)
 
 
 def _leaves(model: Model, x: Array, z: Array, h: float) -> bool:
@@ -73,16 +69,12 @@ def _leaves(model: Model, x: Array, z: Array, h: float) -> bool:
 
 def _finite(model: Model, chunk: Chunk) -> Chunk:
     """The chunk up to the first step whose states are beyond the range of numbers, and that as its failure."""
-    sound = np.abs(chunk.x).max(axis=1, initial=0.0) < LARGEST
+    sound = np.abs(chunk.rows.x).max(axis=1, initial=0.0) < LARGEST
     if sound.all():
         return chunk
     first = int(np.argmin(sound))
-    entry = int(np.argmin(np.abs(chunk.x[first]) < LARGEST))
-    state = next(s for s in model.descriptor.states if s.point.start <= entry < s.point.stop)
-    failure = SolveError(Outcome.RANGE, str(state.path), "")
-    return replace(
-        chunk, x=chunk.x[:first], energies=chunk.energies[:first], ledgers=chunk.ledgers[:first], failure=failure
-    )
+    path = model.state_path(int(np.argmin(np.abs(chunk.rows.x[first]) < LARGEST)))
+    return replace(chunk, rows=chunk.rows[:first], failure=SolveError(Outcome.RANGE, path, ""))
 
 
 def advance_driven(

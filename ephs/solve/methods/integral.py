@@ -15,7 +15,6 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -38,7 +37,9 @@ from ephs.solve.methods.records import (
     Columns,
     OuterPort,
     Scratch,
+    efforts_of,
     parts_of,
+    rates_of,
     row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, called, evaluation_program
@@ -194,7 +195,7 @@ class Integral:
         self._effort, self._owner = np.zeros((2, self.unknowns), dtype=np.int64)
         self._effort[place[owned]] = self.unknowns + np.flatnonzero(owned)
         stored = np.flatnonzero(t.kind == STORING)
-        self._owner[t.read_w[spans(t.read_w_at[stored], t.dims[stored, 2])]] = np.repeat(stored, t.dims[stored, 2])
+        self._owner[rates_of(t, stored)] = np.repeat(stored, t.dims[stored, 2])
         kinds = t.kind == STORING
         self._calls = [np.flatnonzero(kept & ~constant & chosen) for chosen in (kinds, ~kinds)]
         resting = replace(t, address=model.resting(np.concatenate(self._calls)))
@@ -211,8 +212,8 @@ class Integral:
         t = model.tables
         place, owners = np.full(int(t.counts[1]), -1), np.zeros(int(t.counts[1]), dtype=np.int64)
         stored = np.flatnonzero(t.kind == STORING)
-        efforts = t.e_index[spans(t.e_at[stored], t.dims[stored, 0])]
-        place[efforts] = t.read_w[spans(t.read_w_at[stored], t.dims[stored, 2])]
+        efforts = efforts_of(t, stored)
+        place[efforts] = rates_of(t, stored)
         np.add.at(owners, efforts, 1)
         for at, dim, prescribed, _ in t.outer:
             owners[at : at + dim] += prescribed

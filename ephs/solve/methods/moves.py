@@ -6,7 +6,7 @@ from ephs.semantics.stage import Evaluator, Integer, Real, Vector, staged
 from ephs.solve.methods.records import Columns, StateRecord, row_of
 
 
-def tighten(on: Evaluator, q: Vector) -> None:
+def tighten(q: Vector) -> None:
     """Bring a quaternion that is off by rounding back to unit length."""
     entries = [q[i] for i in range(4)]
     a, b, c, d = entries
@@ -56,6 +56,6 @@ def move_states(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v:
         on.loop(row.dim, increment)
         retract(on, row.code, point, somewhere(on, v).part(0, row.dim), point)
         flat = on.either(on.same(row.code, codes.VECTOR), on.same(row.code, codes.SE2))
-        on.when(on.negate(flat), lambda: tighten(on, point))
+        on.when(on.negate(flat), lambda: tighten(point))
 
     on.loop(t.states.size // StateRecord.integer_width, state)

@@ -28,7 +28,7 @@ from ephs.solve.methods.analysis import (
     entries_at,
     null_unknown,
 )
-from ephs.solve.methods.blame import Blame
+from ephs.solve.methods.blame import contradicted, diverged
 from ephs.solve.methods.collocation import moments
 from ephs.solve.methods.guesses import BEFORE
 from ephs.solve.methods.newton import natural_program
@@ -38,6 +38,7 @@ from ephs.solve.methods.scheme import gauss
 from ephs.solve.methods.spread import closing_of, groups_of, memory_of
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.model import Model
+from ephs.solve.result.record import RunRecord
 from ephs.solve.snapshot import Snapshot, parts
 from ephs.solve.sparse import Index, order
 
@@ -76,19 +77,13 @@ class Chunk:
 
     Parameters
     ----------
-    x
-        (steps, point_size).
-    energies
-        (steps, components): energy of each storage in J, entropy made so far by each irreversible component in J/K.
-    ledgers
-        (steps, 5): heat, energy supplied, exergy supplied, entropy made, least entropy production in the step.
+    rows
+        Times count from the start of the first step.
     cut
         How many of the steps were taken in parts.
     """
 
-    x: Array
-    energies: Array
-    ledgers: Array
+    rows: RunRecord
     iterations: int
     failure: SolveError | None
     cut: int = 0
@@ -96,7 +91,7 @@ class Chunk:
     @property
     def steps(self) -> int:
         """Number of steps taken."""
-        return int(self.x.shape[0])
+        return int(self.rows.t.size)
 
 
 @final
@@ -235,8 +230,8 @@ class Natural:
                 failure = self._failure(status, o, x, z, h)
             else:  # another order, at these values
                 self.elimination, tried, self._unsettled = None, tried + 1, SETTLING
-        states, energies, ledgers = (found[:done] for found in rows)
-        return NaturalState(x, z, previous, sums), Chunk(states, energies, ledgers, int(iterations), failure)
+        record = RunRecord(h * np.arange(1.0, done + 1.0), *(found[:done] for found in rows))
+        return NaturalState(x, z, previous, sums), Chunk(record, int(iterations), failure)
 
     def snapshot(self) -> Snapshot:
         """Origin of the present order of elimination, and the equations left out before."""
@@ -299,12 +294,12 @@ class Natural:
 
     def _failure(self, status: int, o: Order, x: Array, z: Array, h: float) -> SolveError:
         """Why a step has no solution, by the compiled loop's status."""
-        blame = Blame(self.model, o.dropped[: self.model.unknowns])
+        given = self.model, o.dropped[: self.model.unknowns]
         if status == INCONSISTENT:
-            return blame.contradicted(x, z[-1], h)
+            return contradicted(*given, x, z[-1], h)
         if status == DIVERGED:
             held = self._memory if self.stages == 1 else self._scratch
-            return blame.diverged(held.residual, held.scale)
+            return diverged(*given, held.residual, held.scale)
         return SolveError(Outcome.SINGULAR, "", "")
 
     def _order(self, x: Array, z: Array, h: float, inputs: Array, tried: int) -> Order:

@@ -12,6 +12,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.breakpoints import NEAR
 from ephs.solve.control import Control, Grid
+from ephs.solve.instant import rates_read
 from ephs.solve.methods.driven import advance_driven, advance_whole
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
@@ -166,7 +167,7 @@ class Paced:
 
     def _single(self, state: PacedState, h: float) -> tuple[PacedState, float]:
         inner, chunk = self.chunk(state, h, 1)
-        return _end(chunk, inner, state.t + h), float(chunk.ledgers[-1, 4])
+        return _end(chunk, inner, state.t + h), float(chunk.rows.ledgers[-1, 4])
 
     def _sums(self, row: Row) -> Array:
         """(4 + components,) counts of a method's state at a row."""
@@ -200,17 +201,16 @@ def _end(chunk: Chunk, inner: NaturalState, t: float) -> PacedState:
     """
     if chunk.failure is not None:
         raise chunk.failure
-    return PacedState(t, inner, Row(chunk.x[-1], chunk.energies[-1], chunk.ledgers[-1, :4]))
+    return PacedState(t, inner, chunk.rows.row(-1))
 
 
-def _taken(times: Array, chunk: Chunk, last: NaturalState) -> Taken[PacedState]:
-    """Instants at the ends of a chunk's steps, from whose states steps may start anew."""
+def _taken(rows: RunRecord, last: NaturalState) -> Taken[PacedState]:
+    """Instants at the ends of steps, from whose states steps may start anew."""
 
     def state(k: int) -> PacedState:
-        row = Row(chunk.x[k], chunk.energies[k], chunk.ledgers[k, :4])
-        return PacedState(float(times[k]), replace(last, x=row.x), row)
+        return PacedState(float(rows.t[k]), replace(last, x=rows.x[k]), rows.row(k))
 
-    return Taken(times, chunk.ledgers[:, 4], (chunk.x, chunk.energies, chunk.ledgers), state)
+    return Taken(rows.t, rows.ledgers[:, 4], (rows.x, rows.energies, rows.ledgers), state)
 
 
 @final
@@ -222,7 +222,7 @@ class _FixedSteps:
     def __init__(self, method: Paced, span: Span[PacedState], step: float) -> None:
         self.state, self.counts = span.state, replace(span.counts, h=step)
         self._method, self._span = method, span
-        self._grid, self._sign = Grid(0.0, abs(span.until - span.t0), step), 1.0 if span.until > span.t0 else -1.0
+        self._grid, self._sign = Grid(abs(span.until - span.t0), step), 1.0 if span.until > span.t0 else -1.0
         self._saved, self._most = span.saved, FIRST
         self._rows: Instants[PacedState] = []
 
@@ -243,12 +243,12 @@ class _FixedSteps:
         ended = done + count == grid.count
         if ended and chunk.steps == count:
             times[-1] = span.until
-        taken = _taken(times, chunk, inner)
+        taken = _taken(replace(chunk.rows, t=times), inner)
         if chunk.steps:
             self._rows = taken if span.save_at is None else self._between(taken, span.save_at)
             self.state = replace(taken.state(chunk.steps - 1), inner=inner)
             shortest, longest = min(self.counts.shortest, h), max(self.counts.longest, h)
-            least = min(self.counts.least, float(chunk.ledgers[:, 4].min()))
+            least = min(self.counts.least, float(taken.least.min()))
             self.counts = Counts(done + chunk.steps, 0, shortest, longest, least, grid.h)
         if chunk.failure is not None:
             raise chunk.failure
@@ -301,8 +301,7 @@ def _counted(problem: Problem) -> Array:
     out = np.ones(d.rate_size, dtype=bool)
     for slot in d.components:
         if slot.primitive.kind == "storage":
-            rates = [i for s in slot.reads for i in range(s.rates.start, s.rates.stop)]
-            for rate, effort in zip(rates, slot.efforts, strict=True):
+            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
                 out[rate] = not bound[effort]
     odd = {i for s in d.states if s.quantity.parity < 0 for i in range(s.rates.start, s.rates.stop)}
     out[[i for i in range(d.rate_size) if i not in odd]] = True

@@ -1,6 +1,5 @@
 """Heat from irreversible components to stores of heat of a system, booked as energy; see `Heats`."""
 
-from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -17,29 +16,6 @@ from ephs.solve.model import Model
 
 
 @final
-@dataclass(frozen=True, slots=True, eq=False)
-class Booked:
-    """The heat of a step.
-
-    Parameters
-    ----------
-    numbers
-        (stores,) of the stores at the end.
-    made
-        (components,) by how much more entropy each made than its quadrature says, in J/K.
-    heat
-        By how much more heat of friction there is than its quadrature says, in J.
-    passed
-        Heat that went to the stores, in J.
-    """
-
-    numbers: Array
-    made: Array
-    heat: float
-    passed: float
-
-
-@final
 class Passages:
     """Thermal ports of irreversible components at stores of heat.
 
@@ -52,20 +28,18 @@ class Passages:
     def __init__(self, model: Model, stores: HeatStores, conduction: ConductionMatrix | None) -> None:
         t, d = model.tables, model.descriptor
         self._stores, self._conduction = stores, conduction
-        store = np.full(int(t.counts[1]), -1)
-        store[stores.efforts] = np.arange(stores.efforts.size)
         makers = np.flatnonzero(t.kind == IRREVERSIBLE)
         owners, flows = np.repeat(makers, t.dims[makers, 0]), spans(t.e_at[makers], t.dims[makers, 0])
         efforts = t.e_index[flows]
         thermal = t.entropy[efforts] == 1.0
         count = np.bincount(owners[thermal], minlength=t.kind.size)
-        chosen = np.flatnonzero(thermal & (store[efforts] >= 0))
+        chosen = np.flatnonzero(thermal & (stores.at[efforts] >= 0))
         self._makers, self._flows, effort = owners[chosen], flows[chosen], efforts[chosen]
         frictions = (count[self._makers] == 1) & (t.dims[self._makers, 0] > 1)
         self._effort, self._intensive = int(t.counts[0]) + effort, t.intensive[effort]
         self._conducting = np.searchsorted(self._flows, conduction.ports) if conduction is not None else None
         self.called = chosen.size > (0 if conduction is None else conduction.ports.size)
-        at = store[effort]
+        at = stores.at[effort]
         self._heats = Heats(
             tuple(d.components[number].path for number in stores.components.tolist()),
             np.where(stores.hot, stores.components, -1), lambda: (stores.c1, stores.c2),
@@ -94,7 +68,7 @@ class Passages:
     def booked(
         self, y: Array, passed: Array | None, conducted: tuple[Array, float], missed: Array | None,
         energies: Array | None, work: float,
-    ) -> Booked:  # fmt: skip
+    ) -> tuple[Array, Array, float, float]:  # fmt: skip
         """The heat of a step from the numbers y.
 
         Parameters
@@ -108,6 +82,13 @@ class Passages:
             (2, components) stored before and after, in J, where there is friction.
         work
             What was supplied, in J.
+
+        Returns
+        -------
+        tuple
+            (stores,) numbers of the stores at the end; (components,) by how much more entropy each component made than
+            its quadrature says, in J/K; by how much more heat of friction there is than its quadrature says, and heat
+            that went to the stores, in J.
 
         Raises
         ------
@@ -127,4 +108,4 @@ class Passages:
         change, made = self._heats.taken(before, flows)
         out = np.bincount(self._makers, made - entropy, self._rest.size).astype(float)
         more = float((flows - heat)[frictions].sum())
-        return Booked((before + change) / stores.units, out, more, float(flows.sum()))
+        return (before + change) / stores.units, out, more, float(flows.sum())

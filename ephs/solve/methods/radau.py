@@ -18,15 +18,16 @@ from ephs.solve.march.iteration import FAST, iterate
 from ephs.solve.methods.collocation import moments, radau_for, values
 from ephs.solve.methods.continuous import AccumulatorRates, Matrices
 from ephs.solve.methods.energies import EnergyEquations
+from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.passages import Passages
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.settling import PUT, TOTAL, Settling
-from ephs.solve.methods.solvers import Solver, Solvers
+from ephs.solve.methods.solvers import Solvers
 from ephs.solve.methods.stores import HeatStores
 from ephs.solve.model import compile_model
 from ephs.solve.problem import NO_STATE, Problem
 from ephs.solve.result.record import RunRecord, record_of
-from ephs.solve.snapshot import Snapshot, like, parts
+from ephs.solve.snapshot import Snapshot
 from ephs.solve.stepping import Attempt, Instants, Row, Span
 
 PROBE = 1e-7
@@ -105,14 +106,14 @@ class Radau:
         self.scheme = radau_for(control.rtol.value if self._chosen else None)
         self.exponent = self.scheme.nodes.size + 1.0
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
-        self.evaluations = self.factorisations = self.iterations = 0
+        self.counts: dict[str, Any] = dict.fromkeys(("iterations", "evaluations", "factorisations"), 0)
         self._rates = int(self.model.tables.counts[0])
         self._makers = self.model.tables.kind == IRREVERSIBLE
-        self._matrices: Matrices | None = None
-        self._slow = False
-        self._family = Solvers(self.model.unknown_name, self.equations.pivots)
-        self._solvers: tuple[float, list[Solver]] | None = None
-        self._current: RadauState | None = None
+        family = Solvers(self.model.unknown_name, self.equations.pivots)
+        self._kept: KeptMatrices[RadauState, Matrices] = KeptMatrices(
+            self.scheme, lambda state: self.equations.matrices(state.y, state.z, self.inputs(state.t, state.y)),
+            lambda m, length: family.of_sum(m.unknowns, length, m.states), self.counts,
+        )  # fmt: skip
         self._last: tuple[RadauState, AccumulatorRates] | None = None
 
     def inputs(self, t: float, y: Array) -> Array:
@@ -142,9 +143,11 @@ class Radau:
         jumps = [_size(end - y, allowed) for end in (first, second)]
         if jumps[1] > 0.75 * jumps[0] and jumps[1] > 1.0:
             entry = int(np.argmax(np.abs(second - y) / allowed))
-            raise SolveError(Outcome.INCONSISTENT, self._path(entry), "the constraints do not hold at the start")
+            raise SolveError(
+                Outcome.INCONSISTENT, self.model.state_path(entry), "the constraints do not hold at the start"
+            )
         stages = self._solved(start, 0.5 * PROBE * h)[0]
-        self._matrices = None
+        self._kept.stale = True
         return replace(start, z=values(self.scheme.nodes, 0.0) @ stages)
 
     def prepare(self, state: RadauState, h: float) -> None:
@@ -163,13 +166,13 @@ class Radau:
         """
         stages, y, iterations = self._solved(state, h)
         if not np.abs(y).max(initial=0.0) < LARGEST:
-            raise SolveError(Outcome.RANGE, self._path(int(np.argmin(np.abs(y) < LARGEST))), "")
+            raise SolveError(Outcome.RANGE, self.model.state_path(int(np.argmin(np.abs(y) < LARGEST))), "")
         totals = self._totals(state, h, stages)
         error = self._error(state, h, stages, y)
         end, missed = self._end(state, h, 1.0, y, stages[-1].copy(), totals)
         end = replace(end, stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
-        self.iterations += iterations
+        self.counts["iterations"] += iterations
         least = float(made.min(initial=np.inf)) if made.size else 0.0
         return Attempt(state, end, h, max(error, missed), least, (stages, totals))
 
@@ -209,45 +212,28 @@ class Radau:
         """Counts, for the solution's statistics."""
         return {
             "form": "paper",
-            "iterations": self.iterations,
-            "evaluations": self.evaluations,
-            "factorisations": self.factorisations,
+            **self.counts,
             "unknowns": self.equations.unknowns,
             **(self._settling.noted.stats() if self._settling.active else {}),
         }
 
     def snapshot(self, state: RadauState) -> Snapshot:
-        """State at which the matrices were made, and the step for which they were factorised."""
-        made = self._current if self._matrices is not None and not self._slow else None
+        """Origin of the matrices, and counts."""
         return {
-            "made": parts(made),
-            "here": made is state,
-            "step": self._solvers[0] if self._solvers is not None and made is not None else None,
-            "counts": [self.evaluations, self.factorisations, self.iterations],
+            "kept": self._kept.snapshot(state),
+            "counts": self.counts,
             "noted": self._settling.noted.snapshot(),
         }
 
     def restore(self, snapshot: Snapshot, state: RadauState) -> None:
         """Make the matrices where they were made."""
-        self._matrices, self._solvers, found = None, None, snapshot["made"]
-        if found is not None:
-            self._refresh(state if snapshot["here"] else like(state, found))
-            if snapshot["step"] is not None:
-                self._solve(snapshot["step"])
-        self.evaluations, self.factorisations, self.iterations = snapshot["counts"]
+        self._kept.restore(snapshot["kept"], state)
+        self.counts.update(snapshot["counts"])
         self._settling.noted.restore(snapshot["noted"])
 
     def _solved(self, state: RadauState, h: float) -> tuple[Array, Array, int]:
         """Stages, the states at the end, and how many iterations that took."""
-        if self._matrices is None or self._slow:
-            self._refresh(state)
-        try:
-            stages, iterations = self._stages(state, h)
-        except SolveError:
-            if self._current is state:
-                raise
-            self._refresh(state)
-            stages, iterations = self._stages(state, h)
+        stages, iterations = self._kept.solved(state, lambda: self._stages(state, h))
         return stages, state.y + h * self.scheme.coefficients[-1] @ stages[:, : self._rates], iterations
 
     def _totals(self, state: RadauState, h: float, stages: Array) -> StepTotals:
@@ -292,14 +278,12 @@ class Radau:
                 energies = np.array([self._known(state).energies, self._instant(t, y, z).energies])
                 missed = self.scheme.gamma * totals.passed[0, 0] + self.scheme.defect @ totals.passed[1:, 0]
                 missed = theta * h * missed
-            booked = passages.booked(
+            y[stored], made, friction, heat = passages.booked(
                 state.y, passed, (weights @ totals.numbers, theta * h), missed, energies, sums[1] - state.sums[1]
             )
-            y[stored] = booked.numbers
-            sums[0] += booked.heat
-            sums[3] += booked.made.sum()
-            sums[4:] += booked.made
-            heat = booked.passed
+            sums[0] += friction
+            sums[3] += made.sum()
+            sums[4:] += made
         if account.size:
             rest = theta * h * z[: self._rates] - changed
             y, account, error = self._settling.settled(
@@ -308,20 +292,6 @@ class Radau:
             )  # fmt: skip
         return RadauState(t, y, z, sums, state.stages, 0.0, account), error
 
-    def _refresh(self, state: RadauState) -> None:
-        self._matrices = self.equations.matrices(state.y, state.z, self.inputs(state.t, state.y))
-        self._current = state
-        self._solvers, self._slow = None, False
-
-    def _solve(self, h: float) -> list[Solver]:
-        """Solvers with ∂g/∂z + h·μ·∂g/∂x for the eigenvalues μ of the coefficients, the real one first."""
-        if self._solvers is None or self._solvers[0] != h:
-            m, (real, *pairs) = self._matrices, self.scheme.values
-            assert m is not None
-            self._solvers = h, [self._family.of_sum(m.unknowns, h * mu, m.states) for mu in (real.real, *pairs)]
-            self.factorisations += 1
-        return self._solvers[1]
-
     def _guess(self, state: RadauState, h: float) -> Array:
         """Unknowns at the stages of a step of h seconds, by the polynomial of the step before."""
         if state.h == 0.0 or abs(h) > FARTHEST * abs(state.h):
@@ -329,7 +299,7 @@ class Radau:
         return self.scheme.ahead(h / state.h) @ state.stages
 
     def _stages(self, state: RadauState, h: float) -> tuple[Array, int]:
-        solvers, scheme, stages, rates = self._solve(h), self.scheme, self._guess(state, h), self._rates
+        solvers, scheme, stages, rates = self._kept.solvers(h), self.scheme, self._guess(state, h), self._rates
         allowed = self._allowed(state.y)
         parts, before = np.zeros((scheme.nodes.size, rates)), np.inf
 
@@ -338,7 +308,7 @@ class Radau:
             ys = state.y + h * scheme.coefficients @ stages[:, :rates]
             inputs = self._inputs(state.t + h * scheme.nodes, ys)
             change = scheme.solved(self.equations.residuals(ys, stages, inputs), solvers)
-            self.evaluations += len(stages)
+            self.counts["evaluations"] += len(stages)
             stages[:] -= change
             parts[:] = np.abs(h * scheme.coefficients @ change[:, :rates]) / allowed
             moved = float(np.max(parts, initial=0.0))
@@ -349,29 +319,23 @@ class Radau:
 
         found = iterate(PLAIN, correct, ENOUGH, ROUGH, FAST)
         if found.solved:
-            self._slow = not found.fast
+            self._kept.stale = not found.fast
             return stages, int(found.tries)
         entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
-        raise SolveError(Outcome.DIVERGED, self._path(entry), "its rate at the stages")
+        raise SolveError(Outcome.DIVERGED, self.model.state_path(entry), "its rate at the stages")
 
     def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
         """Whether rounding, of the equations' terms and of the numbers' sums, alone changes the stages' rates so much.
 
         A factor of 10 covers what the signs of the terms may cancel here.
         """
-        m, real = self._matrices, self._solve(h)[0]
-        assert m is not None
+        m, real = self._kept.matrices, self._kept.solvers(h)[0]
         rates, largest = self._rates, np.abs(stages).max(axis=0)
         summed = self.stores.terms(state.y)
         summed += abs(h) * np.abs(self.scheme.coefficients[-1]).sum() * largest[:rates]
         terms = abs(m.unknowns) @ largest + abs(m.states)[:, :rates] @ summed
         allowed = ROUNDING * np.abs(real(terms)[:rates])
         return bool(np.all(np.abs(change[:, :rates]) <= allowed))
-
-    def _path(self, entry: int) -> str:
-        """The state that an entry of x belongs to."""
-        states = self.model.descriptor.states
-        return str(next(slot.path for slot in states if slot.point.start <= entry < slot.point.stop))
 
     def _error(self, state: RadauState, h: float, stages: Array, y: Array) -> float:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
@@ -380,8 +344,7 @@ class Radau:
 
     def _filtered(self, h: float, changes: Array) -> Array:
         """Changes (…, states) with their stiff parts damped, so that what is algebraic allows them."""
-        real, m = self._solve(h)[0], self._matrices
-        assert m is not None
+        real, m = self._kept.solvers(h)[0], self._kept.matrices
         raw = np.zeros((*changes.shape[:-1], self.equations.unknowns))
         raw[..., : self._rates] = changes
         return changes + h * self.scheme.gamma * real(-(m.states @ raw.T)).T[..., : self._rates]

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Generic, TypeAlias, TypeVar, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.numbering import Index
+from ephs.semantics.descriptor.numbering import Index, spans
 from ephs.semantics.stage import Integer, Integers, Record, Vector, integer, matrix, vector
 from ephs.semantics.stage.kinds import Kind, group
 from ephs.semantics.stage.memory import HeldCells
@@ -190,6 +190,16 @@ class MemoryOf(Generic[Numbers]):
 Tables: TypeAlias = TablesOf[Index, Array]
 Order: TypeAlias = OrderOf[Index, Array]
 Memory: TypeAlias = MemoryOf[Array]
+
+
+def efforts_of(t: Tables, components: Index | slice) -> Index:
+    """Efforts at the ports of some components, one after the other."""
+    return t.e_index[spans(t.e_at[components], t.dims[components, 0])]
+
+
+def rates_of(t: Tables, components: Index | slice) -> Index:
+    """Rates of the states that some components read, one after the other."""
+    return t.read_w[spans(t.read_w_at[components], t.dims[components, 2])]
 
 
 def flat() -> Kind:

@@ -69,48 +69,41 @@ class _StorageNetwork(Missing):
     def look(self, states: Vector) -> None:
         self.status.value = _stored_energies(self.on, *self.given, states, self.energies)
 
-    @staticmethod
-    def of(
-        on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[RunAccount],
-        states: Vector, work: Real, heat: Real,
-    ) -> "_StorageNetwork":  # fmt: skip
-        """What states miss of the energy that work and heat in J leave to them, with its rounding in the account."""
-        a, given = account[0], (t, weights, z, scal, m)
-        run = _StorageNetwork(on, a, a.anchor + (work - heat), on.scratch(3), on.counter(0), False, given)
-        run.look(states)
-        a.noise, a.rest = rounding(on, a.anchor, work, heat) + ROUNDING * run.energies[2], run.short
-        return run
-
-
-def missed(
-    on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[RunAccount],
-    states: Vector, work: Real, heat: Real,
-) -> Integer:  # fmt: skip
-    """Write the energy that states miss, and its rounding, to the account; return 0, or status + FAULTS · storage."""
-    return _StorageNetwork.of(on, t, weights, z, scal, m, account, states, work, heat).status.value
-
 
 def settled(
     on: Evaluator, t: Columns, weights: Vector, z: Vector, scal: Vector, m: Scratch, account: Table[RunAccount],
     states: Vector, start: Vector, along: Vector, beside: Vector, trial: Vector, allowed: Vector, free: Vector,
-    work: Real, heat: Real,
+    work: Real, heat: Real, moves: Integer,
 ) -> Integer:  # fmt: skip
-    """Move states by what they miss; return a status as `missed`.
+    """Write to the account what states miss of the energy that work and heat in J leave to them, with its rounding.
 
-    The account's ``size`` becomes the step's error by that, in tolerances.
+    Where ``moves`` is 1, move the states by that, and let the account's ``size`` be the step's error by it, in
+    tolerances.
+
+    Returns
+    -------
+    Integer
+        0, or a status + FAULTS · storage.
     """
-    a, run = account[0], _StorageNetwork.of(on, t, weights, z, scal, m, account, states, work, heat)
-    a.moved, a.size = 0.0, 0.0
-    store(run, Moved(states, start, along, beside, trial, allowed, lambda k: free[k]))
-    a.rest = run.short
-    a.size = worth(on, a)
+    a, given = account[0], (t, weights, z, scal, m)
+    run = _StorageNetwork(on, a, a.anchor + (work - heat), on.scratch(3), on.counter(0), False, given)
+    run.look(states)
+    a.noise, a.rest = rounding(on, a.anchor, work, heat) + ROUNDING * run.energies[2], run.short
+
+    def move() -> None:
+        a.moved, a.size = 0.0, 0.0
+        store(run, Moved(states, start, along, beside, trial, allowed, lambda k: free[k]))
+        a.rest = run.short
+        a.size = worth(on, a)
+
+    on.when(on.same(moves, 1), move)
     return run.status.value
 
 
 @cache
 def settling_program() -> Program:
     """Return the program of the correction."""
-    return Program("settling", missed=Entry(missed), settled=Entry(settled))
+    return Program("settling", settled=Entry(settled))
 
 
 @final
@@ -144,16 +137,12 @@ class Settling:
         self.active = bool(self._free.any())
         tables = replace(model.only(counted).tables, address=model.resting(counted)[counted])
         self._account = RunAccount.table(1)
-        given = (
-            parts_of(tables), weights, np.zeros(model.unknowns), model.scal(0.0), parts_of(model.memory()),
-            self._account,
-        )  # fmt: skip
         self._states, self._start, self._along, self._beside, trial, self._allowed = np.zeros((6, d.point_size))
-        calls = settling_program().compiled()
-        self._missed = calls["missed"].bind(*given, self._states, 0.0, 0.0)
-        self._settled = calls["settled"].bind(
-            *given, self._states, self._start, self._along, self._beside, trial, self._allowed, self._free, 0.0, 0.0
-        )
+        self._settled = settling_program().compiled()["settled"].bind(
+            parts_of(tables), weights, np.zeros(model.unknowns), model.scal(0.0), parts_of(model.memory()),
+            self._account, self._states, self._start, self._along, self._beside, trial, self._allowed, self._free,
+            0.0, 0.0, 0,
+        )  # fmt: skip
 
     def opened(self, x: Array) -> Array:
         """An account that begins at the states x.
@@ -165,7 +154,7 @@ class Settling:
         """
         a: Any = self._account[0]
         self._states[:], a.anchor = x, 0.0
-        self._refuse(self._missed(0.0, 0.0))
+        self._refuse(self._settled(0.0, 0.0, 0))
         account = np.zeros(CARRY + 1)
         account[ANCHOR] = -a.rest
         return account
@@ -198,11 +187,11 @@ class Settling:
         taken, carry = grown(float(account[HEAT]), float(account[CARRY]), heat)
         (a.anchor, a.left), a.chosen, a.moved, a.size = account[: LEFT + 1].tolist(), int(chosen), 0.0, 0.0
         self._states[:] = x
-        self._refuse(self._missed(work, taken))
+        self._refuse(self._settled(work, taken, 0))
         if abs(a.rest) > a.noise:
             self._start[:], self._allowed[:] = start, np.maximum(allowed, TINY)
             self._along[:], self._beside[:] = directions() * self._free
-            self._refuse(self._settled(work, taken))
+            self._refuse(self._settled(work, taken, 1))
         put, total = account[PUT] + a.moved, account[TOTAL] + abs(a.moved)
         return self._states.copy(), np.array([a.anchor, a.rest, put, total, taken, carry]), float(a.size)
 

@@ -6,8 +6,8 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.numbering import spans
 from ephs.solve.errors import SolveError
+from ephs.solve.methods.records import efforts_of, rates_of
 from ephs.solve.model import Evaluation, Model
 
 
@@ -29,8 +29,7 @@ class StoredEnergies:
         status, _ = found.at(x, z, 0.0)
         if not status:
             t = found.model.tables
-            rates = t.read_w[spans(t.read_w_at, t.dims[:, 2])]
-            z[n_rate + t.e_index[spans(t.e_at, t.dims[:, 0])]] = -found.memory.residual[rates]
+            z[n_rate + efforts_of(t, slice(None))] = -found.memory.residual[rates_of(t, slice(None))]
             return z
         for slot in d.components:  # one after the other, as one of them has no effort there
             if slot.primitive.kind == "storage":

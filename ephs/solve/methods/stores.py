@@ -8,7 +8,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.solve.heats import exponential_law
-from ephs.solve.methods.records import REVERSIBLE, STORING, WORKING
+from ephs.solve.methods.records import REVERSIBLE, STORING, WORKING, efforts_of
 from ephs.solve.model import Model
 
 
@@ -23,8 +23,10 @@ class HeatStores:
 
     Attributes
     ----------
-    components, efforts, states
-        (stores,) numbers of the storages, of their efforts, and entries of the state vector.
+    components, states
+        (stores,) numbers of the storages, and entries of the state vector.
+    at
+        (efforts,) the store at each effort, −1 where there is none.
     hot
         (stores,) whether the law is exponential.
     warm, c1, c2
@@ -40,15 +42,17 @@ class HeatStores:
         taken = np.zeros(int(t.counts[1]) + 1, dtype=np.int64)
         np.add.at(taken, spans(t.outer[:, 0], t.outer[:, 1]), 2)
         passing = np.flatnonzero((t.kind == REVERSIBLE) | (t.kind == WORKING))
-        np.add.at(taken, t.e_index[spans(t.e_at[passing], t.dims[passing, 0])], 2)
+        np.add.at(taken, efforts_of(t, passing), 2)
         stored = np.flatnonzero(t.kind == STORING)
-        np.add.at(taken, t.e_index[spans(t.e_at[stored], t.dims[stored, 0])], 1)
+        np.add.at(taken, efforts_of(t, stored), 1)
         laws = [_law(primitive) for primitive in d.numbering.primitives]
         known = np.array([law is not None for law in laws], dtype=bool)[d.numbering.primitive[stored]]
         chosen = stored[known]
         efforts = t.e_index[t.e_at[chosen]]
         alone = (t.entropy[efforts] == 1.0) & (taken[efforts] == 1)
-        self.components, self.efforts = chosen[alone], efforts[alone]
+        self.components = chosen[alone]
+        self.at = np.full(int(t.counts[1]), -1)
+        self.at[efforts[alone]] = np.arange(self.components.size)
         self.states = t.read_x[t.read_x_at[self.components]]
         found = np.array([laws[number] for number in d.numbering.primitive[self.components]]).reshape(-1, 2)
         self.hot = found[:, 1] > 0.0

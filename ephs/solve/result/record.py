@@ -34,12 +34,18 @@ class RunRecord:
     energies: Array
     ledgers: Array
 
+    def __getitem__(self, where: slice) -> "RunRecord":
+        """Some of its rows."""
+        return RunRecord(*(getattr(self, field.name)[where] for field in fields(RunRecord)))
+
+    def row(self, k: int) -> Row:
+        """The instant of a number."""
+        return Row(self.x[k], self.energies[k], self.ledgers[k, :4])
+
     @property
     def rows(self) -> list[Row]:
         """Its instants one by one."""
-        return [
-            Row(x, energies, sums[:4]) for x, energies, sums in zip(self.x, self.energies, self.ledgers, strict=True)
-        ]
+        return list(map(self.row, range(self.t.size)))
 
 
 def record_of(taken: Instants[Any], rows: Sequence[Row]) -> RunRecord:

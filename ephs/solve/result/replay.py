@@ -2,25 +2,18 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.ending import solution_of
 from ephs.solve.problem import Problem
-from ephs.solve.result.record import RunRecord
+from ephs.solve.result.record import RowBlocks, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.stepping import Row
 
 
 def replay(problem: Problem, t: Array, rows: Sequence[Row], remark: str) -> Solution:
     """The solution of what is kept at the times t; ``remark`` stands for the method."""
-    size, count = problem.descriptor.point_size, len(problem.descriptor.components)
-    record = RunRecord(
-        np.asarray(t, dtype=float),
-        np.array([row.x for row in rows]).reshape(-1, size),
-        np.array([row.energies for row in rows]).reshape(-1, count),
-        np.array([[*row.sums, 0.0] for row in rows]).reshape(-1, 5),
-    )
+    found = record_of([(float(when), None, 0.0) for when in t], rows)
+    record = found if rows else RowBlocks().whole(problem.descriptor)
     stats = {
         "method": remark, "form": "paper", "steps": max(0, len(rows) - 1), "rejected": 0, "setup_s": 0.0,
         "integrate_s": 0.0, "unknowns": 0, "least_production": 0.0,

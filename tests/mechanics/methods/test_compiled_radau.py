@@ -131,13 +131,11 @@ def test_the_freedoms_alone_are_factorised_as_the_whole_is(scene, monkeypatch):
 def test_the_matrix_of_compiled_rates_is_that_of_the_residual(scene, monkeypatch):
     at, seen = Jacobian.at, []
 
-    def both(self, state, *, renew=False):
-        found = at(self, state, renew=renew)
-        if renew:
-            eq, linear = self.equations, Linearised(self.equations)
-            linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
-            moving = eq.nv + eq.n
-            seen.append((found[eq.nv : moving, :moving].copy(), linear.columns(solve=True)[: eq.n, :moving]))
+    def both(self, state):
+        found, eq, linear = at(self, state), self.equations, Linearised(self.equations)
+        linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
+        moving = eq.nv + eq.n
+        seen.append((found[eq.nv : moving, :moving].copy(), linear.columns(solve=True)[: eq.n, :moving]))
         return found
 
     monkeypatch.setattr(Jacobian, "at", both)

@@ -86,7 +86,7 @@ def test_a_contest_goes_on_from_its_state(race, windows):
 
     goes(made, windows)
     again = Contest(prices, CHANGE)
-    again.restore(made.state())
+    again.restore(made.snapshot())
     assert goes(again, 60) == goes(made, 60)
 
 

@@ -148,8 +148,9 @@ def test_a_step_ends_a_step_later(equations, method, h):
 def test_matrices_are_kept_for_steps_of_one_length_and_made_anew_when_asked(equations):
     method, start = stepper(equations, "radau"), equations.start(0.0)
     made, y = method._stages, equations.vector(start)
+    made.kept.renew(start)
     for h, factorised in ((0.1, 1), (0.1, 1), (0.2, 2)):
-        made.solvers(start, h)
+        made.kept.solvers(h)
         assert method.counts["factorisations"] == factorised
     before = method.counts["jacobians"]
     made.keep(fast=False)

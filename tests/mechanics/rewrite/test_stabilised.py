@@ -60,7 +60,7 @@ def stepped(name, make, h):
     workers = [i for i, slot in enumerate(d.components) if slot.primitive.name == "closing"]
     at = [first + d.components[i].multiplier + k for i in workers for k in range(6)]
     stored = np.array([slot.primitive.kind == "storage" for slot in d.components])
-    changes = (chunk.energies - method.energies(x))[:, stored]
+    changes = (chunk.rows.energies - method.energies(x))[:, stored]
     return Run(
         d.unpack(after.x), float(np.abs(after.z[0, at]).max(initial=0.0)), float(changes[-1].sum()),
         float(np.abs(changes).sum(axis=1).max()), after.sums, workers,

@@ -25,8 +25,8 @@ from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import json_schema
 from ephs.mechanics.scene.soundness import check_scene
 from ephs.show.motions.lines import lines_of
-from ephs.solve import instant
-from ephs.solve.instant import Mobility
+from ephs.solve.mobility import Mobility
+from tests.solve.dense import dense_mobility
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "elements.md"
 CELLS = re.findall(r"```\{code-cell\} ipython3\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
@@ -264,7 +264,7 @@ def test_a_rod_takes_one_freedom_and_a_tendon_none(tmp_path):
     for section, keys, count in (("rods", rod, 5), ("tendons", cord, 6)):
         problem = problem_of_scene(loaded(tmp_path, FALL + table(section, "r", keys)))
         x = problem.descriptor.pack(problem.initial)
-        assert mobility_of(problem) == instant.mobility(problem.descriptor, x) == Mobility(count, 0)
+        assert mobility_of(problem) == dense_mobility(problem.descriptor, x) == Mobility(count, 0)
 
 
 def test_runs_in_other_units_agree(tmp_path):
