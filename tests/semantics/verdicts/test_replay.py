@@ -16,7 +16,7 @@ from ephs import quantity as Q
 from ephs.operad import PatternError, Space
 from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.primitives.primitives import Formula
-from ephs.semantics.primitives.special import sinhc
+from ephs.semantics.primitives.special import sinhc, squared_turn, turn_curve, turn_ratio
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.bounds import signs
 from ephs.semantics.symbols.terms import OPERATIONS
@@ -232,6 +232,30 @@ def test_identities_are_expanded(one, other):
 def test_what_is_no_identity_does_not_expand_to_zero(one, other):
     on, apart = difference(one, other)
     assert not on.vanishes(apart)
+
+
+FUNCTIONS = {word: (least, function) for word, (least, _, function) in OPERATIONS.items()} | {
+    "sinhc": (1, sinhc),
+    "turn_ratio": (1, turn_ratio),
+    "turn_curve": (1, turn_curve),
+    "squared turn": (4, lambda *q: squared_turn(q)),
+}
+
+
+@pytest.mark.parametrize("word", FUNCTIONS)
+def test_what_a_function_expands_to_has_its_value_and_its_slope(word):
+    def value(term, x):
+        if isinstance(term, tuple):
+            return FUNCTIONS[term[0]][1](*(value(each, x) for each in term[1:]))
+        return x if term == "x" else term
+
+    on, (count, function) = Expander(), FUNCTIONS[word]
+    more = [0.75, 0.5, 0.25][: count - 1]
+    found = on.function(word, on.atom("symbol", "x", False), *(number_of(Fraction(each)) for each in more))
+    x, step = 1.3 if word == "acosh" else 0.7, 1e-5  # of which h² and ε/h are left in a slope
+    assert value(on.term(found), x) == pytest.approx(function(x, *more), rel=1e-14, abs=0.0)
+    change = function(x + step, *more) - function(x - step, *more)
+    assert value(on.term(on.slope(found, "x")), x) == pytest.approx(change / (2 * step), rel=1e-8)
 
 
 @pytest.mark.parametrize(
