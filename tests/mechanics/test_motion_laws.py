@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.parameters import varied
 
 GRAVITY, DAMPING = 9.81, 0.05
 CART = """
@@ -213,6 +214,21 @@ def test_text_keeps_the_law(form):
     scene = loaded(CART.replace("{motion}", form))
     again = scene_from_text(scene_to_text(scene))
     assert again.joint("rail").motion == scene.joint("rail").motion == FORMS[form]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_path_changes_one_number_of_a_law(form):
+    scene = loaded(CART.replace("{motion}", form))
+    numbers = dict(FORMS[form].numbers)
+    for key in ("rate", "amplitude", "frequency", "phase"):
+        values = {f"joints.rail.motion.{key}": 0.7}
+        if key in numbers:
+            joint = varied(scene, values).joint("rail")
+            assert type(joint.motion) is type(FORMS[form]) and dict(joint.motion.numbers) == numbers | {key: 0.7}
+            assert joint.rate == joint.motion.rate(0.0)
+        else:
+            with pytest.raises(ephs.SceneError, match="no such number"):
+                varied(scene, values)
 
 
 def test_numbers_of_a_law_are_varied():
