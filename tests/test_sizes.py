@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 123_300,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 543_600,
+    "tests": 545_400,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

@@ -1,6 +1,7 @@
 """Motions that are prescribed as functions of time: laws, closed forms by every method, loops, what is refused."""
 
 import tempfile
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,7 +13,10 @@ from scipy.integrate import solve_ivp
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.tree.finding.parts import determined_by
 
 GRAVITY, DAMPING = 9.81, 0.05
 CART = """
@@ -208,11 +212,38 @@ def test_system_by_hand_takes_a_law():
         ephs.simulate(problem.system, 0.5, method="rk87", initial=own, inputs={str(port): {"effort": HARMONIC.rate}})
 
 
+def test_a_system_is_read_anew_for_each_motion_and_once_for_all_forces():
+    problem = problem_of_scene(loaded(CART.replace("{motion}", "{ rate = 0.3 }")))
+    ((path, signal),) = problem.signals.items()
+
+    def key(value, effort):
+        return determined_by(replace(problem, signals={path: replace(signal, value=value, effort=effort)}))
+
+    values = [*FORMS.values(), np.array([0.2]), np.array([0.3])]
+    assert len({key(value, True) for value in values}) == len(values)
+    assert key(np.array([0.2]), False) == key(np.array([0.3]), False)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_text_keeps_the_law(form):
     scene = loaded(CART.replace("{motion}", form))
     again = scene_from_text(scene_to_text(scene))
     assert again.joint("rail").motion == scene.joint("rail").motion == FORMS[form]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_path_changes_one_number_of_a_law(form):
+    scene = loaded(CART.replace("{motion}", form))
+    numbers = dict(FORMS[form].numbers)
+    for key in ("rate", "amplitude", "frequency", "phase"):
+        values = {f"joints.rail.motion.{key}": 0.7}
+        if key in numbers:
+            joint = varied(scene, values).joint("rail")
+            assert type(joint.motion) is type(FORMS[form]) and dict(joint.motion.numbers) == numbers | {key: 0.7}
+            assert joint.rate == joint.motion.rate(0.0)
+        else:
+            with pytest.raises(ephs.SceneError, match="no such number"):
+                varied(scene, values)
 
 
 def test_numbers_of_a_law_are_varied():

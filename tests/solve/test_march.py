@@ -216,6 +216,45 @@ def test_a_pendulum_takes_the_steps_of_a_mechanism(method):
         assert np.abs(moved - (angle[1:] - angle[0])).max() <= 1e-4 * 2.0 * np.sqrt(stiffness)
 
 
+@dataclass(frozen=True)
+class Conducting(Pendulum):
+    """q̇ = 1 and the flow ṡ = q − c into a sum whose rounding is given."""
+
+    summed = 2
+
+    def rates(self, on, base, y, q, out):
+        q[0] = base[0] + y[0]
+        out[0], out[1], out[2] = y[1], 0.0, q[0] - self.parameters[0]
+        return 0, 0
+
+    def rounding(self, on, anchor, y):
+        return self.parameters[1]
+
+    def hold(self, on, change, low, high):
+        change[0] = on.maximum(low[0], on.minimum(high[0], change[0]))
+
+
+CONDUCTING = compiled_and_plain(program(lambda parameters, size: Conducting(parameters)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("centre", "rounding", "counts"),
+    [(0.501, 0.01, False), (0.501, 1e-4, True), (0.499, 0.01, True), (1.001, 1.0, True), (-1e-3, 1.0, True)],
+)
+def test_a_flow_both_ways_that_goes_back_by_less_than_rounding_is_none(method, centre, rounding, counts):
+    """Over a step of 1 s ½ − c flows; one that only goes back, or goes back by more, or forth, counts."""
+    for call in CONDUCTING.values():
+        run = start(
+            call, method, [0.0, 1.0, 0.0], 1.0, parameters=(centre, rounding), grid=1.0, step=1.0, q=[0.0],
+            increments=1,
+        )  # fmt: skip
+        for name in ("carry", "carry1", "carry2", "change", "size", "whole", "low"):
+            run.arrays[name] = np.zeros(1)
+        assert run.advance(2) is Ending.DONE
+        assert run.arrays["y"][2] == pytest.approx((0.5 - centre) * counts, abs=1e-14)
+
+
 def test_backward_in_time_leads_back():
     there = start(KEPLER["compiled"], "rk87", ORBIT, 3.0, rtol=1e-11, atol=1e-11)
     there.advance(1000)

@@ -182,26 +182,21 @@ def _along(
     model: Dynamics, here: _ForceBalance, share: float, ahead: Array, distance: float, metric: Array
 ) -> tuple[_ForceBalance, float, int] | None:
     """The equilibrium at a distance along the tangent, its part of the loads, and the iterations."""
-    made = distance * ahead
+    made, normal = distance * ahead, metric * ahead
 
     def bordered(at: _ForceBalance) -> tuple[Array, Array]:
-        normal = metric * ahead
         matrix = np.block(
             [[at.stiffness, -at.load[:, None]], [(normal[:-1] @ at.Z)[None, :], np.array([[normal[-1]]])]]
         )
-        return matrix, np.append(at.force, normal @ (distance * ahead - made))
+        return matrix, np.append(at.force, 0.0)  # changes are normal to the tangent: the distance stays
 
-    def moved(change: Array, at: _ForceBalance) -> None:
-        made[:] += np.append(at.Z @ change[:-1], change[-1])
-
-    start = _moved(model, here.state, made[:-1])
-    return _solved(model, start, share + float(made[-1]), metric, bordered, moved)
+    return _solved(model, _moved(model, here.state, made[:-1]), share + float(made[-1]), metric, bordered)
 
 
 def _equilibrium_at(model: Dynamics, state: State, share: float) -> _ForceBalance | None:
     """The equilibrium near by at a part of the loads."""
     metric = np.ones(model.layout.n + 1)
-    found = _solved(model, state, share, metric, lambda at: (at.stiffness, at.force), lambda _change, _at: None)
+    found = _solved(model, state, share, metric, lambda at: (at.stiffness, at.force))
     return None if found is None else found[0]
 
 
@@ -211,7 +206,6 @@ def _solved(
     share: float,
     metric: Array,
     system: Callable[[_ForceBalance], tuple[Array, Array]],
-    moved: Callable[[Array, _ForceBalance], None],
 ) -> tuple[_ForceBalance, float, int] | None:
     """Newton's iteration to rounding; None where it does not converge."""
     last, at = np.inf, _balance(model, state, share)
@@ -229,7 +223,6 @@ def _solved(
         if size > 4.0 * LONGEST or (size <= ROUNDED and size >= 0.5 * last):
             return (at, share, count) if size <= ROUNDED else None
         last = size
-        moved(change, at)
         share += float(change[k]) if change.size > k else 0.0
         at = _balance(model, _moved(model, at.state, step), share)
     return (at, share, ITERATIONS) if last <= ROUNDED else None

@@ -1,6 +1,7 @@
 """Prescribed motions of a scene file, and their numbers by path."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from ephs.mechanics.scene.checked import Checked
@@ -74,8 +75,5 @@ def first_rate(law: MotionLaw | None) -> float | None:
 
 
 def changed(of: MotionLaw | None, key: str, value: float) -> MotionLaw:
-    """The motion law with another number."""
-    if key == "rate" or not isinstance(of, HarmonicMotion):
-        return PolynomialMotion((value,))
-    numbers = {**dict(of.numbers), key: value}
-    return HarmonicMotion(numbers["amplitude"], numbers["frequency"], numbers["phase"])
+    """The motion law with another one of its `numbers`; a constant rate has no others."""
+    return replace(of, **{key: value}) if isinstance(of, HarmonicMotion) else PolynomialMotion((value,))

@@ -85,6 +85,30 @@ stiffness = {stiffness}
 loss = {loss}
 friction = {friction}
 """
+RODS = """
+[bodies.long]
+mass = 1.0
+inertia = [2e-2, 2e-2, 2e-3]
+position = [0.0, 3.0, 0.6]
+[bodies.short]
+mass = 1.0
+inertia = [7e-3, 7e-3, 2e-3]
+position = [0.15, 3.01, 0.8]
+rotation = {{ axis = [1.0, 2.0, 0.5], angle = 0.2 }}
+velocity = [-1.0, 0.0, 0.0]
+[surfaces.long]
+body = "long"
+shape = {{ capsule = [0.05, 0.6] }}
+stiffness = {stiffness}
+loss = {loss}
+friction = {friction}
+[surfaces.short]
+body = "short"
+shape = {{ capsule = [0.05, 0.1] }}
+stiffness = {stiffness}
+loss = {loss}
+friction = {friction}
+"""
 USUAL = {
     "gravity": 0.0, "height": 0.15, "along": 0.0, "speed": 0.0, "stiffness": 1e5, "exponent": 1.0, "loss": 0.0,
     "friction": 0.0, "slip": 1e-3,
@@ -128,8 +152,12 @@ def test_below_its_support_a_gap_above_a_plane_may_be_closed(gap, turn):
 
 @pytest.mark.parametrize(
     ("text", "until", "touching"),
-    [(BALL, 0.25, ["ball_floor"]), (BALL + BLOCK, 0.1, ["floor_lower", "lower_upper"])],
-    ids=["plane", "boxes"],
+    [
+        (BALL, 0.25, ["ball_floor"]),
+        (BALL + BLOCK, 0.1, ["floor_lower", "lower_upper"]),
+        (BALL + RODS, 0.1, ["long_short"]),
+    ],
+    ids=["plane", "boxes", "rods"],
 )
 def test_what_is_out_of_reach_is_left_out_to_the_last_bit(text, until, touching, monkeypatch):
     options = {"height": 0.15, "along": 1.0, "gravity": -9.81, "loss": 0.3, "friction": 0.4}

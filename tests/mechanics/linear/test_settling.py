@@ -15,11 +15,11 @@ AXES = {
 }
 
 
-def chain(axes: str, held: int | None, free: int = 0) -> ephs.Scene:
+def chain(axes: str, held: int | None, free: int = 0, motion: str = "rate = 0.0") -> ephs.Scene:
     """Three rods in a row, far from hanging, with springs in the later hinges; one may be held, another one free."""
     parts = []
     for number, axis in enumerate(AXES[axes]):
-        more = "motion = { rate = 0.0 }" if number == held else f"stiffness = {3.0 * number * (number != free)}"
+        more = f"motion = {{ {motion} }}" if number == held else f"stiffness = {3.0 * number * (number != free)}"
         parts.append(f"""
     [bodies.rod{number}]
     mass = {1.0 + number}
@@ -59,3 +59,10 @@ def test_a_joint_whose_motion_is_prescribed_is_free_in_a_system_without_it():
     loose, rest = ephs.equilibrium(chain("skew", 2).system()), ephs.equilibrium(chain("skew", None, 2))
     for path in (path for path in rest.states if str(path).endswith(".pe.q")):
         assert apart(loose.states[path], rest.states[path], 3.0) < 1e-9
+
+
+@pytest.mark.parametrize("motion", ["rate = 2.0", "polynomial = [0.0, 1.0]", "polynomial = [2.0, -1.0]"])
+def test_a_joint_that_is_moved_within_the_first_second_has_no_equilibrium(motion):
+    """Also one that is at rest at the beginning of it, or at the end."""
+    with pytest.raises(ephs.SimulationError, match=r"joints\.hinge1.*its motion is prescribed"):
+        ephs.equilibrium(chain("parallel", 1, motion=motion))

@@ -27,6 +27,7 @@ angular_velocity = [0.4, 0.5, -0.6]
 mass = 1.0
 inertia = [0.3, 0.4, 0.5]
 position = [1.3, -0.2, 0.5]
+rotation = [SIGN, 0.0, 0.0, 0.0]
 
 [joints.wrist]
 type = "spherical"
@@ -35,9 +36,10 @@ at = [0.8, -0.2, 0.5]
 """
 
 
-@pytest.fixture(scope="module")
-def scene():
-    return scene_of_text(SCENE)
+@pytest.fixture(scope="module", params=["1.0", "-1.0"])
+def scene(request):
+    """With either of the two quaternions of the arm's rotation."""
+    return scene_of_text(SCENE.replace("SIGN", request.param))
 
 
 @pytest.mark.parametrize("method", ["rk54", "radau", "variational"])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks.hard.four_bars import ADJUSTED
 from ephs.mechanics.runs.check import check_model
+from ephs.mechanics.scene.adjust import mass_roots
 from ephs.mechanics.scene.kinematics import elements, largest_gap, largest_slip
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.state import Snapshot
@@ -44,6 +45,16 @@ def test_given_coordinates_and_rates_come_before_given_poses(angle, rate, off, k
     assert scene.joint("a").coordinate[0] == pytest.approx(angle, abs=1e-8)
     assert scene.joint("a").rate[0] == pytest.approx(rate, abs=1e-7)
     assert scene.adjusted is None or not scene.adjusted.changed
+
+
+@given(st.floats(-6.0, 6.0))
+def test_the_unit_of_mass_does_not_decide_what_moves(power):
+    """Roots of inertias that are c times as large are √c times as small, also those of massless bodies."""
+    masses = np.array([2.0, 0.0, 0.5])
+    inertias = np.array([np.diag([1.0, 2.0, 3.0]), np.zeros((3, 3)), np.diag([1.0, 1.0, 0.0])])
+    roots, scale = mass_roots(masses, inertias), 10.0**power
+    assert np.allclose(mass_roots(scale * masses, scale * inertias) * np.sqrt(scale), roots, rtol=1e-14, atol=1e-15)
+    assert np.allclose(roots[0] @ roots[0], np.diag(1.0 / np.array([1.0, 2.0, 3.0, 2.0, 2.0, 2.0])), atol=1e-15)
 
 
 def test_where_given_rates_contradict_each_other_it_is_said_which_gave_way(capsys):

@@ -15,6 +15,8 @@ import ephs
 from ephs import quantity as Q
 from ephs.mechanics import Element, key, register_element, rule
 from ephs.mechanics.runs.scene_problem import problem_of_scene
+from ephs.mechanics.scene.build import initial_state
+from ephs.mechanics.scene.continuing import lost_states
 from ephs.mechanics.scene.custom import ElementError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.own_units import OwnUnits, mobility_of
@@ -509,6 +511,23 @@ def test_a_run_goes_on_from_the_end_of_another_or_is_refused(tmp_path):
     with pytest.raises(ephs.SceneError, match=r"pushes\.s: found the state spring\.q .* let continued"):
         odd = pushed(tmp_path, turns=2)
         odd.at(ephs.simulate(odd, 0.5, step=0.01), 0.5)
+
+
+def test_a_run_goes_on_at_either_quaternion_of_a_pose_and_at_no_other_pose(tmp_path):
+    class Placed(Element, section="placed", said="the energy of a pose"):
+        def build(self, site):
+            start = [0.6, 0.8, 0.0, 0.0, 0.1, 0.2, 0.3]
+            body = ephs.storage({"q": Q.pose}, lambda q: 0.5 * (q[4] ** 2 + q[5] ** 2 + q[6] ** 2))
+            site.add(body, {"q": site.inner("q", Q.pose)}, "body", initial={"q": start})
+
+    register_element(Placed)
+    scene = loaded(tmp_path, FALL + "[placed.x]\n")
+    states = initial_state(scene)
+    (path,) = (path for path in states if str(path).endswith("placed.x.body.q"))
+    turned = np.array([-1.0] * 4 + [1.0] * 3)
+    assert not list(lost_states(scene, {**states, path: turned * states[path]}))
+    assert list(lost_states(scene, {**states, path: states[path] + 1e-3 * (turned > 0.0)}))
+    assert list(lost_states(scene, {**states, path: -turned * states[path]}))
 
 
 def test_the_page_runs(capsys):

@@ -130,6 +130,18 @@ def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     held_to_the_general_form(eq, problem, state)
 
 
+@pytest.mark.parametrize("off", [1e-3, -0.1])
+def test_wheels_out_of_mesh_are_turned_to_where_they_mesh(off):
+    system, start = pair()
+    start = {Path.of(path): value for path, value in start.items()}
+    eq = ReducedEquations(problem_of(system, system.state() | start), 0.0)
+    state = eq.start(0.0)
+    apart = replace(state, q=eq.advance(state.q, np.array([0.0, off])))
+    found = eq.closed(apart).q
+    assert apart.q.tolist() == [0.0, MESHED + off]
+    assert abs(found[1] - MESHED - 2.0 * found[0]) <= 1e-12
+
+
 def test_changes_of_geared_motion_are_those_of_the_equations():
     system, start = train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
     start = {Path.of(path): value for path, value in start.items()}

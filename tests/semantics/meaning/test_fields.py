@@ -103,6 +103,13 @@ def test_equations_among_variables_that_come_last_are_solved_too():
     assert sorted(map(len, found.values())) == [1, 1] and found[X] == found[Y]
 
 
+def test_values_are_those_of_the_variables_that_the_constant_determines():
+    """x = 3, y = 0: z has no value."""
+    field = Rational()
+    rows = [field.exact({X: 2.0, ONE: -6.0}), field.exact({Y: 1.0})]
+    assert LinearRelation.of(field, [X, Y, Z, ONE], rows).values() == {X: 3.0, Y: 0.0, ONE: 1.0}
+
+
 def test_the_constant_is_no_pivot_of_a_canonical_form():
     field = Rational()
     (row,) = LinearRelation.of(field, [X, ONE], [field.exact({X: 2.0, ONE: -6.0})]).canonical

@@ -13,6 +13,7 @@ from ephs import Pattern
 from ephs import quantity as Q
 from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.verdicts.recorded import DEFINED
+from ephs.semantics.verdicts.trials import trial_of
 from tests.semantics.verdicts.right_parts import turn
 from tests.semantics.verdicts.wrong_parts import PS, QP, TURN, X, friction, gyrator, stored
 from tests.semantics.zoo import hidden
@@ -134,11 +135,18 @@ def test_friction_that_is_negative_in_a_drawn_window_is_refused(middle, width, a
         part(-1.0)()
 
 
-def test_single_points_without_a_value_are_named_and_do_not_refuse():
-    """Coulomb's friction is 0/0 at rest."""
-    verdict = friction(lambda p, s: 1.0 / abs(p))().verdict
+@pytest.mark.parametrize(
+    ("part", "place"),
+    [
+        (friction(lambda p, s: 1.0 / abs(p)), "p = 0"),
+        (gyrator({**QP, **X, "~y": Q.displacement}, lambda x, y: np.sin(x - y) / (x - y) * TURN), "x = 1, y = 1"),
+    ],
+)
+def test_single_points_without_a_value_are_named_and_do_not_refuse(part, place):
+    """Coulomb's friction is 0/0 at rest; a ratio of two states is where these are equal."""
+    verdict = part().verdict
     assert verdict == "searched" and [c.statement for c in verdict.open] == [DEFINED]
-    assert "p = 0" in verdict.text
+    assert place in verdict.text
 
 
 def test_a_relation_without_a_value_says_where():
@@ -148,3 +156,8 @@ def test_a_relation_without_a_value_says_where():
     with pytest.raises(StructureError, match=r"the matrix L has no value at x = 0\.0"):
         system.relation().at({"k.q": 0.0})
     assert not system.relation().at({"k.q": 2.0}).empty
+
+
+def test_a_witness_has_no_negative_zeros():
+    primitive = reading(lambda x: x)()
+    assert str(trial_of(primitive, [-0.0], Reference()).witness(primitive)) == "x = 0"

@@ -16,7 +16,7 @@ from ephs import quantity as Q
 from ephs.operad import PatternError, Space
 from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.primitives.primitives import Formula
-from ephs.semantics.primitives.special import sinhc
+from ephs.semantics.primitives.special import sinhc, squared_turn, turn_curve, turn_ratio
 from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.bounds import signs
 from ephs.semantics.symbols.terms import OPERATIONS
@@ -216,7 +216,10 @@ def difference(one, other):
             return on.function(term[0], *map(value, term[1:]))
         return known[term] if isinstance(term, str) else number_of(Fraction(term))
 
-    return on, on.add(value(one), scaled(value(other), -1))
+    expanded = value(one), value(other)
+    for each in expanded:  # written as a term it expands to the same
+        assert value(sent(on.term(each))) == each
+    return on, on.add(expanded[0], scaled(expanded[1], -1))
 
 
 @pytest.mark.parametrize(("one", "other"), RIGHT)
@@ -231,9 +234,36 @@ def test_what_is_no_identity_does_not_expand_to_zero(one, other):
     assert not on.vanishes(apart)
 
 
+FUNCTIONS = {word: (least, function) for word, (least, _, function) in OPERATIONS.items()} | {
+    "sinhc": (1, sinhc),
+    "turn_ratio": (1, turn_ratio),
+    "turn_curve": (1, turn_curve),
+    "squared turn": (4, lambda *q: squared_turn(q)),
+}
+
+
+@pytest.mark.parametrize("word", FUNCTIONS)
+def test_what_a_function_expands_to_has_its_value_and_its_slope(word):
+    def value(term, x):
+        if isinstance(term, tuple):
+            return FUNCTIONS[term[0]][1](*(value(each, x) for each in term[1:]))
+        return x if term == "x" else term
+
+    on, (count, function) = Expander(), FUNCTIONS[word]
+    more = [0.75, 0.5, 0.25][: count - 1]
+    found = on.function(word, on.atom("symbol", "x", False), *(number_of(Fraction(each)) for each in more))
+    x, step = 1.3 if word == "acosh" else 0.7, 1e-5  # of which h² and ε/h are left in a slope
+    assert value(on.term(found), x) == pytest.approx(function(x, *more), rel=1e-14, abs=0.0)
+    change = function(x + step, *more) - function(x - step, *more)
+    assert value(on.term(on.slope(found, "x")), x) == pytest.approx(change / (2 * step), rel=1e-8)
+
+
 @pytest.mark.parametrize(
-    "term", [["^", 2.0, 1e9], ["^", ["+", "x", "y", 1.0], 1e9], ["/", 1.0, ["-", "x", "x"]], ["what", "x"]]
-)
+    "term",
+    [
+        ["^", 2.0, 1e9], ["^", 0.5, 1e5], ["^", ["+", "x", "y", 1.0], 1e9], ["/", 1.0, ["-", "x", "x"]], ["what", "x"],
+    ],
+)  # fmt: skip
 def test_what_has_no_expansion_is_refused_at_once(term):
     with pytest.raises(Unexpandable):
         difference(term, 0.0)
