@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 400_500,
+    "ephs/mechanics": 401_000,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_400,
-    "ephs/semantics": 191_300,
+    "ephs/semantics": 193_200,
     "ephs/show": 62_600,
     "ephs/solve": 124_400,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 546_500,
+    "tests": 547_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

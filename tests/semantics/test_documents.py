@@ -186,7 +186,7 @@ MECHANICS = [
         damping=0.1,
         expands=True,
     ),
-    shell_system(Shell.of(SQUARE, [[0, 1, 2, 3]], ShellSection.isotropic(0.1, E=1e3, rho=1.0))),
+    shell_system(Shell.of(SQUARE, [[0, 1, 2, 3]], ShellSection.isotropic(0.1, E=1e3, rho=1.0)), damping=0.1),
     *(tendon([([0, 0, 0], [0, 0, 1.0])], 3.0, 1.0, slack=slack) for slack in (False, True)),
     alone(ephs.mechanics.thermoelastic(capacity=3.0, temperature=310.0, pull=0.4, reference=300.0)),
     stabilised(mbs_pattern()(body1=ROUND, body2=ROUND, joint=joint("revolute"))),

@@ -63,13 +63,7 @@ class LogarithmStep:
             state[7 + i] = a.x0[i]
         for i in range(n):
             step[6 + i] = a.v[i]
-        rest = on.scratch(7 * len(self.edges))
-
-        def pose_at_rest(e: Integer) -> None:
-            for i, x in enumerate(se3.exp(on, [a.p[6 * e + i] for i in range(6)])):
-                rest[7 * e + i] = x
-
-        on.loop(len(self.edges), pose_at_rest)
+        rest = poses_at_rest(on, len(self.edges), a.p)
         efforts, energy = self._evaluated(on, a.p, rest, state, step)
         for i in range(n):
             a.e[i] = efforts[6 + i]
@@ -105,7 +99,7 @@ class LogarithmStep:
         def measure(e: Integer) -> None:
             between = [rest[7 * e + i] for i in range(7)]
             for at, out in ((state, first), (end, last)):
-                a, b = ([at[7 * self._end(on, e, side) + i] for i in range(7)] for side in (0, 1))
+                a, b = ([at[7 * end_of(on, self.edges, e, side) + i] for i in range(7)] for side in (0, 1))
                 for i, x in enumerate(se3.increment(on, a, se3.compose(on, between, b))):
                     out[6 * e + i] = x - p[6 * e + i]
 
@@ -129,7 +123,7 @@ class LogarithmStep:
         efforts, slopes = on.scratch(6 * poses), Slopes(on)
 
         def push(e: Integer) -> None:
-            ends = self._end(on, e, 0), self._end(on, e, 1)
+            ends = end_of(on, self.edges, e, 0), end_of(on, self.edges, e, 1)
             given = [[x[size * k + i] for i in range(size)] for k in ends for x, size in ((state, 7), (step, 6))]
             between = [*over(on, SE3, given[0], given[1], 0), *over(on, SE3, given[2], given[3], 6)]
             constant = [*(rest[7 * e + i] for i in range(7)), *(stress[6 * e + i] for i in range(6))]
@@ -142,12 +136,25 @@ class LogarithmStep:
         on.loop(count, push)
         return efforts, energy.value
 
-    def _end(self, on: Evaluator, edge: Integer, side: int) -> Integer:
-        """Number of the pose at an end of an edge."""
-        found: Integer = self.edges[-1][side]
-        for number, ends in enumerate(self.edges[:-1]):
-            found = on.select(on.same(edge, number), ends[side], found)
-        return found
+
+def poses_at_rest(on: Evaluator, edges: int, p: Vector) -> Vector:
+    """(7 edges,) exp(d⁰) of logarithms (6 edges,)."""
+    rest = on.scratch(7 * edges)
+
+    def pose_at_rest(e: Integer) -> None:
+        for i, x in enumerate(se3.exp(on, [p[6 * e + i] for i in range(6)])):
+            rest[7 * e + i] = x
+
+    on.loop(edges, pose_at_rest)
+    return rest
+
+
+def end_of(on: Evaluator, edges: tuple[tuple[int, int], ...], edge: Integer, side: int) -> Integer:
+    """Number of the pose at an end of an edge."""
+    found: Integer = edges[-1][side]
+    for number, ends in enumerate(edges[:-1]):
+        found = on.select(on.same(edge, number), ends[side], found)
+    return found
 
 
 @cache

@@ -15,6 +15,7 @@ from ephs.semantics.derive.closing import Closing
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.linear import Linear
+from ephs.semantics.derive.logarithm_loss import LogarithmLoss
 from ephs.semantics.derive.logarithms import LogarithmStep
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relating import (
@@ -181,7 +182,9 @@ class ReversibleStep:
         return on.select(good, OK, DOMAIN)
 
 
-Relation: TypeAlias = StorageStep | LogarithmStep | ReversibleStep | IrreversibleStep | Holonomic | Closing
+Relation: TypeAlias = (
+    StorageStep | LogarithmStep | LogarithmLoss | ReversibleStep | IrreversibleStep | Holonomic | Closing
+)
 
 
 def sizes(relation: Relation) -> dict[str, int]:

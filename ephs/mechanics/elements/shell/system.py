@@ -16,11 +16,13 @@ from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.stiffness import EDGES
-from ephs.operad import Pattern, junction, quantity
+from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
+from ephs.semantics import library
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
-from ephs.semantics.primitives.logarithms import logarithm_form
-from ephs.semantics.primitives.primitives import Primitive, Storage, power_ports
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.logarithms import logarithm_form, logarithm_loss
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage, power_ports
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import STATEMENTS
@@ -49,14 +51,7 @@ def shell_spring(rest: Array, stiffness: Array) -> Storage:
     StructureError
         An array of a wrong shape, a number that is not finite, or K is not symmetric.
     """
-    rest, k = np.asarray(rest, dtype=float), np.asarray(stiffness, dtype=float)
-    for key, found, sound, expected in (
-        ("rest", rest, rest.shape == (4, 6) and bool(np.isfinite(rest).all()), "finite numbers (4, 6)"),
-        ("stiffness", k, k.shape == (24, 24) and bool(np.isfinite(k).all()), "finite numbers (24, 24)"),
-        ("stiffness", k, k.shape == k.T.shape and bool(np.array_equal(k, k.T)), "a symmetric matrix"),
-    ):
-        if not sound:
-            raise StructureError("parameter", "shell", key=key, found=f"shape {found.shape}", expected=expected)
+    rest, k = _checked(rest, stiffness)
     form = logarithm_form(EDGES, rest, k, "shell_spring")
     return Storage(
         "shell_spring",
@@ -64,18 +59,60 @@ def shell_spring(rest: Array, stiffness: Array) -> Storage:
         energy=form.energy,
         gradient=form.gradient,
         discrete_gradient=form.discrete_gradient,
-        parameters=(("rest", tuple(rest.ravel().tolist())), ("stiffness", tuple(k.ravel().tolist()))),
+        parameters=_numbers(rest, k),
         kernel=form.kernel,
         proof=lambda: proved("poses are even, and log reads q and −q alike; dE = Σ Bᵀ K Δ", *STATEMENTS["storage"]),
         trusted=True,
     )
 
 
+def shell_damper(rest: Array, stiffness: Array, damping: float) -> Irreversible:
+    """Kelvin–Voigt damping μ = Bᵀ τ K B of the rates ḋ = B u of the edges; ports p_2, p_3, p_4, s, reads q_2, q_3, q_4.
+
+    Parameters
+    ----------
+    rest, stiffness
+        As of a `shell_spring`.
+    damping
+        τ in s.
+
+    Raises
+    ------
+    StructureError
+        As of a `shell_spring`, or the damping is negative.
+    """
+    rest, k = _checked(rest, stiffness)
+    if not 0.0 <= damping < np.inf:
+        raise StructureError("parameter", "shell", key="damping", found=damping, expected="a number ≥ 0")
+    matrix, kernel = logarithm_loss(EDGES, rest, damping * k, "shell_damper")
+    ports = {f"p_{corner}": PortType(quantity.joint_momentum("free"), True) for corner in OTHERS}
+    ports |= {"s": PortType(quantity.entropy, True)}
+    reads = {f"q_{corner}": PortType(RELATIVE, False) for corner in OTHERS}
+    interface = Directory(ports | reads)
+    return Irreversible(
+        "shell_damper",
+        interface,
+        matrix,
+        tuple(map(Path.of, reads)),
+        (*_numbers(rest, k), ("damping", float(damping))),
+        kernel,
+        proof=lambda: structures.dissipation_proof(interface, None),
+        trusted=True,
+    )
+
+
 @cache
-def shell_pattern() -> Pattern:
+def shell_pattern(*, damped: bool = False, heat: bool = False) -> Pattern:
     """An element: for its corners k = 2, 3, 4 offsets o1k, ok, the relation hck and the coupling pkck; the energy pe.
 
     The ports p1 … p4 carry the momenta of its nodes.
+
+    Parameters
+    ----------
+    damped
+        It has the loss mf.
+    heat
+        The heat of the loss leaves through the port s, in place of the box env.
     """
     momentum, rate = quantity.body_momentum, quantity.joint_momentum("free")
     junctions = {f"p{corner}": junction(momentum, exposed=True) for corner in (1, *OTHERS)}
@@ -87,10 +124,22 @@ def shell_pattern() -> Pattern:
         boxes[f"o{k}"] = {"p2": f"p{k}", "p_j2": f"p_j{k}"}
         boxes[f"hc{k}"] = {"p_j1": f"p_c{k}", "p_j2": f"p_j{k}", "p_r": f"p_r{k}", "q_r": f"~q_{k}"}
         boxes[f"pkc{k}"] = {"q_r": f"q_{k}", "p_r": f"p_r{k}"}
+    if damped:
+        junctions["s"] = junction(quantity.entropy, exposed=heat)
+        boxes["mf"] = {f"p_{k}": f"p_r{k}" for k in OTHERS} | {"s": "s"} | {f"q_{k}": f"~q_{k}" for k in OTHERS}
+        boxes |= {} if heat else {"env": {"s": "s"}}
     return Pattern(junctions=junctions, boxes=boxes)
 
 
-def shell_element(sections: "ArrayLike", at_rest: "ArrayLike", rest: "ArrayLike", stiffness: "ArrayLike") -> System:
+def shell_element(
+    sections: "ArrayLike",
+    at_rest: "ArrayLike",
+    rest: "ArrayLike",
+    stiffness: "ArrayLike",
+    damping: float = 0.0,
+    *,
+    heat: bool = False,
+) -> System:
     """A shell element between four bodies, which are its nodes; its ports p1 … p4 carry their momenta.
 
     Parameters
@@ -99,25 +148,41 @@ def shell_element(sections: "ArrayLike", at_rest: "ArrayLike", rest: "ArrayLike"
         (4, 7) poses of the sections at the corners in their nodes.
     at_rest
         (3, 7) poses of the sections at corners 2, 3, 4 relative to that at corner 1, without stress.
-    rest, stiffness
-        As of a `shell_spring`.
+    rest
+        (4, 6) logarithms of its edges without stress: rad, m.
+    stiffness
+        (24, 24) K of the energy ½ Δᵀ K Δ of their changes.
+    damping
+        Kelvin–Voigt time in s.
+    heat
+        The heat of damping leaves through a port s; else an environment inside takes it.
 
     Raises
     ------
     StructureError
-        As of a `shell_spring`.
+        An array of a wrong shape, a number that is not finite, K is not symmetric, or the damping negative.
     """
     frames, between, free = np.asarray(sections, dtype=float), np.asarray(at_rest, dtype=float), pair("free")
-    parts: dict[str, Primitive] = {"pe": shell_spring(np.asarray(rest), np.asarray(stiffness))}
+    numbers = np.asarray(rest, dtype=float), np.asarray(stiffness, dtype=float)
+    parts: dict[str, Primitive] = {"pe": shell_spring(*numbers)}
     for k, place in zip(OTHERS, between, strict=True):
         parts[f"o1{k}"] = frame_change(SE3.compose(frames[0], place), "p_j1", "p1")
         parts[f"o{k}"] = frame_change(frames[k - 1], "p_j2", "p2")
         parts[f"hc{k}"], parts[f"pkc{k}"] = components.holonomic(free), components.pair_coupling(free)
-    return System.of(shell_pattern(), parts)
+    damped = damping != 0.0
+    if damped:
+        parts["mf"] = shell_damper(*numbers, damping)
+        parts |= {} if heat else {"env": library.environment()}
+    return System.of(shell_pattern(damped=damped, heat=damped and heat), parts)
 
 
 def shell_system(
-    shell: Shell, *, gravity: "ArrayLike" = (0.0, 0.0, 0.0), held: Sequence[int] = (), shared: Sequence[int] = ()
+    shell: Shell,
+    *,
+    gravity: "ArrayLike" = (0.0, 0.0, 0.0),
+    damping: float = 0.0,
+    held: Sequence[int] = (),
+    shared: Sequence[int] = (),
 ) -> System:
     """A shell that moves: bodies ``node0`` … at its points, and elements ``element0`` … between them.
 
@@ -125,6 +190,8 @@ def shell_system(
     ----------
     gravity
         (3,) acceleration in world axes, m/s².
+    damping
+        Kelvin–Voigt time in s; an environment in each element takes the heat.
     held
         Numbers of nodes that are welded to the ground.
     shared
@@ -162,7 +229,7 @@ def shell_system(
     at_rest = _from_first(shell)
     for e, nodes in enumerate(shell.cells.tolist()):
         boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)}
-        parts[f"element{e}"] = shell_element(sections[e], at_rest[e], shell.rest[e], shell.matrix[e])
+        parts[f"element{e}"] = shell_element(sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping)
     return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
 
 
@@ -171,3 +238,20 @@ def _from_first(shell: Shell) -> Array:
     along = [[SE3.exp(log) for log in logs] for logs in shell.rest]
     # corner 2 by edge 12, corner 4 by edge 14, corner 3 by edges 14 and 43: see `EDGES`
     return np.array([[two, SE3.compose(four, three), four] for two, three, four, _ in along])
+
+
+def _checked(given: Array, stiffness: Array) -> tuple[Array, Array]:
+    rest, k = np.asarray(given, dtype=float), np.asarray(stiffness, dtype=float)
+    for key, found, sound, expected in (
+        ("rest", rest, rest.shape == (4, 6) and bool(np.isfinite(rest).all()), "finite numbers (4, 6)"),
+        ("stiffness", k, k.shape == (24, 24) and bool(np.isfinite(k).all()), "finite numbers (24, 24)"),
+        ("stiffness", k, k.shape == k.T.shape and bool(np.array_equal(k, k.T)), "a symmetric matrix"),
+    ):
+        if not sound:
+            raise StructureError("parameter", "shell", key=key, found=f"shape {found.shape}", expected=expected)
+    return rest, k
+
+
+def _numbers(rest: Array, stiffness: Array) -> tuple[tuple[str, object], ...]:
+    """The parameters of a part, as documents have them."""
+    return ("rest", tuple(rest.ravel().tolist())), ("stiffness", tuple(stiffness.ravel().tolist()))

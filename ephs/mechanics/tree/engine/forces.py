@@ -219,8 +219,8 @@ class _ActingEvaluation:
     def edge(self, edge: Acting, number: Integer) -> None:
         """Add the forces of an edge with this number to those on joints, or to the wrenches on links."""
         on = self.on
-        alone = on.both(edge.several >= 0, on.both(edge.spring < 0, edge.friction < 0))
-        on.when(alone, lambda: None, lambda: self._edge(edge, number))
+        bare = on.both(on.same(edge.kind, ON_BODIES), on.both(edge.spring < 0, edge.friction < 0))
+        on.when(bare, lambda: None, lambda: self._edge(edge, number))
         on.when(edge.poses > 0, lambda: self.unless_refused(lambda: self._several(edge, number)))
 
     def _edge(self, edge: Acting, number: Integer) -> None:

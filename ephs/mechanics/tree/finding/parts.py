@@ -135,7 +135,7 @@ class _PartsReader:
         for joint in self.found.joints:
             of = joints if self._carries(joint, joint.rate in attached) else spans if joint.rate in attached else forces
             of.append(edges[joint.rate])
-        forces = self._side_by_side(joints, spans, forces)
+        spans, forces = self._side_by_side(joints, spans), self._side_by_side(joints, forces)
         held = {body for edge in joints for body in (edge.body1, edge.body2)}
         joints += [self._free(i, str(names[i])) for i in range(len(links)) if i not in held]
         for group in islands(len(links), joints):  # those that nothing ties to the ground move with their first one
@@ -240,26 +240,24 @@ class _PartsReader:
         kept = OF_COORDINATES[attached:]
         return joint.pair != FREE or energy in kept or joint.rate in self.wiring.outer
 
-    def _side_by_side(self, joints: list[Edge], spans: list[Edge], forces: list[Edge]) -> list[Edge]:
-        """Forces with those of one potential one after the other, in the order of the relative poses that it stores.
+    def _side_by_side(self, joints: list[Edge], others: list[Edge]) -> list[Edge]:
+        """Edges with those of one potential one after the other, in the order of the relative poses that it stores.
 
         Raises
         ------
         Unplaced
-            A potential of several relative poses has one that is no force's.
+            Not all poses of a potential of several are among them, or one leads to a body.
         """
         of: dict[int, list[Edge]] = {}
-        for edge in (*joints, *spans, *forces):
+        for edge in (*joints, *others):
             if edge.spring >= 0 and self.roles[edge.spring] is Role.SEVERAL:
                 of.setdefault(edge.spring, []).append(edge)
-        acting = {id(edge) for edge in forces}
+        carrying = {edge.spring for edge in joints}
         for number, edges in of.items():
             slot = self.wiring.components[number]
-            if len(edges) < len(slot.reads) or any(id(edge) not in acting for edge in edges):
-                raise Unplaced(slot.path, "stores a relative pose that is not that of a free joint between bodies")
-        if not of:
-            return forces
-        apart = [edge for edge in forces if edge.spring not in of]
+            if len(edges) < len(slot.reads) or number in carrying:
+                raise Unplaced(slot.path, "stores relative poses, which are not all alike those of free joints")
+        apart = [edge for edge in others if edge.spring not in of]
         return apart + [edge for edges in of.values() for edge in sorted(edges, key=lambda edge: edge.place)]
 
     def _free(self, link: int, name: str) -> Edge:
