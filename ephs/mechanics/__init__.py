@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ephs.mechanics.elements.shell.section import Ply as Ply
     from ephs.mechanics.elements.shell.section import ShellSection as ShellSection
     from ephs.mechanics.elements.shell.shell import Shell as Shell
+    from ephs.mechanics.elements.shell.system import shell_element as shell_element
+    from ephs.mechanics.elements.shell.system import shell_system as shell_system
     from ephs.mechanics.elements.tendon import tendon as tendon
     from ephs.mechanics.motion.inside import Inside as Inside
     from ephs.mechanics.rewrite.stabilised import stabilised as stabilised
@@ -55,6 +57,8 @@ _HOME = {
     "Ply": "ephs.mechanics.elements.shell.section",
     "Shell": "ephs.mechanics.elements.shell.shell",
     "ShellSection": "ephs.mechanics.elements.shell.section",
+    "shell_element": "ephs.mechanics.elements.shell.system",
+    "shell_system": "ephs.mechanics.elements.shell.system",
     "tendon": "ephs.mechanics.elements.tendon",
     "thermoelastic": "ephs.mechanics.elements.beam",
     "stabilised": "ephs.mechanics.rewrite.stabilised",

@@ -13,8 +13,19 @@ from referencing import Registry, Resource
 import ephs
 from ephs import Pattern, PatternError, SemanticsError, System, junction, library
 from ephs import quantity as Q
-from ephs.mechanics import beam_element, joint, mbs_pattern, rigid_body, spring_damper, stabilised, tendon
+from ephs.mechanics import (
+    Shell,
+    ShellSection,
+    beam_element,
+    joint,
+    mbs_pattern,
+    rigid_body,
+    spring_damper,
+    stabilised,
+    tendon,
+)
 from ephs.mechanics.elements.catalogue import PARTS
+from ephs.mechanics.elements.shell.system import shell_system
 from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
 from ephs.operad.reading import Reader
@@ -160,6 +171,7 @@ def test_every_library_part_is_written_by_name(name):
 
 KINDS = ("revolute", "prismatic", "cylindrical", "planar", "spherical", "fixed", "free", "screw")
 ROUND = rigid_body(2.0, [0.1, 0.2, 0.25])
+SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
 TURN, SLIDE = (ephs.quantity.joint_momentum(kind) for kind in ("revolute", "prismatic"))
 MECHANICS = [
     *(joint(kind, stiffness=2.0, pitch=0.3) for kind in KINDS),
@@ -174,6 +186,7 @@ MECHANICS = [
         damping=0.1,
         expands=True,
     ),
+    shell_system(Shell.of(SQUARE, [[0, 1, 2, 3]], ShellSection.isotropic(0.1, E=1e3, rho=1.0)), damping=0.1),
     *(tendon([([0, 0, 0], [0, 0, 1.0])], 3.0, 1.0, slack=slack) for slack in (False, True)),
     alone(ephs.mechanics.thermoelastic(capacity=3.0, temperature=310.0, pull=0.4, reference=300.0)),
     stabilised(mbs_pattern()(body1=ROUND, body2=ROUND, joint=joint("revolute"))),

@@ -11,9 +11,11 @@ from ephs.mechanics.elements.cylinder import oil
 from ephs.mechanics.elements.gear import belt_spring
 from ephs.mechanics.elements.motor import armature
 from ephs.mechanics.elements.offset import frame_change
+from ephs.mechanics.elements.shell.system import shell_damper, shell_spring
 from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Interface, Path, Quantity
 from ephs.semantics import library
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.documents.catalogue import LibraryPart
 from ephs.semantics.primitives.primitives import Primitive
 from ephs.semantics.spaces import Pair, pair
@@ -82,6 +84,18 @@ def _beam_spring(_ports: Interface, n: Numbers) -> Primitive:
     return beam.beam_spring(n["length"], n["stiffness"], n["rest"], n.get("order", 2))
 
 
+def _shell_numbers(n: Numbers) -> tuple[Array, Array]:
+    return np.array(n["rest"]).reshape(4, 6), np.array(n["stiffness"]).reshape(24, 24)
+
+
+def _shell_spring(_ports: Interface, n: Numbers) -> Primitive:
+    return shell_spring(*_shell_numbers(n))
+
+
+def _shell_damper(_ports: Interface, n: Numbers) -> Primitive:
+    return shell_damper(*_shell_numbers(n), n["damping"])
+
+
 def _thermoelastic(_ports: Interface, n: Numbers) -> Primitive:
     return beam.thermoelastic(n["capacity"], n["temperature"], n["pull"], n["reference"])
 
@@ -112,6 +126,8 @@ PARTS: tuple[LibraryPart, ...] = (
     LibraryPart("point_spring", "point_spring", lambda _, n: springs.point_spring(n["stiffness"], n["length"])),
     LibraryPart("point_stretch", "point_stretch", lambda _ports, _numbers: springs.point_stretch()),
     LibraryPart("reservoir", "environment", _reservoir),
+    LibraryPart("shell_damper", "shell_damper", _shell_damper),
+    LibraryPart("shell_spring", "shell_spring", _shell_spring),
     LibraryPart("slack_spring", "slack_spring", lambda _, n: tension_spring(n["stiffness"], n["length"], slack=True)),
     LibraryPart(
         "velocity_relation",

@@ -69,7 +69,7 @@ class Variational(ReducedMethod):
         self._linear = Linearised(equations)
         # springs at cut joints, and what reads their poses, are bent where these are, in the middle of the step too
         read = equations.reduced.attaching.bent >= equations.n
-        self._bent = bool(np.any((t.kind == CUT) & (t.spring >= 0)) or np.any(read))
+        self._bent = bool(np.any((t.kind == CUT) & (np.maximum(t.spring, t.several) >= 0)) or np.any(read))
         self._rows = equations.dense.residual.m + int(t.driven.sum())
         self._matrix: Array | None = None
         self._guess: tuple[Array, Array] | None = None

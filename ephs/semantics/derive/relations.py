@@ -15,6 +15,8 @@ from ephs.semantics.derive.closing import Closing
 from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.linear import Linear
+from ephs.semantics.derive.logarithm_loss import LogarithmLoss
+from ephs.semantics.derive.logarithms import LogarithmStep
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relating import (
     DOMAIN,
@@ -180,13 +182,15 @@ class ReversibleStep:
         return on.select(good, OK, DOMAIN)
 
 
-Relation: TypeAlias = StorageStep | ReversibleStep | IrreversibleStep | Holonomic | Closing
+Relation: TypeAlias = (
+    StorageStep | LogarithmStep | LogarithmLoss | ReversibleStep | IrreversibleStep | Holonomic | Closing
+)
 
 
 def sizes(relation: Relation) -> dict[str, int]:
     """Number of coordinates of each argument after the first."""
     n, k, m, size = relation.dimensions
-    stores = isinstance(relation, StorageStep)
+    stores = isinstance(relation, StorageStep | LogarithmStep)
     f, c, jac = (n * n, 1, 0) if stores else (n, k, (n + k) * (n + k + m))
     p = relation.numbers
     return {"scal": 3, "p": p, "x0": size, "v": m, "e": n, "lam": k, "f": f, "c": c, "jac": jac, "work": 0}

@@ -6,7 +6,7 @@ Onsager structures, and over a step the same relation holds that the two compone
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import final
+from typing import TypeAlias, final
 
 import numpy as np
 
@@ -14,11 +14,16 @@ from ephs.operad import Directory, Interface, Path, PortType
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.derive.closing import Closing
 from ephs.semantics.derive.linear import Linear
+from ephs.semantics.derive.logarithm_loss import LogarithmLoss
+from ephs.semantics.derive.logarithms import LogarithmStep
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relations import StorageStep
 from ephs.semantics.primitives import structures
 from ephs.semantics.primitives.primitives import Irreversible, Kernel, Point, Reversible
 from ephs.semantics.verdicts.verdict import Condition
+
+WithoutMaps: TypeAlias = Linear | StorageStep | LogarithmStep | LogarithmLoss | Closing
+"""Relations that are not seen through maps."""
 
 
 @final
@@ -116,7 +121,7 @@ def pull_back(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> R
 
 def pulled_ports(kernel: Kernel) -> tuple[tuple[int, int, int, int, Array], ...]:
     """(inner at, inner dim, at, dim, matrix (inner dim, dim)) of each port of a kernel that `pull_back` made."""
-    maps = None if isinstance(kernel.relation, Linear | StorageStep | Closing) else kernel.relation.maps
+    maps = None if isinstance(kernel.relation, WithoutMaps) else kernel.relation.maps
     if maps is None:
         return ()
     numbers = kernel.parameters[len(kernel.parameters) - maps.numbers :]
@@ -147,7 +152,7 @@ def _matrix(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> Arr
 
 def _kernel(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> Kernel | None:
     kernel = process.kernel
-    if kernel is None or isinstance(kernel.relation, Linear | StorageStep | Closing):
+    if kernel is None or isinstance(kernel.relation, WithoutMaps):
         return None
     if any(m.matrix.shape[1] > m.matrix.shape[0] for m in maps.values()):
         return None

@@ -34,7 +34,8 @@ def columns_of_trees(t: MechanismTables, increments: int, freedoms: int, warm: I
     tied = {int(one): {int(one)} for one in root}
     heated: dict[int, set[int]] = {one: set() for one in tied}
     for i, kind in enumerate(t.kind):
-        ends = [i] if kind == TREE else [int(t.first[i]), int(t.second[i])]
+        those = range(i, i + max(1, int(t.poses[i])))  # an energy of several relative poses ties the ends of all
+        ends = [i] if kind == TREE else [int(end) for k in those for end in (t.first[k], t.second[k])]
         trees = {int(root[end]) for end in ends if end >= 0}
         for one in trees:
             tied[one] |= trees

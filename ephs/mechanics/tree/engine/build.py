@@ -258,7 +258,7 @@ def _shapes(
         "relative": (cuts, Relative.real_width),
         "value": (rows, 4), "entry": (closing.entries,), "covector": (slots, 6), "along": (slots, 12),
         "largest": (max(closing.blocks, 1),), "temperature": (max(entropies, 1),), "entropy": (entropies,),
-        "x": (16,), "v": (64,), "e": (16,), "lam": (64,), "f": (256,), "c": (16,), "jac": (512,), "scratch": (2048,),
+        "x": (32,), "v": (64,), "e": (32,), "lam": (64,), "f": (512,), "c": (16,), "jac": (512,), "scratch": (2048,),
         "alter": (freedoms,), "moved": (joints,), "answer": (1,),
         "momenta": (links, 6), "spin": (freedoms,), "direction": (freedoms,), "descent": (freedoms,),
         "kept": (6 * islands,), "released": (6 * islands,), "found": (6 * islands,), "torque": (6 * islands,),
@@ -351,13 +351,14 @@ def _forces(
     number = {int(i): k for k, i in enumerate(cut[:, -1])}
     edges: list[list[int]] = []
     parts: list[list[int]] = []
+    shared: list[list[int]] = []
     frames: list[Array] = []
     left: list[Array] = []
     reach: list[Array] = []
     port: dict[int, list[int]] = {}
     for i in range(len(reduced.edges)):
         friction = int(t.friction[i])
-        if t.dim[i] == 0 or (t.spring[i] < 0 and friction < 0 and i not in acted[0]):
+        if t.dim[i] == 0 or (max(t.spring[i], t.several[i], friction) < 0 and i not in acted[0]):
             continue
         one, two, frame = _ends(reduced, bodies, ground, i)
         if t.kind[i] != SPRING:
@@ -366,6 +367,7 @@ def _forces(
         edges.append(
             [kind, one, two, int(t.dim[i]), int(t.q_at[i]), int(t.q_size[i]), int(t.r_at[i]), number.get(i, -1)]
         )
+        shared.append([int(t.several[i]), int(t.poses[i])])
         parts.append([int(t.spring[i]), friction, int(t.heat[i]), int(t.support[i])])
         reach.append(t.reach[i])
         frames.append(frame)
@@ -373,6 +375,7 @@ def _forces(
     return Forces(
         edge=np.array(edges, dtype=np.int64).reshape(-1, 8),
         part=np.array(parts, dtype=np.int64).reshape(-1, 4),
+        shared=np.array(shared, dtype=np.int64).reshape(-1, 2),
         frame=np.array(frames).reshape(-1, 24),
         left=np.array(left).reshape(-1, 36),
         reach=np.array(reach).reshape(-1, 9),

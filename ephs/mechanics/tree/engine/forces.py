@@ -8,11 +8,11 @@ from ephs.mechanics.road.cuts import Relative, frame_on, motion_of, place_of, po
 from ephs.mechanics.road.needs import NO_INTEGERS
 from ephs.mechanics.road.tree import shift_back, turned
 from ephs.mechanics.tree.engine.near import Near
+from ephs.mechanics.tree.engine.several import dims_of, gather, meet
 from ephs.mechanics.tree.sweeps.acting import (
     ON_BODIES,
     ON_TREE,
     Acting,
-    CompiledComponent,
     ConductingComponent,
     Tables,
     Work,
@@ -20,9 +20,8 @@ from ephs.mechanics.tree.sweeps.acting import (
 from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
-from ephs.semantics.spaces import se3
 from ephs.semantics.spaces.vectors import dot, scale, sub
-from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Variable, Vector, staged
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Variable, Vector, staged
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.drags import Drags
@@ -70,8 +69,9 @@ def strain(on: Evaluator, tables: Tables, work: Work, q: Vector, out: Vector) ->
     """
     acting = _ActingEvaluation(on, tables, work, q, q, work.idle, work.idle, work.idle, on.counter(0), None, None)
 
-    def each_edge(edge: Acting, _: Integer) -> None:
+    def each_edge(edge: Acting, number: Integer) -> None:
         on.when(edge.spring >= 0, lambda: acting.unless_refused(lambda: acting.store(edge, out)))
+        on.when(edge.poses > 0, lambda: acting.unless_refused(lambda: acting.store_several(edge, number, out)))
 
     Near.of(on, tables, work).each(each_edge)
     return acting.status.value
@@ -106,7 +106,7 @@ class _ActingEvaluation:
         jac in place of flows.
         """
         on, tables, w, row = self.on, self.tables, self.work, self.tables.component[number]
-        dims = Integers(row.integers, row.integer_start + CompiledComponent.dims.offset, 4)
+        dims = dims_of(self.tables, number)
         if self.read is not None:
             if stored:
                 self.read.store(on, number, dims, w)
@@ -135,7 +135,7 @@ class _ActingEvaluation:
 
         def stored() -> None:
             if self.read is not None:
-                self.read.local[0] = w.entropy[k] - self.read.expansion[number].state[0]
+                self.read.local[0] = w.entropy[k] - self.read.expanded(number, dims_of(self.tables, number)).state[0]
             else:
                 w.x[0] = w.entropy[k]
             self._evaluate(number, stored=True)
@@ -218,6 +218,12 @@ class _ActingEvaluation:
 
     def edge(self, edge: Acting, number: Integer) -> None:
         """Add the forces of an edge with this number to those on joints, or to the wrenches on links."""
+        on = self.on
+        bare = on.both(on.same(edge.kind, ON_BODIES), on.both(edge.spring < 0, edge.friction < 0))
+        on.when(bare, lambda: None, lambda: self._edge(edge, number))
+        on.when(edge.poses > 0, lambda: self.unless_refused(lambda: self._several(edge, number)))
+
+    def _edge(self, edge: Acting, number: Integer) -> None:
         on, w = self.on, self.work
         rate, pull = on.scratch(6), on.scratch(6)
         motion = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
@@ -269,12 +275,9 @@ class _ActingEvaluation:
         turn, at = frame_on(far, edge.outer_turn, edge.outer_at)
         motion.turn, motion.at, motion.twist = turn, at, twist_of(near, far, turn, at)
         pose = pose_of(on, frame_on(near, edge.inner_turn, edge.inner_at), (turn, at))
-        into = self.work.x
-        if self.read is not None:
-            at_rest = self.read.expansion[self.on.select(edge.spring < 0, edge.friction, edge.spring)].state
-            pose, into = se3.increment(on, at_rest, pose), self.read.local
-        for k, x in enumerate(pose):
-            into[k] = x
+        component = on.select(edge.spring < 0, edge.friction, edge.spring)
+        component = on.select(component < 0, edge.several, component)
+        meet(on, self.tables, self.work, self.read, component, pose, 0)
 
     def _left(self, edge: Acting, j: Integer) -> list[Real]:
         row = Vector(edge.reals, edge.real_start + Acting.left.offset + 6 * j, 6)
@@ -313,6 +316,30 @@ class _ActingEvaluation:
         on.when(on.same(edge.kind, ON_BODIES), aside, in_joint)
         self._evaluate(edge.spring, stored=True)
         out[1], out[2] = out[1] + energy[0], out[2] + on.absolute(energy[0])
+
+    def store_several(self, edge: Acting, number: Integer, out: Vector) -> None:
+        """Add the energy of the relative poses of an edge and the next ones."""
+        on, energy = self.on, self.work.c
+        gather(on, self.tables, self.work, self.read, edge, number)
+        self._evaluate(edge.several, stored=True)
+        out[1], out[2] = out[1] + energy[0], out[2] + on.absolute(energy[0])
+
+    def _several(self, edge: Acting, number: Integer) -> None:
+        """Add the forces of a potential of the relative poses of an edge and the next ones."""
+        on, w = self.on, self.work
+        gather(on, self.tables, self.work, self.read, edge, number)
+        self._evaluate(edge.several, stored=True)
+
+        def each_pose(k: Integer) -> None:
+            one, pull = self.tables.acting[number + k], on.scratch(6)
+            motion = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
+            far = place_of(on, w.places(self.tables), one.second)
+            motion.turn, motion.at = frame_on(far, one.outer_turn, one.outer_at)
+            for j in range(6):
+                pull[j] = -w.e[6 * k + j]
+            self._on_links(one, motion, pull)
+
+        on.loop(edge.poses, each_pose)
 
     def _spring(self, edge: Acting, pull: Vector) -> None:
         self._evaluate(edge.spring, stored=True)

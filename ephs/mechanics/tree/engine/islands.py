@@ -44,7 +44,8 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
     for i, (one, two) in enumerate(ends):
         if (one < 0) == (two < 0):
             continue
-        acting = t.spring[i] >= 0 or t.friction[i] >= 0 or i in acted[0] or _inert(reduced, i)
+        inside = max(t.spring[i], t.several[i], t.friction[i]) >= 0
+        acting = inside or i in acted[0] or _inert(reduced, i)
         free = np.zeros((6, 0)) if acting else reduced.twists[i] if t.kind[i] != SPRING else np.eye(6)
         barred[groups[max(one, two)]].append(complement(free))
     for body in acted[1]:

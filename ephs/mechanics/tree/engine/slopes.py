@@ -94,7 +94,7 @@ class RateSlopes:
         work |= {"e": np.zeros(64), "jac": np.zeros(1024), "scratch": np.zeros(4096)}
         self._fault = work["fault"]
         net, q = reduced.attaching.network, np.zeros(coordinates)
-        about = memory_about(len(reduced.tables.dims), net.known, len(reduced.attaching.bent))
+        about = memory_about(reduced.tables.evaluated, net.known, len(reduced.attaching.bent))
         about["increment"] = np.zeros(engine.work["still"].size)
         found = rate_slopes(looped=engine.looped).compiled()
         self._keep = found["keep"].bind(tables, work, about, self._base, self._y, q, self._out)

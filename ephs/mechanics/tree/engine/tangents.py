@@ -265,7 +265,7 @@ def evaluated(tables: Mapping[str, Any]) -> Sequence[int]:
     """Return the numbers of the components that equations with these tables evaluate."""
     acting, node, conduction = tables["acting"], tables["node"], tables["conduction"]
     found = {int(row.component) for rows in (node, conduction) for row in _rows(rows)}
-    found |= {int(number) for row in _rows(acting) for number in (row.spring, row.friction)}
+    found |= {int(number) for row in _rows(acting) for number in (row.spring, row.several, row.friction)}
     return sorted(found - {-1, PLAIN})
 
 

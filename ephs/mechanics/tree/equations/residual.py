@@ -76,7 +76,7 @@ class Residual:
             **whole.tables, **{name: np.zeros(shape) for name, shape in whole.shapes.items()},
             "work": np.zeros((records.size + 1) * self.program.width), "fault": np.zeros(1, dtype=np.int64),
             "drive": np.zeros(self.nv), "wrench": np.zeros((reduced.links, 6)), "scal": scal, "supply": supply,
-            "lead": np.zeros(n), **memory_about(t.dims.shape[0], net.known, len(reduced.attaching.bent)),
+            "lead": np.zeros(n), **memory_about(t.evaluated, net.known, len(reduced.attaching.bent)),
             "increment": np.zeros(self.nv), "base": q, "q": q.copy(), "r": np.zeros(n),
             "a": np.zeros(n), "multiplier": np.zeros(m), "unit": np.zeros(n),
             "mass": np.zeros((n, n)), "factor": np.zeros((n, n)), "jacobian": np.zeros((m + driven, n)),

@@ -261,7 +261,8 @@ class _Finder:
             if self.roles[other] is Role.COUPLING:
                 (at,) = (j for p, j in wiring.ports(other).items() if p != port)
                 stored = wiring.stored(at)
-                if stored is not None and stored[1].path == state.path and self.roles[stored[0]] is Role.RELATIVE:
+                known = stored is not None and self.roles[stored[0]] in (Role.RELATIVE, Role.SEVERAL)
+                if stored is not None and known and stored[1].path == state.path:
                     self.placed |= {number, other, stored[0]}
                     first, second = self.frames[ports["p_j1"]], self.frames[ports["p_j2"]]
                     pair = Pair.from_space(state.quantity.space)

@@ -195,7 +195,8 @@ def _tables(
     length = _length(edges)
     at_q = at_r = 0
     driven: list[int] = []
-    spring, friction, heat = (np.full(count, -1) for _ in range(3))
+    spring, several, friction, heat = (np.full(count, -1) for _ in range(4))
+    shared = np.zeros(count, dtype=np.int64)
     support, reach = np.zeros(count, dtype=np.int64), np.zeros((count, 9))
     for i, (edge, kind) in enumerate(zip(edges, kinds, strict=True)):
         b, d = edge.pair.basis, edge.pair.dim
@@ -210,7 +211,9 @@ def _tables(
         if kind == TREE:
             driven += [int(edge.motion is not None)] * d
         heat[i] = edge.heat
-        spring[i] = -1 if edge.spring < 0 or _stores_nothing(model, edge.spring) else edge.spring
+        stored = 0 if edge.spring < 0 else len(model.descriptor.components[edge.spring].reads)
+        spring[i] = -1 if stored != 1 or _stores_nothing(model, edge.spring) else edge.spring
+        several[i], shared[i] = (edge.spring, 0 if edge.place else stored) if stored > 1 else (-1, 0)
         idle = edge.friction < 0 or _idle(model, edge.friction)
         friction[i] = -1 if idle else edge.friction
         if kind == SPRING:
@@ -231,7 +234,7 @@ def _tables(
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
     owners = [owner for _, _, owner in sinks]
     rubs = [0 <= taken < len(storages) and owners.count(owner) == 1 for _, taken, owner in sinks]
-    acting = np.unique([*spring, *friction, *_called(parts.network)]).astype(np.int64)
+    acting = np.unique([*spring, *several, *friction, *_called(parts.network)]).astype(np.int64)
     return MechanismTables(
         parent=np.array(parents, dtype=np.int64),
         inertia=np.array([parts.links[body].inertia for body in order]).reshape(links, 6, 6),
@@ -252,6 +255,8 @@ def _tables(
         normal=normal,
         rows=rows,
         spring=spring,
+        several=several,
+        poses=shared,
         friction=friction,
         heat=heat,
         support=support,

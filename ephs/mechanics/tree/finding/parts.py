@@ -135,6 +135,7 @@ class _PartsReader:
         for joint in self.found.joints:
             of = joints if self._carries(joint, joint.rate in attached) else spans if joint.rate in attached else forces
             of.append(edges[joint.rate])
+        spans, forces = self._side_by_side(joints, spans), self._side_by_side(joints, forces)
         held = {body for edge in joints for body in (edge.body1, edge.body2)}
         joints += [self._free(i, str(names[i])) for i in range(len(links)) if i not in held]
         for group in islands(len(links), joints):  # those that nothing ties to the ground move with their first one
@@ -209,8 +210,13 @@ class _PartsReader:
         return Edge(
             name, joint.path, joint.first.link, joint.second.link, joint.first.offset, joint.second.offset, joint.pair,
             None if port is None else self._motion(port, d), np.array(self.problem.initial[joint.state.path]),
-            slice(start, start + d), joint.state.path, port, joint.potential, friction, heat,
+            slice(start, start + d), joint.state.path, port, joint.potential, friction, heat, self._place(joint),
         )  # fmt: skip
+
+    def _place(self, joint: LinkJoint) -> int:
+        """Which of the relative poses that its potential stores is a joint's."""
+        stored = [state.path for state in self.wiring.components[joint.potential].reads]
+        return stored.index(joint.state.path)
 
     def _motion(self, port: Path, freedoms: int) -> MotionLaw | None:
         """Prescribed effort of a joint's port; None where a force is given."""
@@ -233,6 +239,26 @@ class _PartsReader:
         energy = self.wiring.components[joint.potential].primitive.name
         kept = OF_COORDINATES[attached:]
         return joint.pair != FREE or energy in kept or joint.rate in self.wiring.outer
+
+    def _side_by_side(self, joints: list[Edge], others: list[Edge]) -> list[Edge]:
+        """Edges with those of one potential one after the other, in the order of the relative poses that it stores.
+
+        Raises
+        ------
+        Unplaced
+            Not all poses of a potential of several are among them, or one leads to a body.
+        """
+        of: dict[int, list[Edge]] = {}
+        for edge in (*joints, *others):
+            if edge.spring >= 0 and self.roles[edge.spring] is Role.SEVERAL:
+                of.setdefault(edge.spring, []).append(edge)
+        carrying = {edge.spring for edge in joints}
+        for number, edges in of.items():
+            slot = self.wiring.components[number]
+            if len(edges) < len(slot.reads) or number in carrying:
+                raise Unplaced(slot.path, "stores relative poses, which are not all alike those of free joints")
+        apart = [edge for edge in others if edge.spring not in of]
+        return apart + [edge for edges in of.values() for edge in sorted(edges, key=lambda edge: edge.place)]
 
     def _free(self, link: int, name: str) -> Edge:
         """The free joint of a link that nothing else ties to the ground."""

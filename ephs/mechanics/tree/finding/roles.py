@@ -10,6 +10,8 @@ from ephs.semantics.primitives.primitives import Irreversible, Primitive, Revers
 from ephs.semantics.primitives.pullback import pulled_ports
 from ephs.solve.heats import exponential_law
 
+FREE = quantity.relative_pose("free")
+
 
 class Role(Enum):
     """Part of a primitive in a mechanism."""
@@ -30,6 +32,8 @@ class Role(Enum):
     """The relation of a joint between two frames."""
     RELATIVE = auto()
     """Stores the relative pose of a joint, with a potential or none."""
+    SEVERAL = auto()
+    """Stores the relative poses of several free joints, with one potential."""
     FRICTION = auto()
     """Resists the rate of a joint, and heats."""
     DRAG = auto()
@@ -77,6 +81,8 @@ def _role(primitive: Primitive) -> Role:
 
 def _of_storage(primitive: Storage, kinds: list[str], on_bodies: list[bool]) -> Role:
     kernel = primitive.kernel
+    if kernel is not None and len(kinds) > 1 and {q for _, _, q in primitive.bundle.items()} == {FREE}:
+        return Role.SEVERAL
     if len(kinds) != 1 or kernel is None:
         return Role.OTHER
     if on_bodies[0]:

@@ -40,6 +40,8 @@ class Edge:
         Outer port of its momentum, or None.
     spring, friction, heat
         Components of its potential and its friction, and the entropy that the latter heats; −1 where there is none.
+    place
+        Which of the relative poses that the potential stores is the edge's.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Edge:
     spring: int
     friction: int
     heat: int
+    place: int = 0
 
 
 def frames_of_joints(edges: Sequence[Edge], poses: Sequence[Array | None]) -> list[Array]:

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.sparse import Index
 
@@ -31,6 +33,8 @@ class MechanismTables(NamedTuple):
     normal: Array  # (edges, 6, 6): rows that are constrained, of cut edges
     rows: Index  # (edges,): how many
     spring: Index  # (edges,): component of the potential, −1: none
+    several: Index  # (edges,): component whose energy is of its relative pose and others', −1: none
+    poses: Index  # (edges,): how many relative poses that has, in this edge and those that follow; 0 in the latter
     friction: Index  # (edges,): component, −1: none
     heat: Index  # (edges,): entropy that takes the friction's heat
     support: Index  # (edges,): 0, or where both components vanish, see `ephs.mechanics.tree.sweeps.acting.Acting`
@@ -46,3 +50,12 @@ class MechanismTables(NamedTuple):
     parameters: Array
     parameter_at: Index
     made_at: Index  # (components,): place of what it makes, −1
+
+    @property
+    def evaluated(self) -> Index:
+        """(components, 4) dimensions of those that act on the motion or store its heat, zeros of others."""
+        acting = [self.spring, self.several, self.friction, self.node, self.conduction[:, :1]]
+        found = np.unique(np.concatenate([part.ravel() for part in acting]))
+        out = np.zeros_like(self.dims)
+        out[found[found >= 0]] = self.dims[found[found >= 0]]
+        return out

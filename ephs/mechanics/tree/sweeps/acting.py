@@ -128,6 +128,9 @@ class Acting(Record):
         Components of the potential and of friction, −1: none.
     heat
         The entropy that takes its heat.
+    several, poses
+        Component of a potential of several relative poses, −1: none, and their number: those of this edge and of the
+        next ones, which have 0.
     support, reach
         `ABOVE` or `BEYOND`: where the second frame's place in the first is higher or farther, nothing acts; else 0.
     halves, margin
@@ -153,6 +156,8 @@ class Acting(Record):
     spring = integer()
     friction = integer()
     heat = integer()
+    several = integer()
+    poses = integer()
     inner_at = reals(3)
     outer_at = reals(3)
     reach = real()

@@ -6,7 +6,6 @@ first order, which is all that equations over dual numbers need there.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import prod
 from typing import Annotated, Any, Final, final
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from ephs.mechanics.tree.sweeps.acting import Work
 from ephs.mechanics.tree.sweeps.balances import slopes_of
 from ephs.mechanics.tree.sweeps.network import Net, write_entry
+from ephs.semantics.descriptor.numbering import starts
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import (
     Evaluator,
@@ -21,16 +21,18 @@ from ephs.semantics.stage import (
     Integers,
     Matrix,
     Real,
-    Record,
-    Table,
     Vector,
     members,
-    real,
-    reals,
 )
+from ephs.solve.sparse import Index
+
+MOST: Final = 24
+"""Increments of one component's state at most: those of four relative poses."""
 
 
-class Expansion(Record):
+@final
+@dataclass(frozen=True, slots=True)
+class Expansion:
     """A component at a point.
 
     Attributes
@@ -42,14 +44,20 @@ class Expansion(Record):
     slope
         Their derivatives, row by row: by efforts, then by the state, left-trivialised; of a storage by the latter.
     energy
-        Of a storage, in J.
+        (1,) of a storage, in J.
     """
 
-    state = reals(7)
-    effort = reals(7)
-    value = reals(7)
-    slope = reals(7, 13)
-    energy = real()
+    state: Vector
+    effort: Vector
+    value: Vector
+    slope: Vector
+    energy: Vector
+
+    @staticmethod
+    def size(dims: Index) -> Index:
+        """(components,) numbers of the expansions of components with dimensions (components, 4)."""
+        n, _, rates, states = dims.T
+        return states + 2 * n + n * (n + rates) + 1
 
 
 @final
@@ -59,8 +67,8 @@ class About:
 
     Attributes
     ----------
-    expansion
-        Of each component.
+    expansion, begin
+        Of all components, and where that of each one begins.
     met, flow, slope
         Of what is attached: (known + read,) rates, temperatures, prescribed efforts, states, and zeros for degrees of
         freedom of joints that it reads; (known,) flows by the first; their derivatives.
@@ -70,30 +78,42 @@ class About:
         Memory: increments of a component's state, of ``met``; flows.
     """
 
-    expansion: Table[Expansion]
+    expansion: Vector
+    begin: Integers
     met: Vector
     flow: Vector
     slope: Matrix
     increment: Vector
-    local: Annotated[Vector, 7]
+    local: Annotated[Vector, MOST]
     off: Vector
     changed: Vector
 
     # ---- components --------------------------------------------------------------------------------------------
 
+    def expanded(self, number: Integer, dims: Integers) -> Expansion:
+        """The expansion of a component with these dimensions."""
+        n, rates, states = dims[0], dims[2], dims[3]
+        sizes: list[Integer] = [states, n, n, n * (n + rates), 1]
+        at: Integer = self.begin[number]
+        parts: list[Vector] = []
+        for size in sizes:
+            parts.append(Vector(self.expansion.cells, self.expansion.start + at, size))
+            at = at + size
+        return Expansion(*parts)
+
     def keep(self, on: Evaluator, number: Integer, dims: Integers, work: Work, stored: bool) -> None:
         """Keep a component that was evaluated in the memory."""
-        n, rates, one = dims[0], dims[2], self.expansion[number]
-        value, slope = _part(one, Expansion.value), _part(one, Expansion.slope)
-        copy(on, work.x.part(0, dims[3]), _part(one, Expansion.state).part(0, dims[3]))
+        n, rates, one = dims[0], dims[2], self.expanded(number, dims)
+        value, slope = one.value, one.slope
+        copy(on, work.x.part(0, dims[3]), one.state)
         if stored:
-            copy(on, work.e.part(0, n), value.part(0, n))
+            copy(on, work.e.part(0, n), value)
             on.loop(n * n, lambda k: write_entry(slope, k, 2.0 * work.f[k]))
-            one.energy = work.c[0]
+            one.energy[0] = work.c[0]
             return
         width = n + rates
-        copy(on, work.e.part(0, n), _part(one, Expansion.effort).part(0, n))
-        copy(on, work.f.part(0, n), value.part(0, n))
+        copy(on, work.e.part(0, n), one.effort)
+        copy(on, work.f.part(0, n), value)
 
         def row(j: Integer) -> None:
             at = width * j
@@ -104,21 +124,20 @@ class About:
 
     def store(self, on: Evaluator, number: Integer, dims: Integers, work: Work) -> None:
         """Write the efforts of a storage to the memory, and its energy at the point."""
-        n, one = dims[0], self.expansion[number]
-        value, slope = _part(one, Expansion.value), _part(one, Expansion.slope)
+        n, one = dims[0], self.expanded(number, dims)
+        value, slope = one.value, one.slope
 
         def effort(j: Integer) -> None:
             work.e[j] = value[j] + _along(on, slope.part(n * j, n), self.local)
 
         on.loop(n, effort)
-        work.c[0] = one.energy
+        work.c[0] = one.energy[0]
 
     def relate(self, on: Evaluator, number: Integer, dims: Integers, work: Work, moving: Integer) -> None:
         """Write the flows of a component to the memory, whose state's first increments move so many."""
-        n, one = dims[0], self.expansion[number]
-        width, effort = n + dims[2], _part(one, Expansion.effort)
-        value, slope, off = _part(one, Expansion.value), _part(one, Expansion.slope), on.scratch(7)
-        on.loop(n, lambda k: write_entry(off, k, work.e[k] - effort[k]))
+        n, one = dims[0], self.expanded(number, dims)
+        width, value, slope, off = n + dims[2], one.value, one.slope, on.scratch(7)
+        on.loop(n, lambda k: write_entry(off, k, work.e[k] - one.effort[k]))
 
         def flow(j: Integer) -> None:
             by_effort = _along(on, slope.part(width * j, n), off)
@@ -156,25 +175,22 @@ class About:
         on.loop(net.bent.size, lambda k: put(net.known + k, self.increment[net.bent[k]]))
 
 
-def memory_about(components: int, known: int, bent: int) -> dict[str, Any]:
+def memory_about(dims: Index, known: int, bent: int) -> dict[str, Any]:
     """Memory of a point by the names of `About`, but for increments.
 
     Parameters
     ----------
-    components
-        Number of components of the system.
+    dims
+        (components, 4) dimensions of those that are evaluated, zeros of others.
     known, bent
         Numbers of known efforts of the attached network, and of degrees of freedom that it reads.
     """
+    size = Expansion.size(dims)
     shapes = {
-        "met": (known + bent,), "flow": (known,), "slope": (known, known + bent), "local": (7,), "off": (known + bent,),
-        "changed": (known,),
+        "expansion": (int(size.sum()),), "met": (known + bent,), "flow": (known,), "slope": (known, known + bent),
+        "local": (MOST,), "off": (known + bent,), "changed": (known,),
     }  # fmt: skip
-    return {"expansion": Expansion.table(components), **{name: np.zeros(shape) for name, shape in shapes.items()}}
-
-
-def _part(one: Expansion, field: Any) -> Vector:
-    return Vector(one.reals, one.real_start + field.offset, prod(field.shape))
+    return {"begin": starts(size), **{name: np.zeros(shape) for name, shape in shapes.items()}}
 
 
 def _along(on: Evaluator, row: Vector, by: Vector) -> Real:

@@ -1,0 +1,257 @@
+"""Shells as systems: nodes are bodies, and each element is a storage of the relative poses of its four nodes.
+
+Free joints lead from the section at the element's first corner to those at the others. Their relative poses q_2, q_3,
+q_4 are 1 at rest; the storage pe has the strain energy ½ Δᵀ K Δ of the logarithms of the four edges. All elements share
+their pattern and their machine code. Everything else is a joint's.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ephs.mechanics.elements import components
+from ephs.mechanics.elements.bodies import rigid_body
+from ephs.mechanics.elements.offset import frame_change
+from ephs.mechanics.elements.shell.shell import Shell
+from ephs.mechanics.elements.shell.stiffness import EDGES
+from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
+from ephs.semantics import library
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.primitives import structures
+from ephs.semantics.primitives.logarithms import logarithm_form, logarithm_loss
+from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage, power_ports
+from ephs.semantics.spaces import SE3, pair
+from ephs.semantics.systems.system import System
+from ephs.semantics.verdicts.checks import STATEMENTS
+from ephs.semantics.verdicts.verdict import proved
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+RELATIVE = quantity.relative_pose("free")
+OTHERS = (2, 3, 4)
+"""Corners whose poses are relative to that of corner 1."""
+
+
+def shell_spring(rest: Array, stiffness: Array) -> Storage:
+    """Strain energy of an element; ports q_2, q_3, q_4 of the free pair: 1 where there is no stress.
+
+    Parameters
+    ----------
+    rest
+        (4, 6) logarithms of the edges without stress: rad, m.
+    stiffness
+        (24, 24) K: symmetric, non-negative.
+
+    Raises
+    ------
+    StructureError
+        An array of a wrong shape, a number that is not finite, or K is not symmetric.
+    """
+    rest, k = _checked(rest, stiffness)
+    form = logarithm_form(EDGES, rest, k, "shell_spring")
+    return Storage(
+        "shell_spring",
+        power_ports(**{f"q_{corner}": RELATIVE for corner in OTHERS}),
+        energy=form.energy,
+        gradient=form.gradient,
+        discrete_gradient=form.discrete_gradient,
+        parameters=_numbers(rest, k),
+        kernel=form.kernel,
+        proof=lambda: proved("poses are even, and log reads q and −q alike; dE = Σ Bᵀ K Δ", *STATEMENTS["storage"]),
+        trusted=True,
+    )
+
+
+def shell_damper(rest: Array, stiffness: Array, damping: float) -> Irreversible:
+    """Kelvin–Voigt damping μ = Bᵀ τ K B of the rates ḋ = B u of the edges; ports p_2, p_3, p_4, s, reads q_2, q_3, q_4.
+
+    Parameters
+    ----------
+    rest, stiffness
+        As of a `shell_spring`.
+    damping
+        τ in s.
+
+    Raises
+    ------
+    StructureError
+        As of a `shell_spring`, or the damping is negative.
+    """
+    rest, k = _checked(rest, stiffness)
+    if not 0.0 <= damping < np.inf:
+        raise StructureError("parameter", "shell", key="damping", found=damping, expected="a number ≥ 0")
+    matrix, kernel = logarithm_loss(EDGES, rest, damping * k, "shell_damper")
+    ports = {f"p_{corner}": PortType(quantity.joint_momentum("free"), True) for corner in OTHERS}
+    ports |= {"s": PortType(quantity.entropy, True)}
+    reads = {f"q_{corner}": PortType(RELATIVE, False) for corner in OTHERS}
+    interface = Directory(ports | reads)
+    return Irreversible(
+        "shell_damper",
+        interface,
+        matrix,
+        tuple(map(Path.of, reads)),
+        (*_numbers(rest, k), ("damping", float(damping))),
+        kernel,
+        proof=lambda: structures.dissipation_proof(interface, None),
+        trusted=True,
+    )
+
+
+@cache
+def shell_pattern(*, damped: bool = False, heat: bool = False) -> Pattern:
+    """An element: for its corners k = 2, 3, 4 offsets o1k, ok, the relation hck and the coupling pkck; the energy pe.
+
+    The ports p1 … p4 carry the momenta of its nodes.
+
+    Parameters
+    ----------
+    damped
+        It has the loss mf.
+    heat
+        The heat of the loss leaves through the port s, in place of the box env.
+    """
+    momentum, rate = quantity.body_momentum, quantity.joint_momentum("free")
+    junctions = {f"p{corner}": junction(momentum, exposed=True) for corner in (1, *OTHERS)}
+    boxes = {"pe": {f"q_{k}": f"q_{k}" for k in OTHERS}}
+    for k in OTHERS:
+        junctions |= {f"p_c{k}": junction(momentum), f"p_j{k}": junction(momentum)}
+        junctions |= {f"q_{k}": junction(RELATIVE), f"p_r{k}": junction(rate)}
+        boxes[f"o1{k}"] = {"p1": "p1", "p_j1": f"p_c{k}"}
+        boxes[f"o{k}"] = {"p2": f"p{k}", "p_j2": f"p_j{k}"}
+        boxes[f"hc{k}"] = {"p_j1": f"p_c{k}", "p_j2": f"p_j{k}", "p_r": f"p_r{k}", "q_r": f"~q_{k}"}
+        boxes[f"pkc{k}"] = {"q_r": f"q_{k}", "p_r": f"p_r{k}"}
+    if damped:
+        junctions["s"] = junction(quantity.entropy, exposed=heat)
+        boxes["mf"] = {f"p_{k}": f"p_r{k}" for k in OTHERS} | {"s": "s"} | {f"q_{k}": f"~q_{k}" for k in OTHERS}
+        boxes |= {} if heat else {"env": {"s": "s"}}
+    return Pattern(junctions=junctions, boxes=boxes)
+
+
+def shell_element(
+    sections: "ArrayLike",
+    at_rest: "ArrayLike",
+    rest: "ArrayLike",
+    stiffness: "ArrayLike",
+    damping: float = 0.0,
+    *,
+    heat: bool = False,
+) -> System:
+    """A shell element between four bodies, which are its nodes; its ports p1 … p4 carry their momenta.
+
+    Parameters
+    ----------
+    sections
+        (4, 7) poses of the sections at the corners in their nodes.
+    at_rest
+        (3, 7) poses of the sections at corners 2, 3, 4 relative to that at corner 1, without stress.
+    rest
+        (4, 6) logarithms of its edges without stress: rad, m.
+    stiffness
+        (24, 24) K of the energy ½ Δᵀ K Δ of their changes.
+    damping
+        Kelvin–Voigt time in s.
+    heat
+        The heat of damping leaves through a port s; else an environment inside takes it.
+
+    Raises
+    ------
+    StructureError
+        An array of a wrong shape, a number that is not finite, K is not symmetric, or the damping negative.
+    """
+    frames, between, free = np.asarray(sections, dtype=float), np.asarray(at_rest, dtype=float), pair("free")
+    numbers = np.asarray(rest, dtype=float), np.asarray(stiffness, dtype=float)
+    parts: dict[str, Primitive] = {"pe": shell_spring(*numbers)}
+    for k, place in zip(OTHERS, between, strict=True):
+        parts[f"o1{k}"] = frame_change(SE3.compose(frames[0], place), "p_j1", "p1")
+        parts[f"o{k}"] = frame_change(frames[k - 1], "p_j2", "p2")
+        parts[f"hc{k}"], parts[f"pkc{k}"] = components.holonomic(free), components.pair_coupling(free)
+    damped = damping != 0.0
+    if damped:
+        parts["mf"] = shell_damper(*numbers, damping)
+        parts |= {} if heat else {"env": library.environment()}
+    return System.of(shell_pattern(damped=damped, heat=damped and heat), parts)
+
+
+def shell_system(
+    shell: Shell,
+    *,
+    gravity: "ArrayLike" = (0.0, 0.0, 0.0),
+    damping: float = 0.0,
+    held: Sequence[int] = (),
+    shared: Sequence[int] = (),
+) -> System:
+    """A shell that moves: bodies ``node0`` … at its points, and elements ``element0`` … between them.
+
+    Parameters
+    ----------
+    gravity
+        (3,) acceleration in world axes, m/s².
+    damping
+        Kelvin–Voigt time in s; an environment in each element takes the heat.
+    held
+        Numbers of nodes that are welded to the ground.
+    shared
+        Numbers of nodes whose momenta are ports ``p0`` …, by their number: for what else acts on them.
+
+    Raises
+    ------
+    StructureError
+        The section has no mass, or a node is not one of the shell's.
+    """
+    count, inertia = len(shell.points), shell.inertia
+    for key, nodes in (("held", held), ("shared", shared)):
+        if wrong := [node for node in nodes if not 0 <= node < count]:
+            raise StructureError("parameter", "shell", key=key, found=wrong, expected=f"nodes of 0 … {count - 1}")
+    if not shell.section.mass > 0.0:
+        raise StructureError("parameter", "shell", key="section", found="no mass", expected="a density above 0")
+    fixed = set(held)
+    momentum, unit = quantity.body_momentum, np.array([1.0, 0.0, 0.0, 0.0])
+    junctions = {f"p{i}": junction(momentum, exposed=i in shared) for i in range(count)}
+    boxes: dict[str, dict[str, str]] = {}
+    parts: dict[str, System | Primitive] = {}
+    for i, point in enumerate(shell.points):
+        pose = np.concatenate([unit, point])
+        if i in fixed:
+            boxes[f"node{i}"] = {"ground": "p_ground", "p": f"p{i}"}
+            parts[f"node{i}"] = frame_change(pose, "p", "ground")
+        else:
+            boxes[f"node{i}"] = {"p": f"p{i}"}
+            body = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
+            parts[f"node{i}"] = body.with_initial({"pe.q": pose})
+    if fixed:
+        junctions["p_ground"] = junction(momentum)
+        boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
+    sections = np.concatenate([shell.axes, np.zeros((*shell.cells.shape, 3))], axis=2)
+    at_rest = _from_first(shell)
+    for e, nodes in enumerate(shell.cells.tolist()):
+        boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)}
+        parts[f"element{e}"] = shell_element(sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping)
+    return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
+
+
+def _from_first(shell: Shell) -> Array:
+    """(n, 3, 7) poses of sections 2, 3, 4 of the elements at rest, relative to the first."""
+    along = [[SE3.exp(log) for log in logs] for logs in shell.rest]
+    # corner 2 by edge 12, corner 4 by edge 14, corner 3 by edges 14 and 43: see `EDGES`
+    return np.array([[two, SE3.compose(four, three), four] for two, three, four, _ in along])
+
+
+def _checked(given: Array, stiffness: Array) -> tuple[Array, Array]:
+    rest, k = np.asarray(given, dtype=float), np.asarray(stiffness, dtype=float)
+    for key, found, sound, expected in (
+        ("rest", rest, rest.shape == (4, 6) and bool(np.isfinite(rest).all()), "finite numbers (4, 6)"),
+        ("stiffness", k, k.shape == (24, 24) and bool(np.isfinite(k).all()), "finite numbers (24, 24)"),
+        ("stiffness", k, k.shape == k.T.shape and bool(np.array_equal(k, k.T)), "a symmetric matrix"),
+    ):
+        if not sound:
+            raise StructureError("parameter", "shell", key=key, found=f"shape {found.shape}", expected=expected)
+    return rest, k
+
+
+def _numbers(rest: Array, stiffness: Array) -> tuple[tuple[str, object], ...]:
+    """The parameters of a part, as documents have them."""
+    return ("rest", tuple(rest.ravel().tolist())), ("stiffness", tuple(stiffness.ravel().tolist()))
