@@ -8,8 +8,8 @@ from typing import Any
 
 import ephs
 from benchmarks.report import Report, table_of
-from ephs.solve import ending
-from ephs.solve.probe import SignalProbe
+from ephs.solve.posing.probe import SignalProbe
+from ephs.solve.running import ending
 
 SCENES = Path(__file__).parents[1] / "scenes"
 RUNS: dict[str, dict[str, Any]] = {

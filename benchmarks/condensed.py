@@ -18,10 +18,10 @@ from ephs.semantics.descriptor.numbering import Index, starts
 from ephs.semantics.spaces.decompositions import least_squares, singular_values
 from ephs.semantics.spaces.rank import IMPLICIT
 from ephs.semantics.systems.kept import once
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.equations.model import Evaluation, Model
+from ephs.solve.equations.sparse import equilibrate
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import Evaluation, Model
-from ephs.solve.sparse import equilibrate
+from ephs.solve.posing.errors import Outcome, SolveError
 
 SOUND = 1e-6
 """A pivot is used if it is at least this part of its row's largest entry, in every copy."""

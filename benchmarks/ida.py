@@ -17,9 +17,9 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control
-from ephs.solve.errors import OptionError, Outcome, SolveError
-from ephs.solve.stepping import Attempt
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError
+from ephs.solve.running.control import Control
+from ephs.solve.running.stepping import Attempt
 
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-15
 """Least tolerances for IDA, which fails with smaller ones because of rounding."""

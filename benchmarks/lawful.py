@@ -15,8 +15,8 @@ from benchmarks import families
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve.control import Control, Tolerance
-from ephs.solve.stepping import Span
+from ephs.solve.running.control import Control, Tolerance
+from ephs.solve.running.stepping import Span
 
 __all__ = ["table"]
 

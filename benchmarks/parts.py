@@ -20,8 +20,8 @@ from ephs.mechanics import joint, rigid_body
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Input, descriptor_of
+from ephs.solve.equations.model import Model, compile_model
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import Model, compile_model
 
 __all__ = ["measure", "report"]
 

@@ -11,8 +11,8 @@ from benchmarks.report import Report, table_of
 from ephs.mechanics.rewrite.folded import folded_problem
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.linear.sparse import sparse_lu
+from ephs.solve.equations.model import Evaluation, compile_model
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import Evaluation, compile_model
 
 __all__ = ["report"]
 

@@ -56,19 +56,19 @@ if TYPE_CHECKING:
     from ephs.solve.auditing.findings import AuditError as AuditError
     from ephs.solve.auditing.findings import AuditWarning as AuditWarning
     from ephs.solve.auditing.findings import CostWarning as CostWarning
-    from ephs.solve.errors import Interrupted as Interrupted
-    from ephs.solve.errors import OptionError as OptionError
-    from ephs.solve.errors import SimulationError as SimulationError
-    from ephs.solve.events import Event as Event
     from ephs.solve.exchange.coupling import Bond as Bond
     from ephs.solve.exchange.errors import ExchangeError as ExchangeError
     from ephs.solve.exchange.exchange import Exchange as Exchange
     from ephs.solve.methods.own import Method as Method
-    from ephs.solve.motion_law import HarmonicMotion as HarmonicMotion
-    from ephs.solve.motion_law import PolynomialMotion as PolynomialMotion
-    from ephs.solve.motion_law import TabulatedMotion as TabulatedMotion
+    from ephs.solve.posing.errors import Interrupted as Interrupted
+    from ephs.solve.posing.errors import OptionError as OptionError
+    from ephs.solve.posing.errors import SimulationError as SimulationError
+    from ephs.solve.posing.events import Event as Event
+    from ephs.solve.posing.motion_law import HarmonicMotion as HarmonicMotion
+    from ephs.solve.posing.motion_law import PolynomialMotion as PolynomialMotion
+    from ephs.solve.posing.motion_law import TabulatedMotion as TabulatedMotion
+    from ephs.solve.posing.sampled import Sampled as Sampled
     from ephs.solve.result.solution import Solution as Solution
-    from ephs.solve.sampled import Sampled as Sampled
 
 _HOMES = {
     "ephs.operad": (
@@ -102,14 +102,14 @@ _HOMES = {
     "ephs.mechanics.runs.reading": ("load_solution",),
     "ephs.mechanics.runs.simulate": ("simulate",),
     "ephs.mechanics.sensitivity": ("fit", "gradient", "sensitivity"),
-    "ephs.solve.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
-    "ephs.solve.events": ("Event",),
+    "ephs.solve.posing.errors": ("Interrupted", "OptionError", "Outcome", "SimulationError"),
+    "ephs.solve.posing.events": ("Event",),
     "ephs.solve.exchange.coupling": ("Bond",),
     "ephs.solve.exchange.errors": ("ExchangeError",),
     "ephs.solve.exchange.exchange": ("Exchange",),
     "ephs.solve.methods.own": ("Method",),
-    "ephs.solve.motion_law": ("HarmonicMotion", "PolynomialMotion", "TabulatedMotion"),
-    "ephs.solve.sampled": ("Sampled",),
+    "ephs.solve.posing.motion_law": ("HarmonicMotion", "PolynomialMotion", "TabulatedMotion"),
+    "ephs.solve.posing.sampled": ("Sampled",),
     "ephs.modelica.errors": ("ModelicaError",),
     "ephs.modelica.library": ("ModelicaLibrary",),
     "ephs.solve.auditing.findings": ("AuditError", "AuditWarning", "CostWarning"),

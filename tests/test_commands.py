@@ -13,7 +13,7 @@ import pytest
 
 import ephs
 from ephs.cli import main
-from ephs.solve.journal import _FRAME, Journal
+from ephs.solve.running.journal import _FRAME, Journal
 
 ROOT = Path(__file__).resolve().parents[1]
 SPINNING = """format = 1

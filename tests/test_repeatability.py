@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.solve import loop
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running import loop
+from ephs.solve.running.threads import in_one_thread
 from tests.repeat import contents, digest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,7 +73,7 @@ def test_libraries_that_come_later_take_one_thread_too():
     """SUNDIALS brings a library of its own when it is first imported."""
     text = """
 from threadpoolctl import threadpool_info, threadpool_limits
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 seen = in_one_thread(lambda: {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"})
 for module in ("numpy", "sksundae.ida"):
     __import__(module)

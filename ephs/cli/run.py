@@ -178,7 +178,7 @@ def _run_on(folder: Path, audit: str, *, report: bool) -> int:
     """Continue the interrupted run of a result folder; its model is in the journal."""
     from ephs.mechanics.runs.system_text import is_system_text
     from ephs.mechanics.scene.document import scene_from_text
-    from ephs.solve.journal import read_journal
+    from ephs.solve.running.journal import read_journal
 
     file = folder / JOURNAL
     if not file.is_file() and (folder / "solution.nc").is_file():
@@ -199,7 +199,7 @@ def _simulate(
 ) -> int:
     """Simulate with a journal, write the results; the exit code."""
     import ephs
-    from ephs.solve.journal import Journal
+    from ephs.solve.running.journal import Journal
 
     options = dict(asked)
     until, parts = options.pop("until"), options.pop("keep", None)

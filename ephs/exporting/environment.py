@@ -15,7 +15,7 @@ from ephs.exporting.module import Exported, exported
 from ephs.exporting.running import Instances
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import RTOL
+from ephs.solve.running.control import RTOL
 
 CHUNK: Final = 8
 """Least number of instances per thread: with fewer, scheduling costs more than computing."""

@@ -18,8 +18,8 @@ from ephs.exporting.module import Exported, exported
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.objects import emitted
 from ephs.semantics.systems.system import System
-from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
+from ephs.solve.running.control import ATOL, RTOL
 
 PLATFORMS: Final[Mapping[str, tuple[str, str, str]]] = {
     "x86_64-linux": ("linux-x86-64-v2", "x86_64-linux-gnu", ".so"),

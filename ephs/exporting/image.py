@@ -24,11 +24,11 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
 from ephs.semantics.systems.system import System
-from ephs.solve.control import ATOL, RTOL, first_step
 from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import Proportional
-from ephs.solve.problem import Problem
-from ephs.solve.stepping import Span
+from ephs.solve.posing.problem import Problem
+from ephs.solve.running.control import ATOL, RTOL, first_step
+from ephs.solve.running.stepping import Span
 
 METHODS = ("rk54", "rk87")
 MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")

@@ -13,8 +13,8 @@ from ephs.semantics.stage.ctext import c_text
 from ephs.semantics.stage.llvm import compile_text
 from ephs.semantics.stage.objects import TARGETS, emitted
 from ephs.semantics.systems.system import System
-from ephs.solve.control import ATOL, RTOL
 from ephs.solve.result.durable import durable
+from ephs.solve.running.control import ATOL, RTOL
 
 
 def export(

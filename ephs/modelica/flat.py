@@ -9,7 +9,7 @@ from typing import Any, final
 from ephs.modelica.errors import ModelicaError
 from ephs.modelica.expressions import Expr, ExpressionReader, Symbol, node_text, sp
 from ephs.operad import Quantity, quantity
-from ephs.solve.errors import nearest_of
+from ephs.solve.posing.errors import nearest_of
 
 
 @final

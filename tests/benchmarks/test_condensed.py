@@ -12,10 +12,10 @@ from benchmarks.parts import FAMILIES
 from ephs import AssemblyError, Reference
 from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.systems.laws import random_probe
-from ephs.solve.errors import SolveError
+from ephs.solve.equations.model import compile_model, evaluate_at
+from ephs.solve.equations.sparse import equilibrate
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import compile_model, evaluate_at
-from ephs.solve.sparse import equilibrate
+from ephs.solve.posing.errors import SolveError
 from tests.benchmarks.test_copies import repeating
 
 ROUNDING = float(np.finfo(float).eps)

@@ -4,8 +4,8 @@ import pytest
 
 from benchmarks.hard import CASES
 from benchmarks.honesty import Kind, cells, known, methods, settings
-from ephs.solve import ending
 from ephs.solve.auditing.findings import Audit
+from ephs.solve.running import ending
 
 HERE = {
     "brake 100": ("natural", "natural4", "radau", "rk54"),

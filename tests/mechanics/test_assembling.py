@@ -13,7 +13,7 @@ from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state, scene_inputs
 from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3
-from ephs.solve.mobility import mobility
+from ephs.solve.equations.mobility import mobility
 
 METHODS = ("natural", "natural4")
 

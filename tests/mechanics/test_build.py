@@ -19,7 +19,7 @@ from ephs.mechanics.scene.build import (
 )
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
-from ephs.solve.mobility import mobility
+from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
 
 ROOT = File(__file__).parents[2]

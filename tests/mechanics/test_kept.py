@@ -16,7 +16,7 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path, Pattern, junction
 from ephs.operad import quantity as Q
-from ephs.solve.model import compile_model
+from ephs.solve.equations.model import compile_model
 from tests.mechanics.tree import machines
 
 FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"

@@ -14,7 +14,7 @@ from ephs import library as lib
 from ephs.mechanics.methods import registry
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
-from ephs.solve.stepping import Attempt
+from ephs.solve.running.stepping import Attempt
 from tests.written import scene_of_text
 
 ROOT = Path(__file__).parents[2]

@@ -12,9 +12,9 @@ from ephs import Outcome
 from ephs.mechanics.methods.explicit import Explicit, tableau
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints
-from ephs.solve import loop
-from ephs.solve.errors import SolveError
 from ephs.solve.methods.solvers import dense
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.running import loop
 from examples.failing import oscillator, pendulum, scene
 from examples.failures import ALL, CASES, ELSEWHERE, Case, pushed, runs
 

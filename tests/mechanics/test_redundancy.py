@@ -17,8 +17,8 @@ from ephs.mechanics.scene.build import component_path, scene_inputs
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import GROUND
 from ephs.semantics.spaces import SE3
-from ephs.solve.instant import instant
-from ephs.solve.mobility import mobility
+from ephs.solve.equations.instant import instant
+from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
 from tests.written import scene_of_text
 

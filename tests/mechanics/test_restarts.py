@@ -8,7 +8,7 @@ import pytest
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import scene_inputs
-from ephs.solve.control import RTOL
+from ephs.solve.running.control import RTOL
 from tests.mechanics.test_twins import PIN, SCENE, TWINS, load  # noqa: F401 - a fixture
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))

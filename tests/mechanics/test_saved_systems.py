@@ -51,7 +51,7 @@ def test_a_journal_of_a_system_has_the_system_in_it(tmp_path):
 
 
 def test_a_system_that_cannot_be_written_leaves_its_states(tmp_path):
-    class Law(ephs.solve.motion_law.MotionLaw):
+    class Law(ephs.solve.posing.motion_law.MotionLaw):
         """A law of a user's own, which no file can hold."""
 
         displacement = rate = acceleration = lambda self, t: 0.0

@@ -17,9 +17,9 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
-from ephs.solve.control import Control, Tolerance
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.collocation import radau as coefficients
-from ephs.solve.model import compile_model
+from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 

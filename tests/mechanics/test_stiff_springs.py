@@ -13,7 +13,7 @@ from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
-from ephs.solve.oscillations import oscillations
+from ephs.solve.equations.oscillations import oscillations
 from tests.solve.conftest import oscillator
 from tests.written import scene_of_text
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import rotation_log
-from ephs.solve.instant import instant
+from ephs.solve.equations.instant import instant
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
 
 seeds = st.integers(0, 2**20)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
-from ephs.solve.instant import instant
+from ephs.solve.equations.instant import instant
 from ephs.testing import mechanisms
 from tests.written import scene_of_text
 

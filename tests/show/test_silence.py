@@ -4,8 +4,8 @@ import pytest
 
 from ephs.mechanics.methods.registry import METHODS
 from ephs.show.charts import FAMILIES, SILENT, ChartOutcome, stability
-from ephs.solve import ending
 from ephs.solve.auditing.findings import Audit
+from ephs.solve.running import ending
 
 LIMIT = 0.5
 """Processor time in s of a run."""

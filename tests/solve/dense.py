@@ -4,8 +4,8 @@ import numpy as np
 
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
-from ephs.solve.instant import constraints_of, is_velocity, rate_balances
-from ephs.solve.mobility import Mobility
+from ephs.solve.equations.instant import constraints_of, is_velocity, rate_balances
+from ephs.solve.equations.mobility import Mobility
 
 
 def dense_mobility(descriptor, x, prescribed=()):

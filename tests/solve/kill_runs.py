@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import ephs
-from ephs.solve import journal
+from ephs.solve.running import journal
 
 ROOT = Path(__file__).resolve().parents[2]
 RUNS = (

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ephs.solve.control import CRAWL, STRETCH, Advance
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.control import CRAWL, STRETCH, Advance
 
 
 def walk(first, ratio, least, *, span=1.0, most=10_000):

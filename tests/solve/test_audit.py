@@ -12,14 +12,14 @@ import ephs
 from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.state import Snapshot
-from ephs.solve import ending
 from ephs.solve.auditing import audit as auditing
 from ephs.solve.auditing import rounding
 from ephs.solve.auditing.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
 from ephs.solve.auditing.findings import Audit, Finding
 from ephs.solve.auditing.resolution import natural_trials
-from ephs.solve.breakpoints import MOST_FOUND
-from ephs.solve.control import Control, Tolerance
+from ephs.solve.posing.breakpoints import MOST_FOUND
+from ephs.solve.running import ending
+from ephs.solve.running.control import Control, Tolerance
 from examples.failing import oscillator, pendulum
 
 BRAKE = "friction = 20.0"
@@ -291,7 +291,7 @@ def test_the_error_of_constant_steps_is_estimated_for_every_method(name, monkeyp
         found.append(np.nan if error is None else error.size)  # none where energies grow beyond all that steps move
         return audit(sol, bounds, trials)
 
-    monkeypatch.setattr("ephs.solve.ending.audit", judged)
+    monkeypatch.setattr("ephs.solve.running.ending.audit", judged)
     for size in (coarse, 0.1 * order, 0.05 * order):
         sol = ephs.simulate(spring, 20.0 * size / rate, method=name, step=size / rate, audit="off")
         passed = sol.audit.passed

@@ -14,10 +14,10 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.differentials import DIMENSIONS, differentials
 from ephs.semantics.stage import Program
+from ephs.solve.equations.model import Model, compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import DONE, parts_of
-from ephs.solve.model import Model, compile_model
 
 pytestmark = pytest.mark.optimised
 

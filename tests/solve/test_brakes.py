@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.solve.control import Symmetric
+from ephs.solve.running.control import Symmetric
 from examples.failing import scene
 
 RATE, ENERGY, WARM = 100.0, 5000.0, 300.0

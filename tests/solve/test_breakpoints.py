@@ -9,9 +9,9 @@ import ephs
 from benchmarks.hard.case import WEIGHTLESS, read
 from benchmarks.hard.pushes import MASS, OMEGA, SPRING, TIMES, error, motion, push, sprung
 from ephs.mechanics.methods.registry import METHODS
-from ephs.solve import probe
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.probe import WIDTH, ProbedInput
+from ephs.solve.posing import probe
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.probe import WIDTH, ProbedInput
 from tests.mechanics.plain import uncorrected
 
 SCENE = sprung()

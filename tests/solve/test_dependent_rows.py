@@ -12,8 +12,8 @@ from scipy.sparse import csr_array
 import ephs
 from ephs import library
 from ephs import quantity as Q
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.analysis import dependent_rows, entangled, entries_at, exchanged
-from ephs.solve.model import compile_model
 
 ROOT = Path(__file__).parents[2]
 BRICARD = ROOT / "scenes/bricard.toml"

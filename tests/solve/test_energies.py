@@ -9,11 +9,11 @@ from ephs import Pattern, Reference, junction, library
 from ephs.operad import quantity as Q
 from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.verdicts.conduction import conductances
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.energies import EnergyEquations
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.model import compile_model
 from examples import physics
 
 ROUNDING = float(np.finfo(float).eps)

@@ -7,11 +7,11 @@ from benchmarks.cells import grid, ladder
 from ephs import Reference
 from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.descriptor.numbering import spans
+from ephs.solve.equations.model import compile_model, evaluate_at
 from ephs.solve.march.control import Proportional
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.records import IRREVERSIBLE
-from ephs.solve.model import compile_model, evaluate_at
 from examples import physics
 
 ROUNDING = float(np.finfo(float).eps)

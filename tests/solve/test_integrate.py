@@ -10,9 +10,9 @@ from ephs import library as lib
 from ephs import quantity as Q
 from ephs.semantics import Reference
 from ephs.semantics.meaning.step import step as oracle_step
-from ephs.solve.control import Grid
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import compile_model
+from ephs.solve.running.control import Grid
 
 START = {"osc.pe.q": 1.0}
 

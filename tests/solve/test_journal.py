@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS
-from ephs.solve import journal
-from ephs.solve.errors import Outcome
-from ephs.solve.journal import read_journal
+from ephs.solve.posing.errors import Outcome
+from ephs.solve.running import journal
+from ephs.solve.running.journal import read_journal
 from examples.failures import runs
 from tests.mechanics.ball import BALL
 
@@ -95,7 +95,7 @@ def copies(monkeypatch, tmp_path):
     monkeypatch.setattr(journal, "EVERY", -1.0)
     monkeypatch.setattr(journal.os, "fsync", lambda handle: None)
     monkeypatch.setattr(journal.Written, "write", copied)
-    monkeypatch.setattr("ephs.solve.loop.BURST", 3)
+    monkeypatch.setattr("ephs.solve.running.loop.BURST", 3)
     return made
 
 
@@ -202,7 +202,7 @@ def written(tmp_path_factory):
     file = tmp_path_factory.mktemp("journal") / "run.journal"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(journal, "EVERY", -1.0)
-        patch.setattr("ephs.solve.loop.BURST", 2)
+        patch.setattr("ephs.solve.running.loop.BURST", 2)
         return file, simulate(SCENE, RUNS["natural, constant steps"], journal=file)
 
 
@@ -284,7 +284,7 @@ def test_a_journal_has_one_writer(tmp_path):
 
 def test_a_full_disk_ends_the_run_by_name_and_the_run_goes_on_when_there_is_room(tmp_path, monkeypatch):
     monkeypatch.setattr(journal, "EVERY", -1.0)
-    monkeypatch.setattr("ephs.solve.loop.BURST", 2)
+    monkeypatch.setattr("ephs.solve.running.loop.BURST", 2)
     options = RUNS["natural, constant steps"]
     file = tmp_path / "run.journal"
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 from ephs.semantics.linear.sparse import sparse_lu
-from ephs.solve.sparse import FAINT, PARTS, order, paired
+from ephs.solve.equations.sparse import FAINT, PARTS, order, paired
 
 RUNS = {"compiled": sparse_lu().compiled(), "plain": sparse_lu().plain()}
 factorise, solve = RUNS["compiled"]["factorise"], RUNS["compiled"]["solve"]

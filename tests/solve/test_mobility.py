@@ -8,7 +8,7 @@ from hypothesis import given, settings
 import ephs
 from benchmarks import families
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.solve.mobility import mobility
+from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
 from tests.solve.dense import dense_mobility
 

@@ -9,8 +9,8 @@ import ephs
 from ephs import library
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import SE3
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import compile_model
 
 ROOT = Path(__file__).resolve().parents[2]
 TOP = """format = 1

@@ -11,7 +11,7 @@ from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.auditing.production import Production
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError
 from examples.failing import driving
 
 SYSTEMS = [method.name for method in METHODS.values() if method.systems]

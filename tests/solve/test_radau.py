@@ -7,9 +7,9 @@ from scipy.integrate import solve_ivp
 import ephs
 from ephs import Pattern, junction, library
 from ephs.operad import quantity as Q
-from ephs.solve.errors import Outcome
-from ephs.solve.heats import Heats
+from ephs.solve.equations.heats import Heats
 from ephs.solve.methods.radau import Radau
+from ephs.solve.posing.errors import Outcome
 from examples import oscillator, physics
 from tests.mechanics.plain import uncorrected
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.stage import Entry, Program, vector
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of
 from ephs.solve.methods.residuals import evaluation_program
 from ephs.solve.methods.scales import SPREAD, TAKES_PART
-from ephs.solve.model import compile_model
 
 CALLS = evaluation_program().compiled()
 ROOT = Path(__file__).resolve().parents[2]

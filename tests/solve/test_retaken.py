@@ -9,9 +9,9 @@ import ephs
 from ephs.show.charts import family_scenes as scenes
 from ephs.solve.auditing.growth import apart
 from ephs.solve.auditing.retaken import EACH, MOST, Missed, Retaken, share_missed
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.stepping import Attempt
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.stepping import Attempt
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from scipy.linalg import expm
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.solve import journal
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.running import journal
 
 MASS, STIFFNESS, START = 2.0, 8.0, 0.3
 EPS = float(np.finfo(float).eps)
@@ -221,7 +221,7 @@ def test_a_run_that_stops_on_a_sample_takes_it_once(cart, tmp_path, monkeypatch,
 
     whole, times = go(), taken[1:]
     stop[0] = 0.12
-    monkeypatch.setattr("ephs.solve.loop.RESPONSE", -1.0)  # every step is told
+    monkeypatch.setattr("ephs.solve.running.loop.RESPONSE", -1.0)  # every step is told
     file = tmp_path / "run.journal"
     with pytest.raises(ephs.Interrupted):
         go(journal=file)

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csc_array
 
-from ephs.solve.errors import SolveError
 from ephs.solve.methods import solvers
 from ephs.solve.methods.solvers import DENSE, NARROW, Solvers
+from ephs.solve.posing.errors import SolveError
 
 
 def made():

@@ -11,8 +11,8 @@ from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
-from ephs.solve.sampled import Sampled
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.sampled import Sampled
 
 
 def dynamics(

@@ -14,7 +14,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import pseudoinverse, singular_values
 from ephs.semantics.spaces.rank import ELIMINATION, rank_of
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.mechanics.dynamics.model import Dynamics

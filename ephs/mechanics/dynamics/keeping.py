@@ -7,7 +7,7 @@ import numpy as np
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 ROUNDS = 30
 """Largest number of Newton steps."""

@@ -9,8 +9,8 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.solve.errors import OptionError
-from ephs.solve.problem import State as States
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.problem import State as States
 
 
 @final

@@ -25,10 +25,10 @@ from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError, failing_at
-from ephs.solve.problem import Problem
-from ephs.solve.problem import State as States
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import OptionError, failing_at
+from ephs.solve.posing.problem import Problem
+from ephs.solve.posing.problem import State as States
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.registry import MethodEntry

@@ -11,8 +11,8 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.layout import Layout
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.errors import OptionError
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import OptionError
 
 ByJoint: TypeAlias = Mapping[str, ArrayLike] | ArrayLike
 """Numbers of joints by name, or (n,) of all of the tree in the order of its freedoms."""

@@ -6,7 +6,7 @@ from typing import final
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
-from ephs.solve.model import Model
+from ephs.solve.equations.model import Model
 
 
 @final

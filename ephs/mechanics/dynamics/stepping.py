@@ -17,10 +17,10 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control, Tolerance
-from ephs.solve.errors import OptionError, number_of
 from ephs.solve.methods.own import Method
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.posing.errors import OptionError, number_of
+from ephs.solve.posing.problem import Problem, Signal
+from ephs.solve.running.control import Control, Tolerance
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.registry import MethodEntry

@@ -20,7 +20,7 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedSta
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 AT_ONCE = 1e-6
 """Part of a step within which slips count as velocities: their friction acts along them."""

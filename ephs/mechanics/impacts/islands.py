@@ -15,7 +15,7 @@ import numpy as np
 from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.shapes.impact import Impact
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 TIED = 1e-12
 """Least coupling of two contacts, relative to the largest mobility."""

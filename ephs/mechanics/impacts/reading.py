@@ -18,7 +18,7 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedSta
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import CONSTRAINT, rank_of
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 CLOSED = 1e-7
 """Gap in the mechanism's length, and speed in its own, below which a contact is closed."""

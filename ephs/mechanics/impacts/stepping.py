@@ -24,10 +24,10 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.sparse import Index
-from ephs.solve.stepping import Attempt, Leg, Span
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Leg, Span
 
 CLOSED = 1e-9
 """Gap, in the mechanism's length, below which a contact is closed."""

@@ -18,7 +18,7 @@ from ephs.semantics.primitives.primitives import Irreversible
 from ephs.semantics.spaces import SE3, se3
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 POSES: Final[Any] = se3
 """Formulas of poses, for arrays of many."""

@@ -11,8 +11,8 @@ from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import metric_eigen
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
-from ephs.solve.errors import Outcome, SimulationError
-from ephs.solve.problem import NO_STATE
+from ephs.solve.posing.errors import Outcome, SimulationError
+from ephs.solve.posing.problem import NO_STATE
 
 STALLED = 1e-9
 """Allowed unbalanced fraction of the forces where iterations stagnate."""

@@ -13,8 +13,8 @@ from ephs.mechanics.scene.model import Scene
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
-from ephs.solve.threads import in_one_thread
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

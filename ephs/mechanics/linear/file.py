@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.mechanics.linear.modes import Mode
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 
 if TYPE_CHECKING:
     from ephs.mechanics.linear.statespace import StateSpace

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 MASSLESS = 1e-14
 """Inertia, as a part of the largest, below which it is rounding: rows determine what has none."""

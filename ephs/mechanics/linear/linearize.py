@@ -9,8 +9,8 @@ from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
-from ephs.solve.threads import in_one_thread
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -26,13 +26,13 @@ from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
-from ephs.solve.errors import OptionError
-from ephs.solve.heats import exponential_law
+from ephs.solve.equations.heats import exponential_law
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import compile_model
+from ephs.solve.posing.errors import OptionError
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
-from ephs.solve.stepping import Row
+from ephs.solve.running.stepping import Row
 
 BALANCED = 1e-7
 """Largest unbalanced fraction of the applied forces at an equilibrium."""

@@ -17,13 +17,13 @@ from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError, Outcome, SolveError
-from ephs.solve.instant import rates_read
+from ephs.solve.equations.instant import rates_read
+from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import Model, compile_model
-from ephs.solve.problem import Problem
-from ephs.solve.sparse import Index
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError
+from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

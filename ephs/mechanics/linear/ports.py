@@ -15,7 +15,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 
 
 @final

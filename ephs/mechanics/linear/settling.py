@@ -15,8 +15,8 @@ from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.errors import OptionError, SolveError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import OptionError, SolveError
+from ephs.solve.posing.problem import Problem
 
 SHORTEST, LEAST, SETTLED, CLOSES = 1e-12, 1e-9, 1e-12, 1e-10
 """Artificial time: the shortest step, the least scale of states, the residual and the gaps of joints at the end."""

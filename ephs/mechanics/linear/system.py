@@ -21,15 +21,15 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares, pseudoinverse, svd, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError, failing_at
-from ephs.solve.instant import rates_read
+from ephs.solve.equations.instant import rates_read
+from ephs.solve.equations.model import Model
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import Model
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import OptionError, failing_at
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
-from ephs.solve.sparse import Index
-from ephs.solve.stepping import Row
+from ephs.solve.running.stepping import Row
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

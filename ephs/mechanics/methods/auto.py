@@ -21,13 +21,13 @@ from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.stage import PLAIN
-from ephs.solve.control import Control
-from ephs.solve.errors import SolveError
-from ephs.solve.loop import FINAL
 from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import PATIENCE, held_back
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Leg, Span
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.control import Control
+from ephs.solve.running.loop import FINAL
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Leg, Span
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.radau import Implicit

@@ -13,7 +13,7 @@ from typing import Final, final
 import numpy as np
 
 from ephs.semantics.spaces.rank import TINY
-from ephs.solve.snapshot import Resumable
+from ephs.solve.running.snapshot import Resumable
 
 SETTLING: Final = 4
 """Steps, rejected ones included, in which a method finds the length of its steps, before a window."""

@@ -16,13 +16,13 @@ from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control
-from ephs.solve.errors import SolveError
 from ephs.solve.march import STEPS
 from ephs.solve.march.account import WHOLE, WORTH
 from ephs.solve.methods.own import Method, coefficients_of
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Leg, Span
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.control import Control
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Leg, Span
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.semi import Semi

@@ -12,12 +12,12 @@ from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import LARGEST, Outcome, SolveError
 from ephs.solve.march import STEPS, Ending, RunAccount, Status
 from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import DAMPING, PATIENCE, STRICT
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Counts, Span, Taken
+from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Counts, Span, Taken
 
 if TYPE_CHECKING:
     from ephs.mechanics.methods.semi import Semi

@@ -8,11 +8,11 @@ import numpy as np
 
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control
-from ephs.solve.errors import SolveError
+from ephs.solve.posing.errors import SolveError
 from ephs.solve.result.record import RunRecord
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Instants, Leg, Row, Span, Taken, too_fast
+from ephs.solve.running.control import Control
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Instants, Leg, Row, Span, Taken, too_fast
 
 HALVINGS = 4
 """Number of halvings of a failing part of a step whose whole succeeded."""

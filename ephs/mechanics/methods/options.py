@@ -5,8 +5,8 @@ from typing import Any
 from warnings import warn
 
 from ephs.mechanics.methods.registry import REPLACED, MethodEntry
-from ephs.solve.errors import OptionError, nearest_of
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import OptionError, nearest_of
+from ephs.solve.posing.problem import Problem
 
 
 def options_of(method: MethodEntry, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:

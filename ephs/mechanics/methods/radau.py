@@ -17,10 +17,10 @@ from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
 from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control
 from ephs.solve.methods.collocation import Collocation
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Leg, Span
+from ephs.solve.running.control import Control
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Leg, Span
 
 
 def tableau(scheme: Collocation) -> Mapping[str, Any]:

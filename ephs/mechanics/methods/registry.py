@@ -8,14 +8,14 @@ from warnings import warn
 
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.control import Control, Symmetric
-from ephs.solve.errors import OptionError, nearest_of
+from ephs.solve.equations.model import Model
 from ephs.solve.march.control import Policy, Proportional
 from ephs.solve.methods import own
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import Model
-from ephs.solve.problem import Problem
-from ephs.solve.stepping import Stepper
+from ephs.solve.posing.errors import OptionError, nearest_of
+from ephs.solve.posing.problem import Problem
+from ephs.solve.running.control import Control, Symmetric
+from ephs.solve.running.stepping import Stepper
 
 
 @final

@@ -22,9 +22,9 @@ from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
-from ephs.solve.control import Control
 from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march import Status
+from ephs.solve.running.control import Control
 
 NAME: Final = "semi"
 ORDER: Final = 3

@@ -13,13 +13,13 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedSta
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
-from ephs.solve.control import Control
-from ephs.solve.errors import Outcome, SolveError
 from ephs.solve.march import Newton
 from ephs.solve.march.iteration import iterate
 from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.solvers import Solver, dense
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.control import Control
 
 SOLVED = 1e-13
 """Attainable relative accuracy of a step's equations: rounding, times a condition of some hundreds."""

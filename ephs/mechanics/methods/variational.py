@@ -23,10 +23,10 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY
-from ephs.solve.control import Control
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.control import Control
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt
 
 EXACT = 4e-16
 """Smallest attainable residual, relative to its terms: two roundings."""

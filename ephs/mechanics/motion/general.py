@@ -16,10 +16,10 @@ from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import pseudoinverse, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.instant import instant
-from ephs.solve.motion_law import MotionLaw
+from ephs.solve.equations.instant import instant
+from ephs.solve.posing.motion_law import MotionLaw
 from ephs.solve.result.solution import Solution
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 
 @final

@@ -18,8 +18,8 @@ from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import LEAP
-from ephs.solve.control import SLIVER
 from ephs.solve.result.states import RecordedStates
+from ephs.solve.running.control import SLIVER
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -21,7 +21,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.solve.errors import nearest_of
+from ephs.solve.posing.errors import nearest_of
 from ephs.solve.result.labels import Labels, freedoms
 
 if TYPE_CHECKING:

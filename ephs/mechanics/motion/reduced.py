@@ -24,11 +24,11 @@ from ephs.mechanics.tree.finding.tables import SPRING, TREE
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.errors import OptionError, SolveError
-from ephs.solve.motion_law import MotionLaw
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.posing.errors import OptionError, SolveError
+from ephs.solve.posing.motion_law import MotionLaw
+from ephs.solve.posing.problem import Problem, Signal
 from ephs.solve.result.solution import Solution
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 
 @final

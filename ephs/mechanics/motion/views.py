@@ -24,8 +24,8 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.systems.kept import once
-from ephs.solve.errors import nearest_of
-from ephs.solve.problem import State
+from ephs.solve.posing.errors import nearest_of
+from ephs.solve.posing.problem import State
 
 Item = TypeVar("Item")
 AXIAL = frozenset({"revolute", "prismatic", "cylindrical", "screw"})

@@ -21,10 +21,10 @@ from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, rank_of
-from ephs.solve.errors import OptionError
-from ephs.solve.model import compile_model
-from ephs.solve.problem import Problem
-from ephs.solve.sparse import Index
+from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.problem import Problem
 
 
 @final

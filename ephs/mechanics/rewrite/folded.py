@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.rewrite.folding import FOLD
 from ephs.mechanics.rewrite.rewrite import rewrite
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
 
 

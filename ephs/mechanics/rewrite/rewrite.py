@@ -15,7 +15,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 
 State = Mapping[Path, Array]
 MOST = 20

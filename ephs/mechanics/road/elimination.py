@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ephs.operad.disjoint import DisjointSets
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 
 class ClosingProgram(NamedTuple):

@@ -29,10 +29,10 @@ from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.systems.system import System
-from ephs.solve.ending import solution_of
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
 from ephs.solve.result.solution import Solution
+from ephs.solve.running.ending import solution_of
 
 OPEN = 1e-6
 """Largest joint residual of given initial states, in m or rad."""

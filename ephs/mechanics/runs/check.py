@@ -21,10 +21,10 @@ from ephs.semantics.systems.laws import Probe, system_law
 from ephs.semantics.systems.report import DOUBTS, CheckItem, CheckReport, check_assembly, check_structure, check_types
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.audit import LAWFUL
-from ephs.solve.errors import SolveError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.solution import Solution
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import Path
-from ephs.solve.journal import Journal, Written
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
+from ephs.solve.running.journal import Journal, Written
 
 _PROGRAMS = ("ephs", "numpy", "scipy", "llvmlite")
 

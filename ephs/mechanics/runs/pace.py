@@ -9,13 +9,13 @@ import numpy as np
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import PAIRS, pair
 from ephs.solve.auditing.audit import LEAP
-from ephs.solve.errors import SolveError
-from ephs.solve.problem import NO_STATE
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.posing.problem import NO_STATE
 
 if TYPE_CHECKING:
     from ephs.operad import Quantity
     from ephs.semantics.bundles.bundle import Array
-    from ephs.solve.problem import Problem, Signal
+    from ephs.solve.posing.problem import Problem, Signal
 
 TURN = 0.1
 """Step limit for prescribed motions: largest displacement in rad, or as a fraction of the scene's extent."""

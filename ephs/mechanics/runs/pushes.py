@@ -16,7 +16,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
-from ephs.solve.problem import Signal, State
+from ephs.solve.posing.problem import Signal, State
 
 
 def part_of(whole: Signal, where: slice) -> Signal:

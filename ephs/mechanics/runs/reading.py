@@ -19,14 +19,14 @@ from ephs.mechanics.scene.soundness import check_scene, meshes_within
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
-from ephs.solve.ending import solution_of
-from ephs.solve.errors import OptionError
-from ephs.solve.journal import MAGIC, read_journal
-from ephs.solve.motion_law import MotionLaw
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.motion_law import MotionLaw
+from ephs.solve.posing.problem import Problem, Signal
 from ephs.solve.result.guard import check_file
 from ephs.solve.result.record import RowBlocks
 from ephs.solve.result.solution import Solution
+from ephs.solve.running.ending import solution_of
+from ephs.solve.running.journal import MAGIC, read_journal
 
 
 def load_solution(path: str | File, model: System | Scene | None = None) -> Solution:

@@ -7,7 +7,7 @@ from ephs.mechanics.rewrite.steps import Reduction, Step, listed
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.systems.system import System
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 
 @in_one_thread

@@ -12,15 +12,15 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.growth import Again
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import RTOL, Control, Tolerance
-from ephs.solve.errors import OptionError, SolveError
-from ephs.solve.events import Event
-from ephs.solve.journal import Written
-from ephs.solve.loop import integrate
-from ephs.solve.problem import Problem, State
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.errors import OptionError, SolveError
+from ephs.solve.posing.events import Event
+from ephs.solve.posing.problem import Problem, State
 from ephs.solve.result.solution import Solution
-from ephs.solve.watching import Progress
+from ephs.solve.running.control import RTOL, Control, Tolerance
+from ephs.solve.running.journal import Written
+from ephs.solve.running.loop import integrate
+from ephs.solve.running.watching import Progress
 
 CLOSE = 1e-4
 """Tolerance of the steps of an independent run."""

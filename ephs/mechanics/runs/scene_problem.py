@@ -26,7 +26,7 @@ from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.systems.kept import once
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -8,11 +8,11 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
-from ephs.solve.errors import OptionError, nearest_of
-from ephs.solve.motion_law import MotionLaw
-from ephs.solve.probe import ProbedInput
-from ephs.solve.problem import Problem, Signal, State, States
-from ephs.solve.sampled import Held
+from ephs.solve.posing.errors import OptionError, nearest_of
+from ephs.solve.posing.motion_law import MotionLaw
+from ephs.solve.posing.probe import ProbedInput
+from ephs.solve.posing.problem import Problem, Signal, State, States
+from ephs.solve.posing.sampled import Held
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -20,17 +20,17 @@ from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import random_efforts
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.findings import POLICIES, judged
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import ATOL, RTOL, Control, Tolerance, told_apart
-from ephs.solve.errors import OptionError, count_of, failing_at, nearest_of, number_of
-from ephs.solve.events import events_of
-from ephs.solve.journal import Journal
 from ephs.solve.methods.own import Method, coefficients_of
-from ephs.solve.problem import Problem
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.errors import OptionError, count_of, failing_at, nearest_of, number_of
+from ephs.solve.posing.events import events_of
+from ephs.solve.posing.problem import Problem
+from ephs.solve.posing.sampled import Sampling, holding
 from ephs.solve.result.solution import Solution
-from ephs.solve.sampled import Sampling, holding
-from ephs.solve.threads import in_one_thread
-from ephs.solve.watching import guarded
+from ephs.solve.running.control import ATOL, RTOL, Control, Tolerance, told_apart
+from ephs.solve.running.journal import Journal
+from ephs.solve.running.threads import in_one_thread
+from ephs.solve.running.watching import guarded
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -105,7 +105,7 @@ def simulate(
         `ephs.mechanics.motion.views.StateView`.
     jumps
         Ascending times in s at which inputs jump, or a mapping from inputs to such times: steps end there, and restart
-        on the other side. Functions are searched for further jumps; see `ephs.solve.probe`.
+        on the other side. Functions are searched for further jumps; see `ephs.solve.posing.probe`.
     reference
         The reference environment of a system; a scene has its own.
     progress

@@ -13,7 +13,7 @@ from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.systems.system import System
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.posing.problem import Problem, Signal
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -10,8 +10,8 @@ from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.documents.systems import to_dict_in_order
 from ephs.semantics.systems.system import System
-from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
-from ephs.solve.problem import Signal
+from ephs.solve.posing.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
+from ephs.solve.posing.problem import Signal
 
 _LAWS: dict[str, Any] = {law.__name__: law for law in (PolynomialMotion, HarmonicMotion, TabulatedMotion)}
 

@@ -12,8 +12,8 @@ from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import Scene
-from ephs.solve.errors import SolveError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.solution import Solution
 
 

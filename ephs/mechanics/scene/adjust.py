@@ -15,7 +15,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, LIGHT
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 ITERATIONS = 60
 

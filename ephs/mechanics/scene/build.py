@@ -26,7 +26,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.kept import once
 from ephs.semantics.systems.system import Filling, System
-from ephs.solve.problem import Signal
+from ephs.solve.posing.problem import Signal
 
 
 def component_path(kind: str, name: str) -> Path:

@@ -34,7 +34,7 @@ from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ALIGNED
-from ephs.solve.motion_law import MotionLaw
+from ephs.solve.posing.motion_law import MotionLaw
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.resolve_elements import ReferableNames

@@ -23,7 +23,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, EXPLICIT, REGULAR, rank_of
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 STRIDE, STRIDES = 0.2, 5
 """Steps of the finite motion that is tried, in rad or parts of the mechanism's length, and their number each way."""

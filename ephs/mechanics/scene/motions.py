@@ -7,8 +7,8 @@ from typing import Any, Final
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.errors import shown
 from ephs.mechanics.scene.schema_numbers import EntryTable, Number, Series, key
-from ephs.solve.errors import OptionError
-from ephs.solve.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
 
 
 class MotionEntry(EntryTable):

@@ -22,9 +22,9 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.spaces import Pair, pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.mobility import Mobility, mobility
-from ephs.solve.motion_law import MotionLaw
-from ephs.solve.problem import Problem, Signal, State
+from ephs.solve.equations.mobility import Mobility, mobility
+from ephs.solve.posing.motion_law import MotionLaw
+from ephs.solve.posing.problem import Problem, Signal, State
 from ephs.solve.result.record import RunRecord
 
 NEAR = 16, 20, 20

@@ -19,7 +19,7 @@ from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.systems.kept import once
 from ephs.semantics.systems.system import Filling, System
-from ephs.solve.problem import Signal
+from ephs.solve.posing.problem import Signal
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -18,10 +18,10 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.own import Method
-from ephs.solve.sparse import Index
-from ephs.solve.threads import in_one_thread
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

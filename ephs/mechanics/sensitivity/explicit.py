@@ -32,10 +32,10 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.stage import Table
-from ephs.solve.errors import OptionError, SolveError
 from ephs.solve.march import Status
-from ephs.solve.problem import Problem
-from ephs.solve.stepping import Row
+from ephs.solve.posing.errors import OptionError, SolveError
+from ephs.solve.posing.problem import Problem
+from ephs.solve.running.stepping import Row
 
 WEIGHTS: Final = {
     "mass": np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),

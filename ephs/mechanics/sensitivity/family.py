@@ -23,8 +23,8 @@ from ephs.semantics.derive.relations import entry_of
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.stage import Program
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

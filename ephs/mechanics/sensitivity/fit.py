@@ -14,9 +14,9 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from ephs.solve.result.solution import Solution
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -20,15 +20,15 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector
-from ephs.solve.errors import OptionError, SolveError
+from ephs.solve.equations.model import Evaluation, Model, compile_model
 from ephs.solve.methods.moves import move_states
 from ephs.solve.methods.natural import Natural, NaturalState
 from ephs.solve.methods.records import Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import Evaluation, Model, compile_model
-from ephs.solve.problem import Problem
-from ephs.solve.stepping import Row
+from ephs.solve.posing.errors import OptionError, SolveError
+from ephs.solve.posing.problem import Problem
+from ephs.solve.running.stepping import Row
 
 
 @final

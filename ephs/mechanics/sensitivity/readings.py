@@ -6,7 +6,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from ephs.solve.result.solution import Solution
 
 Reading = Callable[[Solution], Array]

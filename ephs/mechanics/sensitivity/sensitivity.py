@@ -13,11 +13,11 @@ from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamil
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError, failing_at, nearest_of
 from ephs.solve.methods.own import Method
+from ephs.solve.posing.errors import OptionError, failing_at, nearest_of
 from ephs.solve.result.replay import replay
 from ephs.solve.result.solution import Solution
-from ephs.solve.threads import in_one_thread
+from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

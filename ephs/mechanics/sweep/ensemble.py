@@ -27,11 +27,11 @@ from ephs.mechanics.tree.finding.tables import TREE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.solve.auditing.audit import Bounds
-from ephs.solve.control import ATOL, RTOL, Control, first_step
-from ephs.solve.errors import LARGEST
+from ephs.solve.equations.sparse import Index
 from ephs.solve.march import Ending
-from ephs.solve.sparse import Index
-from ephs.solve.stepping import Span
+from ephs.solve.posing.errors import LARGEST
+from ephs.solve.running.control import ATOL, RTOL, Control, first_step
+from ephs.solve.running.stepping import Span
 
 BURST = 100_000
 """Largest number of compiled steps of a member; longer ones are run individually, with progress."""

@@ -25,8 +25,8 @@ from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
-from ephs.solve.errors import SolveError
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import SolveError
 
 Truths = NDArray[np.bool_]
 

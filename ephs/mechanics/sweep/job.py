@@ -19,8 +19,8 @@ from ephs.mechanics.sweep.images import FAULTS
 from ephs.mechanics.sweep.outputs import Output
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError, SemanticsError
-from ephs.solve.errors import Interrupted, SimulationError
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import Interrupted, SimulationError
 
 if TYPE_CHECKING:
     from ephs.semantics.systems.system import System

@@ -14,8 +14,8 @@ from ephs.mechanics.sweep.images import Truths
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.repeating import Repeated
+from ephs.solve.equations.sparse import Index
 from ephs.solve.march import Ending, MarchControl, RunAccount
-from ephs.solve.sparse import Index
 
 Stack = tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]
 """An array of bound calls, and one of its shape for every member, in rows."""

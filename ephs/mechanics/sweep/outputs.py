@@ -10,7 +10,7 @@ from ephs.mechanics.motion.readout import freedoms_of
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from ephs.solve.result.labels import POSE, WRENCH, Labels, labels_of
 from ephs.solve.result.temperatures import heat_storages
 

@@ -10,7 +10,7 @@ from ephs.mechanics.sweep.images import Truths
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.auditing.audit import MOTION, Bounds
 from ephs.solve.auditing.growth import apart
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 
 LONGER = 4
 """Length of comparison steps in constant steps."""

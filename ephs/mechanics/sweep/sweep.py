@@ -16,8 +16,8 @@ from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.job import DONE, Job, MemberBatch
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.semantics.bundles.errors import listed
-from ephs.solve.errors import OptionError, number_of
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import OptionError, number_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,9 +15,9 @@ from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import CostWarning
-from ephs.solve.errors import Interrupted, SimulationError
-from ephs.solve.errors import Outcome as Failure
 from ephs.solve.methods.own import Method
+from ephs.solve.posing.errors import Interrupted, SimulationError
+from ephs.solve.posing.errors import Outcome as Failure
 from ephs.solve.result.solution import Solution
 
 MOST_STEPS = 500_000

@@ -23,8 +23,8 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.show.motions.player import player
 from ephs.show.motions.stage import Stage, stage_of
 from ephs.show.shared.page import Page
-from ephs.solve.ending import solution_of
 from ephs.solve.result.record import RunRecord
+from ephs.solve.running.ending import solution_of
 
 LARGEST: Final = 64 * 2**20
 """Largest size of a dropped model, in bytes."""

@@ -19,10 +19,10 @@ from ephs.solve.auditing.passing import passed_over
 from ephs.solve.auditing.resolution import STILL, StepError, Trials
 from ephs.solve.auditing.retaken import Missed
 from ephs.solve.auditing.rounding import exchanged, isolated, rounded, trembling
-from ephs.solve.breakpoints import MOST_FOUND
-from ephs.solve.errors import Other, or_take, serves_not
+from ephs.solve.equations.model import Model
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import Model
+from ephs.solve.posing.breakpoints import MOST_FOUND
+from ephs.solve.posing.errors import Other, or_take, serves_not
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, final
 
-from ephs.solve.errors import Outcome, SimulationError
+from ephs.solve.posing.errors import Outcome, SimulationError
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -11,7 +11,7 @@ from typing import Any, final
 
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.findings import CostWarning
-from ephs.solve.snapshot import Resumable
+from ephs.solve.running.snapshot import Resumable
 
 FIRST = 32
 """Number of steps before the first forecast, which uses the later half; doubled for each further forecast."""

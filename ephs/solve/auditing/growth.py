@@ -19,9 +19,9 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.rounding import rounded
-from ephs.solve.control import SLIVER
-from ephs.solve.errors import Interrupted
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import Interrupted
+from ephs.solve.running.control import SLIVER
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -13,8 +13,8 @@ from ephs.operad import Path
 from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing.resolution import STILL
 from ephs.solve.auditing.rounding import trembling
-from ephs.solve.instant import compliance_of
-from ephs.solve.oscillations import oscillations
+from ephs.solve.equations.instant import compliance_of
+from ephs.solve.equations.oscillations import oscillations
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -6,8 +6,8 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Point, Storage
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.problem import Problem
 
 SHARE = 1e-12
 """Fraction of the entropies exchanged and produced in a step: smaller negative productions are rounding."""

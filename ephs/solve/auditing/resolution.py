@@ -30,16 +30,16 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.solve.auditing.growth import Again, apart
 from ephs.solve.auditing.retaken import Retaken
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import SLIVER
+from ephs.solve.equations.model import Model, compile_model
 from ephs.solve.methods.driven import advance_driven
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.paced import Paced
-from ephs.solve.model import Model, compile_model
-from ephs.solve.problem import Problem
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RowBlocks, RunRecord
-from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Instants, Stepper
+from ephs.solve.running.control import SLIVER
+from ephs.solve.running.snapshot import Snapshot, like, parts
+from ephs.solve.running.stepping import Instants, Stepper
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -11,10 +11,10 @@ from typing import Generic, TypeVar, final
 
 import numpy as np
 
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.errors import SolveError
-from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Attempt, Stepper
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.snapshot import Snapshot, like, parts
+from ephs.solve.running.stepping import Attempt, Stepper
 
 S = TypeVar("S")
 PARTS = 3

@@ -12,12 +12,12 @@ from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import Pair
 from ephs.semantics.systems.kept import once
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import compile_model
 from ephs.solve.result.states import RecordedStates
 
 if TYPE_CHECKING:
-    from ephs.solve.problem import Problem
+    from ephs.solve.posing.problem import Problem
     from ephs.solve.result.solution import Solution
 
 SOLVED = 100.0 * float(np.finfo(float).eps)

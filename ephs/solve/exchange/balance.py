@@ -15,7 +15,7 @@ bonds in co-simulations (2017), whose corrections are of what units take.
 
 from typing import Final, final
 
-from ephs.solve.snapshot import Resumable
+from ephs.solve.running.snapshot import Resumable
 
 PART: Final = 0.2
 """δ as a part of the largest X: a correction is at most D/(2δ)."""

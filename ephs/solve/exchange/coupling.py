@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import nearest_of
 from ephs.solve.exchange.balance import PortBalance
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.together import Together, number
 from ephs.solve.exchange.unit import PowerPort
 from ephs.solve.exchange.wires import WireEnd, place_of
-from ephs.solve.sampled import Sampled
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.errors import nearest_of
+from ephs.solve.posing.sampled import Sampled
+from ephs.solve.running.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.solve.exchange.exchange import Exchange

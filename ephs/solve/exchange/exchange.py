@@ -7,12 +7,12 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import number_of
 from ephs.solve.exchange.coupling import Bond, Coupling, coupling_of
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.together import Together
 from ephs.solve.exchange.unit import Unit
 from ephs.solve.exchange.wires import Source, WireEnd, place_of, sources_of, starting_order
+from ephs.solve.posing.errors import number_of
 
 SLIVER = 1e-9
 """Tolerance for times, as a fraction of a period."""

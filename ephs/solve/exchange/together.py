@@ -8,7 +8,7 @@ import numpy as np
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.running import Running
 from ephs.solve.exchange.wires import WireEnd
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.running.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.solve.exchange.exchange import Exchange

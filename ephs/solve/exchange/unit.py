@@ -7,8 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, final
 
-from ephs.solve.errors import nearest_of
 from ephs.solve.exchange.errors import ExchangeError
+from ephs.solve.posing.errors import nearest_of
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd")
 """Base units by their names in model descriptions; radians count as numbers."""

@@ -6,9 +6,9 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.solve.errors import nearest_of
 from ephs.solve.exchange.errors import ExchangeError
 from ephs.solve.exchange.unit import Unit
+from ephs.solve.posing.errors import nearest_of
 
 Source = float | Callable[[float, Any], Any]
 """A constant, or a function f(t, state)."""

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any, TypeAlias, final
 
 from ephs.semantics.stage import PLAIN, Evaluator, Integer, Real, Truth
-from ephs.solve.control import SLIVER, Symmetric
 from ephs.solve.march.iteration import BEYOND
 from ephs.solve.march.records import MarchControl
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.running.control import SLIVER, Symmetric
+from ephs.solve.running.snapshot import Snapshot
 
 DAMPING, STRICT, NEAR = 0.4, 30.0, 0.93
 """How much the last error counts; the most by which a step's part of the tolerance makes its acceptance stricter; what

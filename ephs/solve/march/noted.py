@@ -5,7 +5,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.snapshot import Resumable
+from ephs.solve.running.snapshot import Resumable
 
 
 @final

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
-from ephs.solve.errors import SolveError
+from ephs.solve.equations.model import Model, cancelled, evaluate_at
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.records import STORING
-from ephs.solve.model import Model, cancelled, evaluate_at
-from ephs.solve.sparse import Index
+from ephs.solve.posing.errors import SolveError
 
 SHRUNK = 1e-3
 """Part of its first size to which a pivot may shrink: pivots fall with the part that omitted equations have in their

@@ -3,10 +3,10 @@
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.equations.model import Model, evaluate_at
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.scales import NOTHING
-from ephs.solve.model import Model, evaluate_at
-from ephs.solve.sparse import Index
+from ephs.solve.posing.errors import Outcome, SolveError
 
 
 def diverged(model: Model, dropped: Index, residual: Array, scale: Array) -> SolveError:

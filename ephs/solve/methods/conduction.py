@@ -7,9 +7,9 @@ from scipy.sparse import csr_array
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.verdicts.conduction import conductances
+from ephs.solve.equations.model import Model
 from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.model import Model
 
 
 @final

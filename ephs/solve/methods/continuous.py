@@ -13,10 +13,10 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import SolveError
+from ephs.solve.equations.model import Evaluation, Model, cancelled
 from ephs.solve.methods.records import STORING
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import Evaluation, Model, cancelled
+from ephs.solve.posing.errors import SolveError
 
 
 @final

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.equations.model import Model, evaluate_at
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
-from ephs.solve.model import Model, evaluate_at
-from ephs.solve.problem import NO_STATE, Problem, State
+from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
+from ephs.solve.posing.problem import NO_STATE, Problem, State
 from ephs.solve.result.record import joined
 
 ROUNDED_INPUTS = 1e-13

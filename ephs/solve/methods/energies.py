@@ -10,12 +10,12 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.solve.equations.model import Model
 from ephs.solve.methods.conduction import ConductionMatrix
 from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.solvers import DENSE
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.model import Model
 
 
 @final

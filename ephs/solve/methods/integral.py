@@ -26,8 +26,9 @@ from ephs.semantics.stage import (
     Vector,
     staged,
 )
-from ephs.solve.errors import SolveError
-from ephs.solve.layout import LINEAR
+from ephs.solve.equations.layout import LINEAR
+from ephs.solve.equations.model import Model
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
 from ephs.solve.methods.places import Part, add_to
 from ephs.solve.methods.records import (
@@ -43,8 +44,7 @@ from ephs.solve.methods.records import (
     row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, called, evaluation_program
-from ephs.solve.model import Model
-from ephs.solve.sparse import Index
+from ephs.solve.posing.errors import SolveError
 
 
 def _product(on: Evaluator, start: Integers, column: Integers, value: Vector, i: Integer, x: Vector) -> Real:

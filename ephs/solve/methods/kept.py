@@ -7,10 +7,10 @@ mechanisms: when matrices are made anew, when they are factorised, and what a ru
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar, final
 
-from ephs.solve.errors import SolveError
 from ephs.solve.methods.collocation import Collocation
 from ephs.solve.methods.solvers import Solver
-from ephs.solve.snapshot import Snapshot, like, parts
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.snapshot import Snapshot, like, parts
 
 S = TypeVar("S")
 M = TypeVar("M")

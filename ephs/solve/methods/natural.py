@@ -16,7 +16,8 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.kernel_table import RAISED
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.semantics.spaces.rank import TINY
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.equations.model import Model
+from ephs.solve.equations.sparse import Index, order
 from ephs.solve.methods.analysis import (
     AS_BEFORE,
     AT_START,
@@ -37,10 +38,9 @@ from ephs.solve.methods.residuals import FAULTS
 from ephs.solve.methods.scheme import gauss
 from ephs.solve.methods.spread import closing_of, groups_of, memory_of
 from ephs.solve.methods.stored import StoredEnergies
-from ephs.solve.model import Model
+from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.result.record import RunRecord
-from ephs.solve.snapshot import Snapshot, parts
-from ephs.solve.sparse import Index, order
+from ephs.solve.running.snapshot import Snapshot, parts
 
 SETTLING = 16
 """Steps after a change of order until the next: the values at the change itself may be exceptional."""

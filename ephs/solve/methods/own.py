@@ -14,8 +14,8 @@ from typing import Any, Never, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError
 from ephs.solve.methods.orders import order_of, power_of
+from ephs.solve.posing.errors import OptionError
 
 MOST_STAGES = 64
 

@@ -10,18 +10,18 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
-from ephs.solve.breakpoints import NEAR
-from ephs.solve.control import Control, Grid
-from ephs.solve.instant import rates_read
+from ephs.solve.equations.instant import rates_read
+from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.equations.starting import check_start
 from ephs.solve.methods.driven import advance_driven, advance_whole
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
 from ephs.solve.methods.records import IRREVERSIBLE
-from ephs.solve.model import Model, compile_model
-from ephs.solve.problem import Problem
+from ephs.solve.posing.breakpoints import NEAR
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord, record_of
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.starting import check_start
-from ephs.solve.stepping import Attempt, Counts, Instant, Instants, Row, Span, Taken
+from ephs.solve.running.control import Control, Grid
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Row, Span, Taken
 
 FIRST = 16
 """Steps in the first compiled call, by which the time of a step becomes known."""

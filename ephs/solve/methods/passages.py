@@ -7,12 +7,12 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.primitives.primitives import Storage
-from ephs.solve.heats import Heats
+from ephs.solve.equations.heats import Heats
+from ephs.solve.equations.model import Model
 from ephs.solve.methods.conduction import ConductionMatrix
 from ephs.solve.methods.continuous import AccumulatorRates
 from ephs.solve.methods.records import IRREVERSIBLE, STORING
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.model import Model
 
 
 @final

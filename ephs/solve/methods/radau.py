@@ -12,8 +12,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
-from ephs.solve.control import Control
-from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.equations.model import compile_model
 from ephs.solve.march.iteration import FAST, iterate
 from ephs.solve.methods.collocation import moments, radau_for, values
 from ephs.solve.methods.continuous import AccumulatorRates, Matrices
@@ -24,11 +23,12 @@ from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.settling import PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solvers
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.model import compile_model
-from ephs.solve.problem import NO_STATE, Problem
+from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
+from ephs.solve.posing.problem import NO_STATE, Problem
 from ephs.solve.result.record import RunRecord, record_of
-from ephs.solve.snapshot import Snapshot
-from ephs.solve.stepping import Attempt, Instants, Row, Span
+from ephs.solve.running.control import Control
+from ephs.solve.running.snapshot import Snapshot
+from ephs.solve.running.stepping import Attempt, Instants, Row, Span
 
 PROBE = 1e-7
 """Fraction of the first step for the trial of the start, which detects states that violate constraints."""

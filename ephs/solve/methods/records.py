@@ -123,7 +123,7 @@ class TablesOf(Generic[Whole, Numbers]):
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class OrderOf(Generic[Whole, Numbers]):
-    """`ephs.solve.sparse.Elimination` as arrays, and which constraint rows are left out.
+    """`ephs.solve.equations.sparse.Elimination` as arrays, and which constraint rows are left out.
 
     Attributes
     ----------

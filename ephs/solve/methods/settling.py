@@ -16,14 +16,14 @@ from ephs.semantics.linear.sums import grown
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Table, Vector
-from ephs.solve.errors import SolveError
+from ephs.solve.equations.model import Model
 from ephs.solve.march.account import ROUNDING, RunAccount, rounding, worth
 from ephs.solve.march.noted import Noted
 from ephs.solve.march.storing import Missing, Moved, store
 from ephs.solve.methods.places import Part
 from ephs.solve.methods.records import STORING, Columns, Scratch, parts_of
 from ephs.solve.methods.residuals import FAULTS, called
-from ephs.solve.model import Model
+from ephs.solve.posing.errors import SolveError
 
 ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY = range(6)
 """Numbers of a state's account: those of `RunAccount`; the heat in J that went to stores of heat, and its rounding."""

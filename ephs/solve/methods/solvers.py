@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError
 
 DENSE = 48
 """Unknowns up to which factorising without regard to zeros is faster."""

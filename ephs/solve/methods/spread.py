@@ -8,10 +8,10 @@ from ephs.semantics.derive.holonomic import Holonomic
 from ephs.semantics.primitives.primitives import Kernel
 from ephs.semantics.primitives.pullback import pulled_ports
 from ephs.semantics.spaces.codes import SE3
+from ephs.solve.equations.model import Model
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.records import STORING
 from ephs.solve.methods.scheme import Groups, GroupsOf, Stages, StagesOf
-from ephs.solve.model import Model
-from ephs.solve.sparse import Index
 
 
 def groups_of(model: Model, stages: int) -> Groups:

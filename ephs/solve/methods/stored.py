@@ -6,9 +6,9 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import SolveError
+from ephs.solve.equations.model import Evaluation, Model
 from ephs.solve.methods.records import efforts_of, rates_of
-from ephs.solve.model import Evaluation, Model
+from ephs.solve.posing.errors import SolveError
 
 
 @final

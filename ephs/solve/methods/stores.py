@@ -7,9 +7,9 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.primitives.primitives import Primitive, Storage
-from ephs.solve.heats import exponential_law
+from ephs.solve.equations.heats import exponential_law
+from ephs.solve.equations.model import Model
 from ephs.solve.methods.records import REVERSIBLE, STORING, WORKING, efforts_of
-from ephs.solve.model import Model
 
 
 @final

@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.problem import Problem, State
+from ephs.solve.posing.problem import Problem, State
 from ephs.solve.result.labels import Labels, power_labels
 from ephs.solve.result.ledger import Ledgers
 

@@ -11,7 +11,7 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.auditing.findings import Audit
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.dataset import FORMAT, TIME, Content, DatasetVariable, content
 from ephs.solve.result.durable import durable
 from ephs.solve.result.guard import MOST, name_for_file, name_from_file

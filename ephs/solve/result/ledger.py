@@ -10,7 +10,7 @@ from ephs.operad import Path
 from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
 
 STILL = 1e-9

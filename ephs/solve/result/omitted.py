@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.dataset import Content, DatasetVariable
 from ephs.solve.result.ledger import Ledgers, ledgers
 from ephs.solve.result.record import RunRecord

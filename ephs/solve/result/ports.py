@@ -8,8 +8,8 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
-from ephs.solve.instant import instant
-from ephs.solve.problem import Signal
+from ephs.solve.equations.instant import instant
+from ephs.solve.posing.problem import Signal
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
-from ephs.solve.stepping import Instants, Row
+from ephs.solve.running.stepping import Instants, Row
 
 
 @final

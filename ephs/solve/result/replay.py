@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.ending import solution_of
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RowBlocks, record_of
 from ephs.solve.result.solution import Solution
-from ephs.solve.stepping import Row
+from ephs.solve.running.ending import solution_of
+from ephs.solve.running.stepping import Row
 
 
 def replay(problem: Problem, t: Array, rows: Sequence[Row], remark: str) -> Solution:

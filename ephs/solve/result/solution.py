@@ -13,8 +13,8 @@ from ephs.operad import ROOT, Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import Audit
-from ephs.solve.events import Crossing
-from ephs.solve.problem import Linked, MechanicalMotion, Problem
+from ephs.solve.posing.events import Crossing
+from ephs.solve.posing.problem import Linked, MechanicalMotion, Problem
 from ephs.solve.result.dataset import DatasetVariable, sampled_inputs
 from ephs.solve.result.entries import LedgerEntry, entry_of
 from ephs.solve.result.labels import Labels

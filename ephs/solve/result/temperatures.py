@@ -8,7 +8,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor
 from ephs.semantics.primitives.primitives import Storage
-from ephs.solve.errors import nearest_of
+from ephs.solve.posing.errors import nearest_of
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution

@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from tests.mechanics.dynamics.drawn import moving
 
 EPS = float(np.finfo(float).eps)

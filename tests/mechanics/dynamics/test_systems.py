@@ -6,7 +6,7 @@ import pytest
 import ephs
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from tests.mechanics.methods.systems import nested
 from tests.mechanics.methods.test_by_hand import four_bar
 

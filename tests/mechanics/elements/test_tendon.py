@@ -15,7 +15,7 @@ from ephs.mechanics.scene.tendons import Tendon
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
-from ephs.solve.problem import Signal
+from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
 from tests.written import scene_of_text

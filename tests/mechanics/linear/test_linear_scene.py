@@ -17,8 +17,8 @@ from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.parameters import varied
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.continuous import Continuous
-from ephs.solve.model import compile_model
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped

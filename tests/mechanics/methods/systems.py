@@ -9,7 +9,7 @@ from ephs.mechanics.scene.build import initial_state, scene_inputs, scene_system
 from ephs.operad import Path, junction
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.systems.system import System
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.posing.problem import Problem, Signal
 from tests.oracle import Oracle
 
 

@@ -14,7 +14,7 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import SE3
-from ephs.solve.instant import instant
+from ephs.solve.equations.instant import instant
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import renamed
 

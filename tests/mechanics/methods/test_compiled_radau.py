@@ -13,7 +13,7 @@ from ephs.mechanics.methods.stages import KeptJacobian, scheme_of
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.solve.control import Control, Tolerance
+from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.ball import BALL
 from tests.written import scene_of_text
 

@@ -11,8 +11,8 @@ from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve.control import Control, Tolerance
 from ephs.solve.methods.collocation import radau
+from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.written import scene_of_text

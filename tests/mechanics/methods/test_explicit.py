@@ -11,7 +11,7 @@ from benchmarks.cases import CASES
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.finding.mechanism import reduce_system
-from ephs.solve.model import compile_model
+from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
 from tests.written import scene_of_text
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks.hard.brakes import ENERGY, brake
 from ephs.mechanics.methods import radau as implicit
-from ephs.solve.heats import Heats
+from ephs.solve.equations.heats import Heats
 from ephs.solve.methods.collocation import radau
 from examples.failing import scene
 

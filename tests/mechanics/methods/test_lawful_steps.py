@@ -11,7 +11,7 @@ import ephs
 from benchmarks.hard.brakes import brake
 from ephs.mechanics.tree.equations.led import Led
 from ephs.semantics.linear.sums import grown
-from ephs.solve.errors import Outcome
+from ephs.solve.posing.errors import Outcome
 
 EPS = np.finfo(float).eps
 BALANCE = 1e-12

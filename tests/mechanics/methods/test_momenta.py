@@ -12,7 +12,7 @@ import ephs
 from ephs.mechanics.methods import registry
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve import loop
+from ephs.solve.running import loop
 from tests.mechanics.momenta import floating, momenta
 from tests.written import scene_of_text
 

@@ -20,7 +20,7 @@ from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path
 from ephs.semantics.primitives import structures
 from ephs.semantics.primitives.primitives import power_ports
-from ephs.solve.model import compile_model
+from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import problem_of, renamed
 

@@ -10,7 +10,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing import rounding
-from ephs.solve.stepping import Taken
+from ephs.solve.running.stepping import Taken
 
 SCENES = sorted((Path(__file__).resolve().parents[3] / "scenes").glob("*.toml"))
 

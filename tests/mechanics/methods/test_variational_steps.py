@@ -10,7 +10,7 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve.control import Control, Tolerance
+from ephs.solve.running.control import Control, Tolerance
 from tests.written import scene_of_text
 
 SCENE = """format = 1

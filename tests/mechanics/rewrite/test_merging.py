@@ -18,7 +18,7 @@ from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.model import frozen
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
-from ephs.solve.instant import instant
+from ephs.solve.equations.instant import instant
 from ephs.testing import mechanisms
 
 KINDS = (*4 * ("fixed",), "revolute", "spherical", "free")

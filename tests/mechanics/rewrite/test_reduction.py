@@ -18,8 +18,8 @@ from ephs.mechanics.scene.build import component_path, initial_state
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.semantics.spaces import SE3
-from ephs.solve.mobility import mobility
-from ephs.solve.model import compile_model
+from ephs.solve.equations.mobility import mobility
+from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
 from tests.written import scene_of_text
 

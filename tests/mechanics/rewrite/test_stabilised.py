@@ -16,9 +16,9 @@ from ephs.operad import Path
 from ephs.semantics import AssemblyError, Reference
 from ephs.semantics.meaning.step import step as plain_step
 from ephs.semantics.spaces import SE3, manifold
-from ephs.solve.errors import OptionError
+from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import compile_model
+from ephs.solve.posing.errors import OptionError
 
 SCENES = File(__file__).parents[3] / "scenes"
 EPS = float(np.finfo(float).eps)

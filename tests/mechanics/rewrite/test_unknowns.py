@@ -7,7 +7,7 @@ import pytest
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve.model import compile_model
+from ephs.solve.equations.model import compile_model
 from tests.written import scene_of_text
 
 SCENE = """format = 1

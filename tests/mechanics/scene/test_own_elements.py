@@ -27,7 +27,7 @@ from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import json_schema
 from ephs.mechanics.scene.soundness import check_scene
 from ephs.show.motions.lines import lines_of
-from ephs.solve.mobility import Mobility
+from ephs.solve.equations.mobility import Mobility
 from tests.solve.dense import dense_mobility
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "elements.md"

@@ -8,7 +8,7 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.sensitivity import explicit
 from ephs.mechanics.sensitivity.family import ParameterFamily
 from ephs.mechanics.tree.engine.tangents import StepTangent
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
 from tests.solve.test_own_methods import Kutta
 from tests.written import scene_of_text

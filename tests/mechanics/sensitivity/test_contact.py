@@ -5,7 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.parameters import varied
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 from tests.written import scene_of_text
 
 SCENE = """

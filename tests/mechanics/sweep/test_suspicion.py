@@ -6,7 +6,7 @@ import pytest
 import ephs
 from ephs.mechanics.sweep import ensemble, job
 from ephs.show.charts import family_scenes as scenes
-from ephs.solve.errors import Outcome
+from ephs.solve.posing.errors import Outcome
 from examples.failing import pendulum
 
 BRAKE = pendulum(6.0, "friction = 20.0")

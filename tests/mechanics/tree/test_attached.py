@@ -17,7 +17,7 @@ from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.operad import Path
-from ephs.solve.problem import Signal
+from ephs.solve.posing.problem import Signal
 from tests.mechanics.methods.systems import problem_of
 from tests.mechanics.tree import machines
 

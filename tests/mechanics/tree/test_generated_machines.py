@@ -12,7 +12,7 @@ from ephs.mechanics.scene.build import drive_ports, initial_state, scene_inputs,
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from ephs.semantics.systems.system import System
-from ephs.solve.problem import Signal
+from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import nested, problem_of
 from tests.mechanics.tree.general import held_to_the_general_form

@@ -12,7 +12,7 @@ from ephs import Pattern, junction, library, quantity
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.operad import Path
 from ephs.semantics.descriptor.descriptor import Input
-from ephs.solve.instant import instant
+from ephs.solve.equations.instant import instant
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import oracle_of, problem_of
 

@@ -6,7 +6,7 @@ import pytest
 import ephs
 from ephs import Pattern
 from ephs import library as lib
-from ephs.solve import loop
+from ephs.solve.running import loop
 
 PORT = {"effort": "force", "flow": "speed"}
 PERIOD, UNTIL = 0.02, 5.0

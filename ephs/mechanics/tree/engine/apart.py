@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ephs.mechanics.tree.finding.tables import TREE, MechanismTables
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.semantics.bundles.bundle import Array

@@ -12,7 +12,7 @@ from ephs.mechanics.tree.sweeps.network import INTEGERS, REALS, Called, Net, Sto
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import starts
 from ephs.semantics.stage import Evaluator, Integer, Vector
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced

@@ -26,7 +26,7 @@ from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program, Table
 from ephs.semantics.systems.kept import once
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced

@@ -3,7 +3,7 @@
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector
-from ephs.solve.heats import LITTLE, PLAIN
+from ephs.solve.equations.heats import LITTLE, PLAIN
 
 ROUNDING = 100.0 * 2.220446049250313e-16
 """Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
@@ -155,7 +155,10 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
 
 
 def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
-    """Make the heat of friction in a step's changes what the motion lost in J, see `ephs.solve.heats.Heats.booked`."""
+    """Make the heat of friction in a step's changes what the motion lost in J.
+
+    See `ephs.solve.equations.heats.Heats.booked`.
+    """
     nodes, whole = tables.node.size, on.variable(0.0)
 
     def weigh(i: Integer) -> None:

@@ -17,7 +17,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ASSEMBLY, TINY
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced

@@ -21,7 +21,7 @@ from ephs.mechanics.tree.engine.tangents import DIRECTIONS, paired
 from ephs.mechanics.tree.sweeps.expanding import ABOUT, About, memory_about
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Evaluator, Integer, Program, Vector, group
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced

@@ -19,7 +19,7 @@ from ephs.mechanics.tree.sweeps.grouping import Group, Middle
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Record, Table
 from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 ROUNDING: Final = 1e-12
 """Relative error of coordinates in the distance beyond which no point of a contact acts."""

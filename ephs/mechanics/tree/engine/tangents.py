@@ -27,7 +27,7 @@ from ephs.semantics.stage import (
     Table,
     Vector,
 )
-from ephs.solve.heats import PLAIN
+from ephs.solve.equations.heats import PLAIN
 from ephs.solve.march import MarchControl, RunAccount, TableauRecord
 from ephs.solve.march.steps import attempt
 

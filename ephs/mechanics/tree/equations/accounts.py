@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError, nearest_of
 from ephs.solve.march import Status
 from ephs.solve.march.account import WORTH
 from ephs.solve.march.noted import Noted
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.errors import OptionError, nearest_of
+from ephs.solve.running.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState

@@ -13,10 +13,10 @@ from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.model import STORING
+from ephs.solve.equations.model import STORING
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.result.record import RunRecord
-from ephs.solve.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState

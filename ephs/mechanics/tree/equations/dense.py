@@ -16,9 +16,9 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.linear.rows import row_program
 from ephs.semantics.spaces.rank import CLOSED_SINGULAR, GAP
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.heats import Heats
+from ephs.solve.equations.heats import Heats
 from ephs.solve.march.records import Status
+from ephs.solve.posing.errors import Outcome, SolveError
 
 ROUNDS = 12
 SLIP = 1e-2

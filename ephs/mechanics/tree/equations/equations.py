@@ -30,12 +30,12 @@ from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rank import SPARSE, TINY
-from ephs.solve.control import Tolerance
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.equations.model import compile_model
 from ephs.solve.march import Status
-from ephs.solve.model import compile_model
-from ephs.solve.problem import NO_STATE, Problem
-from ephs.solve.stepping import Row
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.problem import NO_STATE, Problem
+from ephs.solve.running.control import Tolerance
+from ephs.solve.running.stepping import Row
 
 __all__ = ["ReducedEquations", "ReducedState"]
 

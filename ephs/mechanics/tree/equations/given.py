@@ -12,7 +12,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
-from ephs.solve.problem import Problem
+from ephs.solve.posing.problem import Problem
 
 
 @final

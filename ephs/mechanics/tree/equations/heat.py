@@ -5,7 +5,7 @@ import numpy as np
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.sweeps.acting import EntropyNode
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.heats import Heats
+from ephs.solve.equations.heats import Heats
 
 
 def heats_of(reduced: Reduced, theta: float) -> Heats:

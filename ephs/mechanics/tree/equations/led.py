@@ -15,8 +15,8 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
-from ephs.solve.mobility import mobility
-from ephs.solve.problem import Problem
+from ephs.solve.equations.mobility import mobility
+from ephs.solve.posing.problem import Problem
 
 
 @final

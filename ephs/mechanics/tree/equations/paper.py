@@ -15,8 +15,8 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, manifold
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigen
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.problem import Problem
 
 NEAR, OFF = 1e-6, 1e-3
 """Initial positions and momenta may differ by this from what the joints make of them, relative to their size where that

@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.residuals import ACTIVE
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.equations.residual import Residual

@@ -18,7 +18,7 @@ from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.descriptor.descriptor import ComponentSlot
 from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 
 @final

@@ -14,7 +14,7 @@ from ephs.semantics.descriptor.descriptor import StateSlot
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces.rank import TINY
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 NEGLIGIBLE = 1e-12
 """Entry of a contracted relation that counts as zero, relative to the largest of the relation that it came from."""

@@ -14,9 +14,9 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
-from ephs.solve.errors import OptionError
-from ephs.solve.heats import PLAIN
-from ephs.solve.sparse import Index
+from ephs.solve.equations.heats import PLAIN
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import OptionError
 
 
 @final

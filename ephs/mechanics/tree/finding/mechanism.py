@@ -22,11 +22,11 @@ from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.pairs import left_inverse
 from ephs.semantics.stage import Table
 from ephs.semantics.systems.kept import Kept, once
-from ephs.solve.errors import OptionError
-from ephs.solve.heats import PLAIN, exponential_law
-from ephs.solve.model import Model
-from ephs.solve.problem import Problem
-from ephs.solve.sparse import Index
+from ephs.solve.equations.heats import PLAIN, exponential_law
+from ephs.solve.equations.model import Model
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.problem import Problem
 
 
 @final

@@ -5,8 +5,8 @@ import numpy as np
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Tolerance
-from ephs.solve.errors import LARGEST, Outcome, SolveError
+from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
+from ephs.solve.running.control import Tolerance
 
 
 def within(reduced: Reduced, q: Array, r: Array, heats: Array) -> None:

@@ -20,8 +20,8 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.motion_law import MotionLaw, PolynomialMotion
-from ephs.solve.problem import Problem, Signal
+from ephs.solve.posing.motion_law import MotionLaw, PolynomialMotion
+from ephs.solve.posing.problem import Problem, Signal
 
 FREE = pair("free")
 OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")

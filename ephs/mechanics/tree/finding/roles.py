@@ -8,7 +8,7 @@ import numpy as np
 from ephs.operad import quantity
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.primitives.pullback import pulled_ports
-from ephs.solve.heats import exponential_law
+from ephs.solve.equations.heats import exponential_law
 
 FREE = quantity.relative_pose("free")
 

@@ -12,7 +12,7 @@ from ephs.operad import Path
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, Pair
-from ephs.solve.motion_law import MotionLaw
+from ephs.solve.posing.motion_law import MotionLaw
 
 
 @final

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 TREE, CUT, SPRING = 0, 1, 2
 """Kinds of edges."""

@@ -24,7 +24,7 @@ from ephs.semantics.stage import (
     Vector,
     members,
 )
-from ephs.solve.sparse import Index
+from ephs.solve.equations.sparse import Index
 
 MOST: Final = 24
 """Increments of one component's state at most: those of four relative poses."""

@@ -13,7 +13,7 @@ from ephs.mechanics.road.elimination import closing
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve.errors import SolveError
+from ephs.solve.posing.errors import SolveError
 from ephs.testing import mechanisms
 
 ROOT = File(__file__).parents[4]

@@ -13,9 +13,9 @@ from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.auditing.passing import TURNED
 from ephs.solve.auditing.resolution import Trials
-from ephs.solve.errors import Interrupted, Outcome, SimulationError, SolveError, serves_not, solve_error_of
-from ephs.solve.oscillations import fastest_of
-from ephs.solve.problem import Problem
+from ephs.solve.equations.oscillations import fastest_of
+from ephs.solve.posing.errors import Interrupted, Outcome, SimulationError, SolveError, serves_not, solve_error_of
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.labels import labels_of
 from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import RunRecord, joined

@@ -6,11 +6,11 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.equations.model import Model
+from ephs.solve.equations.oscillations import fastest_of
 from ephs.solve.methods.natural import Natural
-from ephs.solve.model import Model
-from ephs.solve.oscillations import fastest_of
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.problem import Problem
 
 INSTANT = 1e-7
 """Step without motion, as a fraction of a step."""

@@ -18,10 +18,10 @@ from typing import Any, BinaryIO, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError, Outcome, SolveError
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError
 from ephs.solve.result.durable import sync_folder
 from ephs.solve.result.record import RunRecord, joined
-from ephs.solve.snapshot import Snapshot, parts
+from ephs.solve.running.snapshot import Snapshot, parts
 
 FORMAT = 1
 MAGIC = b"ephs run"

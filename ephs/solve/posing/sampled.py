@@ -12,10 +12,10 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import SLIVER
-from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
-from ephs.solve.problem import Problem, State
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError, number_of
+from ephs.solve.posing.problem import Problem, State
+from ephs.solve.running.control import SLIVER
+from ephs.solve.running.snapshot import Snapshot
 
 FINEST = 1e3
 """Least period, in roundings of the time."""

@@ -6,8 +6,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError, Outcome, SolveError
-from ephs.solve.problem import Problem
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError
+from ephs.solve.posing.problem import Problem
 from ephs.solve.result.ledger import ledgers
 from ephs.solve.result.record import RunRecord
 

@@ -12,11 +12,11 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.motion_law import MotionLaw
-from ephs.solve.probe import Change, ProbedInput, SignalProbe
-from ephs.solve.problem import Problem, Signal, State
-from ephs.solve.sampled import Sampling
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.motion_law import MotionLaw
+from ephs.solve.posing.probe import Change, ProbedInput, SignalProbe
+from ephs.solve.posing.problem import Problem, Signal, State
+from ephs.solve.posing.sampled import Sampling
+from ephs.solve.running.snapshot import Snapshot
 
 NEAR = 16.0
 """Tolerance for equal times, in roundings of the time."""

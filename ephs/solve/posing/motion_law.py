@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError
+from ephs.solve.posing.errors import OptionError
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-    from ephs.solve.problem import State
+    from ephs.solve.posing.problem import State
 
 
 class MotionLaw(ABC):

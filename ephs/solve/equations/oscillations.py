@@ -17,10 +17,10 @@ from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.primitives.primitives import Reversible, Storage
 from ephs.semantics.spaces.decompositions import pseudoinverse, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, TINY, rank_of
-from ephs.solve.errors import SolveError
-from ephs.solve.instant import compliance_of, constraints_of, stored_efforts
-from ephs.solve.problem import Problem
-from ephs.solve.sparse import Index
+from ephs.solve.equations.instant import compliance_of, constraints_of, stored_efforts
+from ephs.solve.equations.sparse import Index
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.posing.problem import Problem
 
 MOST = 600
 """Number of velocities above which the dense problem takes longer than what it explains."""

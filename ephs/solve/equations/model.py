@@ -16,10 +16,10 @@ from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.kept import once
-from ephs.solve.layout import entry_of, laid_out
+from ephs.solve.equations.layout import entry_of, laid_out
+from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, TablesOf, parts_of
 from ephs.solve.methods.residuals import FAULTS, evaluation_program
-from ephs.solve.sparse import Index
 
 
 @final

@@ -13,19 +13,19 @@ from ephs.solve.auditing.audit import Bounds, Tests
 from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
-from ephs.solve.breakpoints import Breakpoints
-from ephs.solve.control import SLIVER, Advance, Control, Grid, first_step
-from ephs.solve.ending import audited, failures_of, repeatable
-from ephs.solve.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
-from ephs.solve.events import Event, Watch
-from ephs.solve.journal import Written
 from ephs.solve.march.control import Policy
-from ephs.solve.problem import Problem, States
+from ephs.solve.posing.breakpoints import Breakpoints
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
+from ephs.solve.posing.events import Event, Watch
+from ephs.solve.posing.problem import Problem, States
 from ephs.solve.result.record import RowBlocks, RunRecord, record_of
 from ephs.solve.result.solution import Solution
-from ephs.solve.snapshot import Snapshot, like, parts
-from ephs.solve.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, too_fast
-from ephs.solve.watching import Balance, Progress
+from ephs.solve.running.control import SLIVER, Advance, Control, Grid, first_step
+from ephs.solve.running.ending import audited, failures_of, repeatable
+from ephs.solve.running.journal import Written
+from ephs.solve.running.snapshot import Snapshot, like, parts
+from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, too_fast
+from ephs.solve.running.watching import Balance, Progress
 
 S = TypeVar("S")
 RESPONSE = 0.1

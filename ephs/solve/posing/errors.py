@@ -10,7 +10,7 @@ import numpy as np
 from ephs.semantics.bundles.errors import nearest_of as nearest_of
 
 if TYPE_CHECKING:
-    from ephs.solve.model import Model
+    from ephs.solve.equations.model import Model
     from ephs.solve.result.solution import Solution
 
 __all__ = [

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, fi
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.control import Control
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.control import Control
+from ephs.solve.running.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from ephs.solve.march.control import Policy

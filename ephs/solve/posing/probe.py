@@ -10,8 +10,8 @@ from typing import Any, final
 
 import numpy as np
 
-from ephs.solve.problem import State
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.problem import State
+from ephs.solve.running.snapshot import Snapshot
 
 WIDTH = 1.0 / 2000.0
 """Spacing of samples of a function as a fraction of the run."""

@@ -9,8 +9,8 @@ import numpy as np
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
-from ephs.solve.errors import OptionError, Outcome, SolveError, number_of
-from ephs.solve.snapshot import Resumable
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError, number_of
+from ephs.solve.running.snapshot import Resumable
 
 SLIVER = 1e-9
 """Fraction of a step, or of a time, that is rounding of sums of steps."""

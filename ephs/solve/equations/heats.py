@@ -22,7 +22,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Primitive, Storage
-from ephs.solve.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError
 
 EXPONENTIAL = 1e-12
 """Relative tolerance for recognising an exponential energy law: rounding of the functions."""

@@ -12,8 +12,8 @@ from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.descriptor.descriptor import Descriptor, Input
 from ephs.semantics.systems.system import System
-from ephs.solve.errors import Outcome, SolveError
-from ephs.solve.motion_law import MotionLaw
+from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.motion_law import MotionLaw
 
 if TYPE_CHECKING:
     from ephs.solve.result.dataset import DatasetVariable

@@ -8,9 +8,9 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.errors import OptionError, Outcome, SolveError
-from ephs.solve.problem import States
-from ephs.solve.snapshot import Snapshot
+from ephs.solve.posing.errors import OptionError, Outcome, SolveError
+from ephs.solve.posing.problem import States
+from ephs.solve.running.snapshot import Snapshot
 
 S = TypeVar("S")
 

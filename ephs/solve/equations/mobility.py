@@ -19,8 +19,8 @@ from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.instant import is_velocity, rate_balances
-from ephs.solve.sparse import Index
+from ephs.solve.equations.instant import is_velocity, rate_balances
+from ephs.solve.equations.sparse import Index
 
 SOUND = 1e-3
 """Least singular value of an invertible block, as a fraction of its row norms."""
