@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 401_100,
+    "ephs/mechanics": 401_600,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_400,
     "ephs/semantics": 193_300,
     "ephs/show": 62_900,
-    "ephs/solve": 123_400,
+    "ephs/solve": 123_700,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 550_400,
+    "tests": 550_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

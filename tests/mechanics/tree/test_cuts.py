@@ -1,13 +1,18 @@
 """Cut joints: powers of rows, rates of what is open, accelerations; fitted elements; the same bits by both runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ephs
 from ephs.mechanics.road.cuts import Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.records import LinkPlace, LinkState
+from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
 
@@ -213,3 +218,15 @@ def test_the_memory_of_a_link_begins_with_its_place():
         one, other = vars(LinkPlace)[name], vars(LinkState)[name]
         assert (one.offset, one.shape) == (other.offset, other.shape)
     assert LinkPlace.real_width == vars(LinkState)["down"].offset
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "universal"])
+def test_loops_that_are_a_little_open_are_closed_by_their_own_rows(name):
+    """With joints of several freedoms in the tree; what does not converge so is closed with more care."""
+    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    state, moved = eq.start(0.0), np.zeros(eq.nv)
+    moved[: eq.n] = 1e-3 * np.random.default_rng(1).standard_normal(eq.n)
+    apart = replace(state, q=eq.advance(state.q, moved))
+    found = eq.closed(apart)
+    assert np.abs(eq.dense.gaps(found.q, found.r)[0]).max() <= 1e-12 and not eq.careful
+    assert np.abs(eq.dense.gaps(apart.q, apart.r)[0]).max() > 1e-5
