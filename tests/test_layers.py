@@ -49,7 +49,7 @@ def test_every_door_is_used():
         ("ephs.semantics.spaces.pairs", "from ephs.semantics.bundle import Bundle"),
         ("ephs.semantics.system", "def f():\n    from ephs.mechanics import scene"),
         ("ephs.solve.equations.model", "from ephs.mechanics.elements.bodies import body"),
-        ("ephs.solve.equations.model", "from .. import body"),
+        ("ephs.solve.equations.model", "from ... import body"),
         ("ephs.mechanics.tree.equations.equations", "from ephs.mechanics.dynamics import dynamics"),
         ("ephs.mechanics.linear.modes", "from ephs.mechanics.sensitivity import fit"),
         ("ephs.mechanics.elements.bodies", "from ephs import show"),
@@ -106,4 +106,4 @@ def test_a_system_without_bodies_is_run_without_scenes(model, known):
     found = loaded(model)
     scenes = [name for name in found if within(name, "ephs.mechanics.scene") or within(name, "ephs.mechanics.tree")]
     assert bool(scenes) == ("pydantic" in found) == known
-    assert known or len([name for name in found if within(name, "ephs")]) <= 245
+    assert known or len([name for name in found if within(name, "ephs")]) <= 250

@@ -336,6 +336,11 @@ class Evaluation:
         self._calls["account"](t, self._z, h, self._inputs, m, self._sums)
         return self._sums.copy()
 
+    def measure(self, dropped: Index) -> float:
+        """The largest residual relative to its scale; omitted equations become the unknown itself."""
+        t, m = self._parts
+        return float(self._calls["measure"](t, self._z, dropped, m))
+
 
 def evaluate_at(model: Model, x: Array, z: Array, h: float) -> tuple[int, int, Memory]:
     """Residual and matrix at a point, for analysis and tests: (status, component, memory that holds them)."""
