@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 124_400,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 547_300,
+    "tests": 547_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
