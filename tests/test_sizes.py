@@ -16,10 +16,10 @@ CEILINGS = {
     "ephs/operad": 30_400,
     "ephs/semantics": 193_300,
     "ephs/show": 62_900,
-    "ephs/solve": 123_700,
+    "ephs/solve": 123_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 550_700,
+    "tests": 551_100,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

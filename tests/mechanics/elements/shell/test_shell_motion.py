@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import ephs
-from ephs.mechanics import Shell, ShellSection
+from ephs import Pattern, junction
+from ephs.mechanics import Shell, ShellSection, joint, rigid_body
 from ephs.mechanics.elements.shell import spectra
 from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.shell import moved
@@ -325,3 +326,26 @@ def test_a_shell_without_mass_does_not_move():
         shell_system(shell)
     with pytest.raises(StructureError, match="held"):
         shell_system(ELEMENT, held=[4])
+
+
+def test_a_body_hangs_at_a_shared_node():
+    """A weight in a ball joint at the corner of a held strip: the joint stays closed, and methods agree."""
+    points, where, cells = grid(lambda u, v: (0.4 * u, 0.2 * v, 0.0 * u), (2, 1))
+    shell = Shell.of(points, cells, STRIP.section)
+    parts = {
+        "strip": shell_system(shell, held=np.flatnonzero(where[:, 0] == 0.0).tolist(), shared=[5]),
+        "weight": rigid_body(0.1, [1e-4] * 3).with_initial({"pe.q": [1.0, 0.0, 0.0, 0.0, 0.4, 0.2, -0.05]}),
+        "joint": joint("spherical", frame2={"position": [0.0, 0.0, 0.05]}),
+    }
+    momentum = junction(ephs.quantity.body_momentum)
+    boxes = {"strip": {"p5": "p"}, "weight": {"p": "q"}, "joint": {"p1": "p", "p2": "q"}}
+    system = Pattern(junctions={"p": momentum, "q": momentum}, boxes=boxes)(**parts)
+    ends = []
+    for method in ("auto", "radau"):
+        solution = ephs.simulate(system, 0.01, method=method, rtol=1e-8)
+        node, weight = (np.asarray(solution[name])[-1] for name in ("strip.node5.pe.q", "weight.pe.q"))
+        hung = weight[4:] + Rotation.from_quat(weight[:4], scalar_first=True).apply([0.0, 0.0, 0.05])
+        assert np.abs(hung - node[4:]).max() <= 1e-9  # a tolerance of steps, in m
+        assert node[6] < -1e-4
+        ends.append(node)
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-7
