@@ -54,6 +54,7 @@ def _of_scene(scene: "Scene") -> list[str]:
     own = dict.fromkeys(section for section, _, _ in scene.all_elements())
     rest: dict[str, Iterable[str]] = {
         "springs": (name for name, _ in scene.all_springs()),
+        "shells": (name for name, _ in scene.all_shells()),
         "tendons": (name for name, _ in scene.all_tendons()),
         "beams": (name for name, _ in scene.all_beams()),
         "contacts": (name for name, _ in scene.all_contacts()),

@@ -19,6 +19,7 @@ from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
+from ephs.mechanics.motion.shells import ShellMotion, shell_motion
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
@@ -202,6 +203,11 @@ class SceneMotion:
             return self.thermal(node).temperature
 
         return beam_motion(self._scene, beam, self.poses, self.inclusion, self.wrench, warmth)
+
+    def shell(self, name: str) -> ShellMotion:
+        """Nodes, resultants and energies of a shell."""
+        sheet, at = _of_name("shell", name, dict(self._scene.all_shells())), component_path("shells", name)
+        return shell_motion(self._scene, sheet, lambda node: self._solution[at / node / "pe" / "q"], self.poses)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker."""

@@ -23,7 +23,8 @@ def inner_states(section: str, name: str, states: Mapping[Path, Array]) -> dict[
 
 def lost_states(scene: Scene, states: Mapping[Path, Array]) -> Iterator[Fault]:
     """Faults of elements that do not start in the states of a solution."""
-    if not (own := list(scene.all_elements())):
+    own = [*scene.all_elements(), *(("shells", name, of) for name, of in scene.all_shells())]
+    if not own:
         return
     start, system = initial_state(scene), scene_system(scene)
     counted = {path for path, of in system.leaves() if isinstance(of, Storage) and of.environment}

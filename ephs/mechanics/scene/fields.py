@@ -318,7 +318,7 @@ FIELDS: Mapping[str, Mapping[str, NumberField]] = {
         "frame1.position": _frame("frame1"),
         "frame2.position": _frame("frame2"),
     },
-    **{section: _registered(KINDS[section]) for section in ("springs", "tendons", *ATTACHED)},
+    **{section: _registered(KINDS[section]) for section in ("springs", "shells", "tendons", *ATTACHED)},
     "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
     **{section: _registered(KINDS[section]) for section in ("conduction", "markers", "contacts")},
 }

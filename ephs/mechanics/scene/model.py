@@ -25,6 +25,7 @@ from ephs.mechanics.scene.joints import Joint, free_joint
 from ephs.mechanics.scene.loads import Load
 from ephs.mechanics.scene.markers import Marker
 from ephs.mechanics.scene.motors import Motor
+from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.scene.surfaces import Surface
 from ephs.mechanics.scene.tendons import Tendon
@@ -90,6 +91,7 @@ class Scene:
     cylinders: Mapping[str, Cylinder] = field(default_factory=dict)
     gas_springs: Mapping[str, GasSpring] = field(default_factory=dict)
     actuators: Mapping[str, Actuator] = field(default_factory=dict)
+    shells: Mapping[str, ShellSheet] = field(default_factory=dict)
     elements: Mapping[str, Mapping[str, Element]] = field(default_factory=dict)
     origin: Array = field(default_factory=lambda: IDENTITY_POSE)
     _kept: Kept = field(default_factory=Kept, init=False, repr=False)
@@ -190,6 +192,10 @@ class Scene:
         """Every beam with its dotted name."""
         return self.every("beams")
 
+    def all_shells(self) -> Iterator[tuple[str, ShellSheet]]:
+        """Every shell with its dotted name."""
+        return self.every("shells")
+
     def all_loads(self) -> Iterator[tuple[str, Load]]:
         """Every load with its dotted name."""
         return self.every("loads")
@@ -261,6 +267,7 @@ ELEMENTS: Mapping[str, type[SceneElement] | type[Element]] = {
     "surfaces": Surface,
     "contacts": Contact,
     "beams": Beam,
+    "shells": ShellSheet,
     "tendons": Tendon,
     "loads": Load,
     **ATTACHED,

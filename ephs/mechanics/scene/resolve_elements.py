@@ -12,7 +12,7 @@ from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.contacts import meeting
 from ephs.mechanics.scene.custom import Element, number_of, read_in
-from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, JOINTS, SINGLE
+from ephs.mechanics.scene.element import AXIS, ENVIRONMENT, GROUND, JOINTS, OUTSIDE, SINGLE
 from ephs.mechanics.scene.entries import Document, validate
 from ephs.mechanics.scene.errors import Fault, did_you_mean, fault, legible, listing, shown, unknown
 from ephs.mechanics.scene.model import KINDS, Scene, elements_of, with_sections
@@ -105,7 +105,7 @@ def check_table(table: Checked[Element], names: ReferableNames, known: Mapping[s
             table.fault("large", name, most=LARGEST)
     for place, kind, name in entry.references():
         of = "joint" if kind in JOINTS else kind
-        if place.partition("[")[0] in spoiled:
+        if place.partition("[")[0] in spoiled or name in OUTSIDE[kind]:
             continue
         if of in ("body", "end", "node"):
             names.check(table, name, place, "thermal" if of == "node" else "body")

@@ -126,9 +126,20 @@ def with_state(
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
     scale = replace(now, poses=poses, twists=twists).scale(scene.world.gravity)
     faults = measure(links, xs, poses, slips, now.names, scale)
+    faults += [
+        fault("not welded", f"shells.{name}.edges", body)
+        for name, sheet in scene.all_shells()
+        for body in dict.fromkeys(sheet.named("end"))
+        if body in now.names and _apart(poses[(i := now.names.index(body))], now.poses[i]) > ASSEMBLY * scale.length
+    ]
     if faults:
         raise SceneError(where, faults)
     return rebuilt(scene, now, poses, twists, xs)
+
+
+def _apart(one: Array, other: Array) -> float:
+    """Distance in m or angle in rad between two poses."""
+    return float(np.abs(SE3.log(SE3.compose(SE3.inverse(one), other))).max())
 
 
 def adjusted(scene: Scene, asked: Mapping[str, Asked]) -> tuple[Scene, list[Fault]]:

@@ -41,7 +41,7 @@ def _things(scene: "Scene") -> list[tuple[str, str, str]]:
         *(("joint", name, f"{j.kind}, {j.body1} – {j.body2}") for name, j in scene.all_joints()),
         *_told(scene, "springs", "contacts"),
         *(("beam", name, f"{beam.elements} elements, {' – '.join(beam.ends)}") for name, beam in scene.all_beams()),
-        *_told(scene, "tendons", "loads"),
+        *_told(scene, "shells", "tendons", "loads"),
         *((section.removesuffix("s").replace("_", " "), name, str(x)) for section, name, x in scene.all_attachments()),
         *(("thermal", name, f"{n.capacity:g} J/K at {n.temperature:g} K") for name, n in scene.all_thermal()),
         *_told(scene, "conduction"),

@@ -170,6 +170,10 @@ class MechanicalMotion(Linked, Protocol):
         """Motion of a beam."""
         ...
 
+    def shell(self, name: str) -> Any:
+        """Motion of a shell."""
+        ...
+
     def state(self, i: int) -> dict[Path, Array]:
         """The states at the i-th instant, as arguments of the continuous relations."""
         ...

@@ -280,6 +280,10 @@ class Solution:
         """The motion of a beam: nodes, strains, forces, moments and energy."""
         return self._moving("beams").beam(name)
 
+    def shell(self, name: str) -> Any:
+        """The motion of a shell: nodes, membrane and transverse forces, moments and energy."""
+        return self._moving("shells").shell(name)
+
     def point(self, body: str, xyz: "ArrayLike") -> Array:
         """(n, 3) world position of a point of the body's frame."""
         motion = self.body(body)

@@ -5,7 +5,7 @@ q_4 are 1 at rest; the storage pe has the strain energy ½ Δᵀ K Δ of the log
 their pattern and their machine code. Everything else is a joint's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -182,7 +182,9 @@ def shell_system(
     gravity: "ArrayLike" = (0.0, 0.0, 0.0),
     damping: float = 0.0,
     held: Sequence[int] = (),
+    carried: "Mapping[str, tuple[ArrayLike, Sequence[int]]] | None" = None,
     shared: Sequence[int] = (),
+    heat: bool = False,
 ) -> System:
     """A shell that moves: bodies ``node0`` … at its points, and elements ``element0`` … between them.
 
@@ -194,42 +196,53 @@ def shell_system(
         Kelvin–Voigt time in s; an environment in each element takes the heat.
     held
         Numbers of nodes that are welded to the ground.
+    carried
+        Nodes that are welded to other bodies: port of a body's momentum -> its pose (7,) in the world when the shell is
+        without stress, and their numbers.
     shared
         Numbers of nodes whose momenta are ports ``p0`` …, by their number: for what else acts on them.
+    heat
+        The heat of damping leaves through a port s.
 
     Raises
     ------
     StructureError
         The section has no mass, or a node is not one of the shell's.
     """
-    count, inertia = len(shell.points), shell.inertia
-    for key, nodes in (("held", held), ("shared", shared)):
+    count, inertia, bodies = len(shell.points), shell.inertia, dict(carried or {})
+    for key, nodes in (("held", held), ("shared", shared), *((port, nodes) for port, (_, nodes) in bodies.items())):
         if wrong := [node for node in nodes if not 0 <= node < count]:
             raise StructureError("parameter", "shell", key=key, found=wrong, expected=f"nodes of 0 … {count - 1}")
     if not shell.section.mass > 0.0:
         raise StructureError("parameter", "shell", key="section", found="no mass", expected="a density above 0")
-    fixed = set(held)
+    welded = {node: (port, np.asarray(pose, dtype=float)) for port, (pose, nodes) in bodies.items() for node in nodes}
+    welded |= dict.fromkeys(held, ("p_ground", SE3.identity()))
     momentum, unit = quantity.body_momentum, np.array([1.0, 0.0, 0.0, 0.0])
     junctions = {f"p{i}": junction(momentum, exposed=i in shared) for i in range(count)}
+    junctions |= {port: junction(momentum, exposed=True) for port in bodies}
     boxes: dict[str, dict[str, str]] = {}
     parts: dict[str, System | Primitive] = {}
     for i, point in enumerate(shell.points):
         pose = np.concatenate([unit, point])
-        if i in fixed:
-            boxes[f"node{i}"] = {"ground": "p_ground", "p": f"p{i}"}
-            parts[f"node{i}"] = frame_change(pose, "p", "ground")
+        if i in welded:
+            port, at = welded[i]
+            boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
+            parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
         else:
             boxes[f"node{i}"] = {"p": f"p{i}"}
             body = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
             parts[f"node{i}"] = body.with_initial({"pe.q": pose})
-    if fixed:
+    if len(held):
         junctions["p_ground"] = junction(momentum)
         boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
+    warm = {"s": "s"} if heat and damping else {}
+    junctions |= {"s": junction(quantity.entropy, exposed=True)} if warm else {}
     sections = np.concatenate([shell.axes, np.zeros((*shell.cells.shape, 3))], axis=2)
     at_rest = _from_first(shell)
     for e, nodes in enumerate(shell.cells.tolist()):
-        boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)}
-        parts[f"element{e}"] = shell_element(sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping)
+        boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)} | warm
+        numbers = sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping
+        parts[f"element{e}"] = shell_element(*numbers, heat=bool(warm))
     return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
 
 

@@ -1,0 +1,144 @@
+"""Shells of scene files: as systems made by hand, in other units and parts, welded to bodies, with heat, refused."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs.mechanics import Shell, ShellSection
+from ephs.mechanics.elements.shell.mesh import grid
+from ephs.mechanics.elements.shell.system import shell_system
+from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from ephs.mechanics.scene.rescaled import rescaled
+from tests.written import scene_of_text
+
+UNTIL = 0.05
+SHEET = {
+    "corners": "[[0.0, 0.0, 0.0], [0.6, 0.0, 0.1], [0.6, 0.4, 0.1], [0.0, 0.4, 0.0]]", "elements": "[3, 2]",
+    "thickness": "4e-3", "E": "2e7", "nu": "0.3", "rho": "900.0", "damping": "2e-3",
+    "edges": '["free", "free", "free", "ground"]',
+}  # fmt: skip
+WORLD = "format = 1\n[world]\ngravity = [1.0, 0.0, -9.81]\n"
+HUB = """
+[bodies.hub]
+mass = 1.0
+inertia = [0.01, 0.01, 0.01]
+position = [-0.1, 0.2, 0.3]
+rotation = [0.8, 0.0, 0.6, 0.0]
+[joints.held]
+type = "KIND"
+bodies = ["ground", "hub"]
+at = [-0.1, 0.2, 0.3]
+axis = [0.0, 1.0, 0.0]
+"""
+
+
+def sheet(more="", **keys):
+    table = "".join(f"{key} = {value}\n" for key, value in {**SHEET, **keys}.items())
+    return scene_of_text(f"{WORLD}{more}[shells.skin]\n{table}")
+
+
+def hub(kind="revolute", **keys):
+    return sheet(HUB.replace("KIND", kind), edges='["free", "free", "free", "hub"]', **keys)
+
+
+def ran(model, **options):
+    return ephs.simulate(model, UNTIL, method="radau", rtol=1e-8, atol=1e-10, save_at=[0.0, UNTIL], **options)
+
+
+def tip(solution):
+    """Place of the node farthest from the weld."""
+    return solution.shell("skin").position[-1, -1]
+
+
+def test_a_sheet_is_the_shell_that_is_made_by_hand():
+    section = ShellSection.isotropic(4e-3, E=2e7, nu=0.3, rho=900.0)
+    points, where, cells = grid(lambda u, v: (0.6 * u, 0.4 * v, 0.1 * u), (3, 2))
+    held = np.flatnonzero(where[:, 0] == 0.0).tolist()
+    made = shell_system(Shell.of(points, cells, section), gravity=[1.0, 0.0, -9.81], damping=2e-3, held=held)
+    one, other = ran(sheet()), ran(made)
+    last = f"node{len(points) - 1}.pe.q"
+    # the heat of one goes to one environment, of the other to one in each element: sums in other orders
+    assert one[f"shells.skin.{last}"][-1] == pytest.approx(other[last][-1], abs=1e-12)
+    assert np.linalg.norm(tip(one) - points[-1]) > 1e-3, "it moves"
+
+
+def test_what_is_welded_to_a_body_that_is_held_is_as_what_is_welded_to_the_ground():
+    assert tip(ran(hub("fixed"))) == pytest.approx(tip(ran(sheet())), abs=1e-10)
+    assert np.linalg.norm(tip(ran(hub("revolute"))) - tip(ran(sheet()))) > 1e-4, "the control: a hub that turns"
+
+
+def test_energy_is_that_of_its_elements_and_its_heat_warms_a_node():
+    more = "[thermal.frame]\ncapacity = 2.0\ntemperature = 300.0\n"
+    run = ran(sheet(more, heat='"frame"'))
+    shell = run.shell("skin")
+    stored = sum(v[-1] for p, v in run.ledgers.storages.items() if str(p).endswith(".pe") and "element" in str(p))
+    assert shell.energy[-1].sum() == pytest.approx(stored, rel=1e-9)
+    warmed = 2.0 * (run.thermal("frame").temperature[-1] - 300.0)
+    assert warmed == pytest.approx(run.heat[-1], rel=1e-6) and run.heat[-1] > 0.0
+    assert run.energy_error.max() < 1e-13
+    assert not shell.membrane[0].any() and np.abs(shell.moment[-1]).max() > 0.0
+
+
+def test_other_units_are_the_same_motion():
+    """By powers of two nothing is rounded but what adaptive steps make of tolerances in metres."""
+    scene = sheet()
+    other = rescaled(scene, 2.0, 4.0, 1.0)
+    assert other.shells["skin"].E == 4.0 / 2.0 * scene.shells["skin"].E
+    assert tip(ran(other)) / 2.0 == pytest.approx(tip(ran(scene)), abs=1e-8)
+
+
+def test_a_part_that_is_moved_has_its_sheet_moved(tmp_path):
+    table = "".join(f"{key} = {value}\n" for key, value in SHEET.items())
+    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{table}")
+    turn = [0.8, 0.0, 0.0, 0.6]
+    (tmp_path / "whole.toml").write_text(
+        f'{WORLD}[parts.left]\nuse = "wing.toml"\nposition = [1.0, 2.0, 0.5]\nrotation = {turn}\n'
+    )
+    run = ran(ephs.load(tmp_path / "whole.toml"))
+    start = run.shell("left.skin").position[0]
+    assert start[-1] == pytest.approx(np.array([1.0, 2.0, 0.5]) + turned(turn, [0.6, 0.4, 0.1]), abs=1e-12)
+    assert run.energy_error.max() < 1e-13
+
+
+def turned(quaternion, vector):
+    w, x, y, z = quaternion
+    u, v = np.array([x, y, z]), np.array(vector)
+    return v + 2.0 * w * np.cross(u, v) + 2.0 * np.cross(u, np.cross(u, v))
+
+
+def test_it_is_read_again_from_a_result(tmp_path):
+    scene = hub()
+    assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
+    run = ran(scene)
+    run.save(tmp_path / "run.nc")
+    assert np.array_equal(ephs.load_solution(tmp_path / "run.nc").shell("skin").position, run.shell("skin").position)
+
+
+@pytest.mark.parametrize(
+    ("keys", "at", "words"),
+    [
+        ({"edges": '["free", "free", "free", "wall"]'}, "edges[3]", "ground"),
+        ({"edges": '["free", "ground"]'}, "edges", "4 entries"),
+        ({"elements": "[0, 2]"}, "elements[0]", "not below 1"),
+        ({"thickness": "0.0"}, "thickness", "above 0"),
+        ({"nu": "0.6"}, "nu", "0.5"),
+        ({"corners": "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]"}, "corners", "an area"),
+        ({"corners": "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 0.2, 0.0], [0.0, 1.0, 0.0]]", "elements": "[1, 1]"},
+         "corners", "convex corners"),
+    ],
+)  # fmt: skip
+def test_what_is_no_shell_is_refused_by_its_key(keys, at, words):
+    with pytest.raises(ephs.SceneError) as error:
+        sheet(**keys)
+    (fault,) = error.value.faults
+    assert fault.key == f"shells.skin.{at}" and words in str(fault)
+
+
+def test_a_start_in_which_it_would_be_strained_is_refused():
+    """A sheet starts without stress: where the body that carries it moves before, its rest would be another one."""
+    scene = hub()
+    with pytest.raises(ephs.SceneError, match="without stress"):
+        scene.with_state({"held": 0.3})
+    with pytest.raises(ephs.SceneError, match="skin"):
+        scene.at(ran(scene), UNTIL)
+    assert scene.with_state(rates={"held": 0.1}).shells == scene.shells
