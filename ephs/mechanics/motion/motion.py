@@ -19,7 +19,7 @@ from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
-from ephs.mechanics.motion.shells import ShellMotion, shell_motion
+from ephs.mechanics.motion.shells import ShellMotion, shell_motion, with_nodes
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
@@ -156,6 +156,11 @@ class SceneMotion:
         self._joints = dict(scene.all_joints())
         self._implicit = dict(scene.implicit_joints())
         self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
+        self._nodes = {
+            f"{name.removesuffix(sheet.name)}{sheet.node(i)}": component_path("shells", name) / f"node{i}"
+            for name, sheet in scene.all_shells()
+            for i in sheet.free()
+        }
 
     @property
     def freedoms(self) -> Mapping[str, Labels]:
@@ -165,8 +170,9 @@ class SceneMotion:
     # ---- reading -----------------------------------------------------------------------------------------------
 
     def body(self, name: str) -> BodyMotion:
-        """The motion of a body."""
-        self._scene.body(name)
+        """The motion of a body; of a node of a shell, too, by the name that pictures have for it."""
+        if name not in self._nodes:
+            self._scene.body(name)
         return BodyMotion(self, name)
 
     def joint(self, name: str) -> JointMotion:
@@ -224,7 +230,7 @@ class SceneMotion:
         """(n, 7) of a body, or of the ground."""
         if name == GROUND:
             return np.broadcast_to(SE3.identity(), (len(self._solution), 7))
-        return self._solution[component_path("bodies", name) / "pe" / "q"]
+        return self._solution[self._nodes.get(name, component_path("bodies", name)) / "pe" / "q"]
 
     def coordinates(self, name: str) -> Array:
         """(n, d) of a joint: of the pose of C2 in C1, in the axes of C1."""
@@ -300,7 +306,11 @@ class SceneMotion:
     @property
     def twists(self) -> dict[str, Array]:
         """(n, 6) by body."""
-        return self._velocities[0]
+        return self._velocities[0] | {name: self._found.twists[path] for name, path in self._nodes.items()}
+
+    def outline(self) -> Scene:
+        """The scene as it is drawn."""
+        return with_nodes(self._scene) if self._nodes else self._scene
 
     @property
     def rates(self) -> dict[str, Array]:

@@ -1,7 +1,7 @@
 """Shells of a motion: poses of nodes, resultants and energies of elements, at all instants."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from ephs.mechanics.elements.shell.mesh import Indices
 from ephs.mechanics.motion.batch import compose
 from ephs.mechanics.scene.element import GROUND
-from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.model import Body, Scene, frozen
 from ephs.mechanics.scene.shells import ShellSheet
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -62,3 +62,14 @@ def shell_motion(
     found = np.array([shell.resultants(each) for each in poses])
     energy = np.array([shell.energy(each) for each in poses])
     return ShellMotion(poses[..., 4:], shell.cells, found[..., :3], found[..., 3:6], found[..., 6:], energy)
+
+
+def with_nodes(scene: Scene) -> Scene:
+    """The scene with the free nodes of its shells as bodies, for pictures."""
+    parts, bodies = {name: with_nodes(part) for name, part in scene.parts.items()}, dict(scene.bodies)
+    for sheet in scene.shells.values():
+        shell = sheet.shell()
+        for i in sheet.free():
+            tensor, mass = frozen(np.diag(shell.inertia[i, :3])), float(shell.inertia[i, 3])
+            bodies[sheet.node(i)] = Body(sheet.node(i), mass, tensor, frozen(shell.poses[i]), frozen(np.zeros(6)))
+    return replace(scene, bodies=bodies, parts=parts)

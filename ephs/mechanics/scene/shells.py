@@ -1,7 +1,7 @@
 """Shells: flat or slightly warped sheets between four corners, in elements whose nodes are bodies."""
 
-from collections.abc import Mapping
-from typing import Annotated, final
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, final
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from ephs.mechanics.scene.schema_numbers import NonNegative, Number, Positive, T
 from ephs.mechanics.scene.site import Site
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
+from ephs.semantics.spaces import SE3, translation
 
 Four = Field(min_length=4, max_length=4)
 
@@ -80,6 +81,28 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
             if body != FREE_END:
                 known = dict.fromkeys(nodes.tolist(), body) | known
         return {body: [node for node, at in known.items() if at == body] for body in dict.fromkeys(known.values())}
+
+    def free(self) -> list[int]:
+        """Numbers of the nodes that are welded to nothing."""
+        welded = {node for nodes in self.welds().values() for node in nodes}
+        return [i for i in range((self.elements[0] + 1) * (self.elements[1] + 1)) if i not in welded]
+
+    def node(self, number: int) -> str:
+        """What pictures call a node."""
+        return f"{self.name}-node{number}"
+
+    def lines(self, site: Site) -> Iterator[tuple[str, Any, str, Any]]:
+        """Edges of its elements; where its nodes are no bodies, as they are at the start."""
+        shell, welded = self.shell(), {node: body for body, nodes in self.welds().items() for node in nodes}
+        ways = np.stack([shell.cells, np.roll(shell.cells, -1, axis=1)], axis=2).reshape(-1, 2)
+
+        def end(i: int) -> tuple[str, Array]:
+            body, at = welded.get(i, self.node(i)), shell.points[i]
+            known = body != GROUND and body in site.scene.bodies
+            return (body, SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:]) if known else (GROUND, at)
+
+        for one, two in np.unique(np.sort(ways, axis=1), axis=0).tolist():
+            yield *end(one), *end(two)
 
     def build(self, site: Site) -> None:
         welds, warm = dict(self.welds()), site.heated(self.heat) if self.damping else {}

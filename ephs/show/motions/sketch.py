@@ -132,7 +132,9 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None, extent
                 draw(out, joint, places[name] @ view, axis @ view, 0.022 * size)
     if extent is None:
         _bar(out, cloud @ view, size)
-        _names(out, {n: poses[n][4:] @ view for n in solids}, {n: p @ view for n, p in places.items()}, size)
+        nodes = tuple(f"{shell}-node" for shell, _ in scene.all_shells())  # too many to be named
+        told = {name: poses[name][4:] @ view for name in solids if not name.startswith(nodes)}
+        _names(out, told, {n: p @ view for n, p in places.items()}, size)
     return out
 
 

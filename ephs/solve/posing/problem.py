@@ -151,7 +151,7 @@ class Outlined(Linked, Protocol):
         ...
 
 
-class MechanicalMotion(Linked, Protocol):
+class MechanicalMotion(Outlined, Protocol):
     """A motion in terms of mechanics: the solver itself has only states, efforts and flows."""
 
     def thermal(self, name: str) -> Any:

@@ -14,7 +14,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.posing.events import Crossing
-from ephs.solve.posing.problem import Linked, MechanicalMotion, Problem
+from ephs.solve.posing.problem import MechanicalMotion, Outlined, Problem
 from ephs.solve.result.dataset import DatasetVariable, sampled_inputs
 from ephs.solve.result.entries import LedgerEntry, entry_of
 from ephs.solve.result.labels import Labels
@@ -234,7 +234,7 @@ class Solution:
         return (self.linked or self._moving("joints")).joint(name)
 
     @cached_property
-    def linked(self) -> Linked | None:
+    def linked(self) -> Outlined | None:
         """The motion of bodies and joints, of a scene or of a system that has them; None where there are none."""
         if self.motion is not None:
             return self.motion
@@ -243,9 +243,7 @@ class Solution:
     @cached_property
     def outline(self) -> Any:
         """Bodies and joints to be drawn: the scene, or those of a system as one; None where there are none."""
-        if self.scene is not None or self.problem is None or self.problem.linked is None:
-            return self.scene
-        return self.problem.linked(self).outline()
+        return None if self.linked is None else self.linked.outline()
 
     def temperature(self, path: str | Path) -> Array:
         """(n,) temperature in K of a storage of heat, by the path of its box or of its entropy; of an environment θ₀.
