@@ -11,7 +11,7 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_800,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 403_400,
+    "ephs/mechanics": 404_200,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_400,
     "ephs/semantics": 193_300,
@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 123_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 552_400,
+    "tests": 552_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

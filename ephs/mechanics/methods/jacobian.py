@@ -33,7 +33,7 @@ class Jacobian:
         self.equations = equations
         self.size = equations.nv + equations.n + equations.ns
         self._counts = {} if counts is None else counts
-        self._counts["jacobians"] = 0
+        self._counts.setdefault("jacobians", 0)
         self._slopes: RateSlopes | None = None
         self._linear: Linearised | None = None
         self.holding = equations.holding

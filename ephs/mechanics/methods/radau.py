@@ -17,10 +17,14 @@ from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
 from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.methods.collocation import Collocation
+from ephs.solve.methods.collocation import Collocation, radau
+from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.running.control import Control
 from ephs.solve.running.snapshot import Snapshot
 from ephs.solve.running.stepping import Attempt, Leg, Span
+
+FEWEST = 3
+"""Stages of order 5."""
 
 
 def tableau(scheme: Collocation) -> Mapping[str, Any]:
@@ -35,17 +39,41 @@ class Implicit(ReducedMethod):
 
     name = "radau"
 
-    def __init__(self, equations: ReducedEquations, control: Control, counts: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        equations: ReducedEquations,
+        control: Control,
+        counts: dict[str, Any] | None = None,
+        scheme: Collocation | None = None,
+    ) -> None:
         super().__init__(equations, control)
         self.counts = self.counts if counts is None else counts
-        self.scheme = scheme_of(equations, control)
+        self.scheme = scheme or scheme_of(equations, control)
+        self._fewer: Implicit | None = None
         self.exponent = self.scheme.nodes.size + 1.0
         self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
         self._stages = Stages(equations, control, self.scheme, self.counts)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
-        """One step of h seconds."""
+        """One step of h seconds: of three stages, where constraints lose rank and more have no solution.
+
+        There, rounding is more than what stages of a higher order may be off by.
+        """
+        try:
+            return self._step(state, h)
+        except SolveError as error:
+            few = self.scheme.nodes.size <= FEWEST or not self.equations.engine.looped
+            if few or error.outcome is not Outcome.DIVERGED:
+                raise
+        return self._with_fewer().step(state, h)
+
+    def _with_fewer(self) -> "Implicit":
+        """The method of three stages."""
+        self._fewer = self._fewer or Implicit(self.equations, self.control, self.counts, radau(FEWEST))
+        return self._fewer
+
+    def _step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         eq = self.equations
         y0 = eq.vector(state)
         first = self.first(state, y0)
@@ -71,12 +99,15 @@ class Implicit(ReducedMethod):
         return March(self, tableau(self.scheme), span, left=left, kept=KeptJacobian(self._stages), contest=contest)
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """State at which the matrix was made, and the step for which it was factorised."""
-        return self._stages.kept.snapshot(state)
+        """State at which the matrix was made, and the step for which it was factorised, of fewer stages, too."""
+        fewer = None if self._fewer is None else self._fewer.taken(state)
+        return {"kept": self._stages.kept.snapshot(state), "fewer": fewer}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        self._stages.kept.restore(own, state)
+        self._stages.kept.restore(own["kept"], state)
+        if own["fewer"] is not None:
+            self._with_fewer().take(own["fewer"], state)
 
     def _closed(
         self, state: ReducedState, end: ReducedState, y0: Array, y1: Array, first: Array, stages: Array, h: float

@@ -89,7 +89,8 @@ class Stages:
             self.rtol, self.atol = np.full_like(self.rtol, ROUNDING), np.full_like(self.atol, ROUNDING)
             self.enough, self.rough, self.enough_kept = 1.0, 1e5, KEPT
         self.counts = counts
-        counts |= {"iterations": 0, "factorisations": 0}
+        for name in ("iterations", "factorisations"):
+            counts.setdefault(name, 0)
         self.jacobian = Jacobian(equations, counts)
         # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
         self._separation = equations.separation()

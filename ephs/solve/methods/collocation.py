@@ -19,7 +19,7 @@ COARSE, FINE = 3e-3, 3e-7
 """Relative tolerances above the first are for order 5, those below the second for order 13, the others for order 9.
 
 Where forces have kinks, as between surfaces, an order is as good as the next one down to a tolerance that is finer."""
-ROUNDED = 3e-9
+ROUNDED = 8e-9
 """Relative tolerance below which constraints that may lose rank are for order 5: near there, rounding is more than what
 stages of a higher order may be off by."""
 
