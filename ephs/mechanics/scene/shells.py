@@ -94,12 +94,13 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
     def lines(self, site: Site) -> Iterator[tuple[str, Any, str, Any]]:
         """Edges of its elements; where its nodes are no bodies, as they are at the start."""
         shell, welded = self.shell(), {node: body for body, nodes in self.welds().items() for node in nodes}
+        bodies = {name for name, _ in site.scene.all_bodies()}
         ways = np.stack([shell.cells, np.roll(shell.cells, -1, axis=1)], axis=2).reshape(-1, 2)
 
         def end(i: int) -> tuple[str, Array]:
             body, at = welded.get(i, self.node(i)), shell.points[i]
-            known = body != GROUND and body in site.scene.bodies
-            return (body, SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:]) if known else (GROUND, at)
+            own = SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:] if body in bodies else at
+            return body if body in bodies else GROUND, own
 
         for one, two in np.unique(np.sort(ways, axis=1), axis=0).tolist():
             yield *end(one), *end(two)
