@@ -145,7 +145,7 @@ def test_jumps_that_are_none_are_one_clear_error(jumps):
 
 
 def test_noise_is_found_to_be_no_input(monkeypatch):
-    for module in ("breakpoints", "auditing.audit"):
+    for module in ("posing.breakpoints", "auditing.audit"):
         monkeypatch.setattr(f"ephs.solve.{module}.MOST_FOUND", 50)
     rng = np.random.default_rng(1)
     with pytest.raises(ephs.AuditError, match=r"input: .* at joints\.rail"):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.semantics.stage import Entry, Program, vector
+from ephs.semantics.stage import Entry, Evaluator, Program, Vector, vector
 from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of
@@ -106,5 +106,9 @@ def test_quaternions_that_are_off_by_rounding_come_back(seed):
     q = np.random.default_rng(seed).standard_normal(4)
     unit = q / np.linalg.norm(q)
     off = unit * (1.0 + 1e-6)
-    Program("tight", tighten=Entry(tighten, q=vector(4))).plain()["tighten"](off)
+
+    def tightened(_: Evaluator, q: Vector) -> None:
+        tighten(q)
+
+    Program("tight", tightened=Entry(tightened, q=vector(4))).plain()["tightened"](off)
     assert np.abs(off - unit).max() <= 1e-11

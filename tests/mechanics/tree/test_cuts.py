@@ -11,7 +11,7 @@ import ephs
 from ephs.mechanics.road.cuts import Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.records import LinkPlace, LinkState
-from ephs.mechanics.runs.simulate import problem_of_scene
+from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
