@@ -14,12 +14,12 @@ CEILINGS = {
     "ephs/mechanics": 404_200,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_400,
-    "ephs/semantics": 193_300,
+    "ephs/semantics": 193_400,
     "ephs/show": 62_900,
     "ephs/solve": 123_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 552_700,
+    "tests": 553_100,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

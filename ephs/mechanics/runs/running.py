@@ -94,7 +94,7 @@ class Course:
         """Further runs of the problem, over the jumps that a run has known; None where steps are chosen."""
         if self.control.step is None:
             return None
-        explicit = self.problem.scene is not None and not self.method.name.startswith("rk")
+        explicit = self.problem.mechanical and not self.method.name.startswith("rk")
         return Again(lambda h, to: self._coarser(known, h, to), partial(self._independent, known) if explicit else None)
 
     def _coarser(self, known: Breakpoints, h: float, to: float) -> Solution:

@@ -88,7 +88,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         return [i for i in range((self.elements[0] + 1) * (self.elements[1] + 1)) if i not in welded]
 
     def node(self, number: int) -> str:
-        """What pictures call a node."""
+        """Name of a node in pictures."""
         return f"{self.name}-node{number}"
 
     def lines(self, site: Site) -> Iterator[tuple[str, Any, str, Any]]:

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from typing import final
 
 from ephs.semantics.derive.arguments import Arguments
-from ephs.semantics.derive.charts import moved
-from ephs.semantics.derive.logarithms import end_of, poses_at_rest
+from ephs.semantics.derive.pose_edges import PoseEdges
 from ephs.semantics.derive.relating import DOMAIN, OK, TEMPERATURE, finite
 from ephs.semantics.spaces import se3
-from ephs.semantics.spaces.codes import SE3
 from ephs.semantics.spaces.vectors import apply, apply_transposed, scale, sub
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
@@ -31,31 +29,23 @@ class LogarithmLoss:
         As of a `LogarithmStep`.
     """
 
-    edges: tuple[tuple[int, int], ...]
-
-    @property
-    def poses(self) -> int:
-        """Number of poses that are read."""
-        return max(map(max, self.edges))
+    edges: PoseEdges
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
         """Numbers of efforts, conditions, increments and state coordinates."""
-        return 6 * self.poses + 1, 0, 6 * self.poses, 7 * self.poses
+        poses = self.edges.poses
+        return 6 * poses + 1, 0, 6 * poses, 7 * poses
 
     @property
     def numbers(self) -> int:
         """Number of parameters: d⁰ of all edges, then R row by row."""
-        width = 6 * len(self.edges)
-        return width + width * width
+        return self.edges.numbers
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
         """Write flows and, unless bare, their derivatives by efforts and increments."""
-        n, _, m, size = self.dimensions
-        state, given, rest = on.scratch(7 + size), on.scratch(n + m), poses_at_rest(on, len(self.edges), a.p)
-        state[0] = 1.0
-        for i in range(size):
-            state[7 + i] = a.x0[i]
+        n, _, m, _ = self.dimensions
+        state, given, rest = self.edges.with_first(on, a.x0), on.scratch(n + m), self.edges.at_rest(on, a.p)
         for i in range(n):
             given[i] = a.e[i]
         for i in range(m):
@@ -87,21 +77,15 @@ class LogarithmLoss:
     ) -> list[Real]:
         """Flows at efforts and half increments that are given one after the other."""
         n, _, m, _ = self.dimensions
-        count, poses = len(self.edges), 1 + self.poses
-        width = 6 * count
-        middle, rates, half = on.scratch(7 * poses), on.scratch(6 * poses), on.scratch(6 * poses)
+        edges, width, count = self.edges, self.edges.width, len(self.edges.ends)
+        rates, half = on.scratch(6 + m), on.scratch(6 + m)
         for i in range(m):
             rates[6 + i], half[6 + i] = given[i], given[n + i]
-
-        def move(k: Integer) -> None:
-            point, by = ([x[size * k + i] for i in range(size)] for x, size in ((state, 7), (half, 6)))
-            for i, x in enumerate(moved(on, SE3, point, by)):
-                middle[7 * k + i] = x
-
+        middle = edges.moved(on, state, half)
         before, after, change = on.scratch(36 * count), on.scratch(36 * count), on.scratch(width)
 
         def measure(e: Integer) -> None:
-            ends = end_of(on, self.edges, e, 0), end_of(on, self.edges, e, 1)
+            ends = edges.end(on, e, 0), edges.end(on, e, 1)
             a, b = ([middle[7 * k + i] for i in range(7)] for k in ends)
             d = se3.increment(on, a, se3.compose(on, [rest[7 * e + i] for i in range(7)], b))
             rows = se3.dexp_inv(on, d), se3.dexp_inv(on, scale(-1.0, d))
@@ -113,7 +97,6 @@ class LogarithmLoss:
                     for j, x in enumerate(row):
                         kept[36 * e + 6 * i + j] = x
 
-        on.loop(poses, move)
         on.loop(count, measure)
         stress, power = on.scratch(width), on.variable(0.0)
 
@@ -128,13 +111,13 @@ class LogarithmLoss:
             power.value = power.value + total.value * change[i]
 
         on.loop(width, pull)
-        force = on.scratch(6 * poses)
+        force = on.scratch(6 + m)
 
         def push(e: Integer) -> None:
             own = [stress[6 * e + i] for i in range(6)]
             for side, kept, sign in ((0, before, -1.0), (1, after, 1.0)):
                 rows = [[kept[36 * e + 6 * i + j] for j in range(6)] for i in range(6)]
-                k = end_of(on, self.edges, e, side)
+                k = edges.end(on, e, side)
                 for i, x in enumerate(apply_transposed(rows, own)):
                     force[6 * k + i] = force[6 * k + i] + sign * x
 

@@ -11,7 +11,8 @@ from functools import cache
 from typing import Any, final
 
 from ephs.semantics.derive.arguments import Arguments
-from ephs.semantics.derive.charts import moved, over
+from ephs.semantics.derive.charts import over
+from ephs.semantics.derive.pose_edges import PoseEdges
 from ephs.semantics.derive.recording import record
 from ephs.semantics.derive.relating import DOMAIN, OK, finite
 from ephs.semantics.derive.slopes import Slopes, lifted
@@ -33,37 +34,28 @@ class LogarithmStep:
     Parameters
     ----------
     edges
-        Numbers of the poses that each edge goes from and to; 0 is the one that does not move.
+        Those along which it has logarithms.
     """
 
-    edges: tuple[tuple[int, int], ...]
-
-    @property
-    def poses(self) -> int:
-        """Number of poses that are states."""
-        return max(map(max, self.edges))
+    edges: PoseEdges
 
     @property
     def dimensions(self) -> tuple[int, int, int, int]:
         """Numbers of efforts, conditions, increments and state coordinates."""
-        return 6 * self.poses, 0, 6 * self.poses, 7 * self.poses
+        poses = self.edges.poses
+        return 6 * poses, 0, 6 * poses, 7 * poses
 
     @property
     def numbers(self) -> int:
         """Number of parameters: d⁰ of all edges, then K row by row."""
-        width = 6 * len(self.edges)
-        return width + width * width
+        return self.edges.numbers
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
         """Write efforts, their derivatives by the step, and the energy; no derivatives where it is bare."""
-        n, _, _, size = self.dimensions
-        state, step = on.scratch(7 + size), on.scratch(6 + n)
-        state[0] = 1.0
-        for i in range(size):
-            state[7 + i] = a.x0[i]
+        n, edges = self.dimensions[0], self.edges
+        state, step, rest = edges.with_first(on, a.x0), on.scratch(6 + n), edges.at_rest(on, a.p)
         for i in range(n):
             step[6 + i] = a.v[i]
-        rest = poses_at_rest(on, len(self.edges), a.p)
         efforts, energy = self._evaluated(on, a.p, rest, state, step)
         for i in range(n):
             a.e[i] = efforts[6 + i]
@@ -87,23 +79,16 @@ class LogarithmStep:
 
     def _evaluated(self, on: Evaluator, p: Vector, rest: Vector, state: Vector, step: Vector) -> tuple[Vector, Real]:
         """Efforts of all poses, and the energy at the end."""
-        count = len(self.edges)
-        width, poses = 6 * count, 1 + self.poses
-        end, first, last = on.scratch(7 * poses), on.scratch(width), on.scratch(width)
-
-        def move(k: Integer) -> None:
-            point, by = ([x[size * k + i] for i in range(size)] for x, size in ((state, 7), (step, 6)))
-            for i, x in enumerate(moved(on, SE3, point, by)):
-                end[7 * k + i] = x
+        edges, width, count = self.edges, self.edges.width, len(self.edges.ends)
+        end, first, last = edges.moved(on, state, step), on.scratch(width), on.scratch(width)
 
         def measure(e: Integer) -> None:
             between = [rest[7 * e + i] for i in range(7)]
             for at, out in ((state, first), (end, last)):
-                a, b = ([at[7 * end_of(on, self.edges, e, side) + i] for i in range(7)] for side in (0, 1))
+                a, b = ([at[7 * edges.end(on, e, side) + i] for i in range(7)] for side in (0, 1))
                 for i, x in enumerate(se3.increment(on, a, se3.compose(on, between, b))):
                     out[6 * e + i] = x - p[6 * e + i]
 
-        on.loop(poses, move)
         on.loop(count, measure)
         stress, energy = on.scratch(width), on.variable(0.0)
 
@@ -120,10 +105,10 @@ class LogarithmStep:
             energy.value = energy.value + 0.5 * last[i] * at_end.value
 
         on.loop(width, pull)
-        efforts, slopes = on.scratch(6 * poses), Slopes(on)
+        efforts, slopes = on.scratch(6 + 6 * edges.poses), Slopes(on)
 
         def push(e: Integer) -> None:
-            ends = end_of(on, self.edges, e, 0), end_of(on, self.edges, e, 1)
+            ends = edges.end(on, e, 0), edges.end(on, e, 1)
             given = [[x[size * k + i] for i in range(size)] for k in ends for x, size in ((state, 7), (step, 6))]
             between = [*over(on, SE3, given[0], given[1], 0), *over(on, SE3, given[2], given[3], 6)]
             constant = [*(rest[7 * e + i] for i in range(7)), *(stress[6 * e + i] for i in range(6))]
@@ -135,26 +120,6 @@ class LogarithmStep:
 
         on.loop(count, push)
         return efforts, energy.value
-
-
-def poses_at_rest(on: Evaluator, edges: int, p: Vector) -> Vector:
-    """(7 edges,) exp(d⁰) of logarithms (6 edges,)."""
-    rest = on.scratch(7 * edges)
-
-    def pose_at_rest(e: Integer) -> None:
-        for i, x in enumerate(se3.exp(on, [p[6 * e + i] for i in range(6)])):
-            rest[7 * e + i] = x
-
-    on.loop(edges, pose_at_rest)
-    return rest
-
-
-def end_of(on: Evaluator, edges: tuple[tuple[int, int], ...], edge: Integer, side: int) -> Integer:
-    """Number of the pose at an end of an edge."""
-    found: Integer = edges[-1][side]
-    for number, ends in enumerate(edges[:-1]):
-        found = on.select(on.same(edge, number), ends[side], found)
-    return found
 
 
 @cache

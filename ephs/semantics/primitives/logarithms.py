@@ -8,6 +8,7 @@ from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.derive import relations
 from ephs.semantics.derive.logarithm_loss import LogarithmLoss
 from ephs.semantics.derive.logarithms import LogarithmStep
+from ephs.semantics.derive.pose_edges import PoseEdges
 from ephs.semantics.primitives.forms import StorageForm
 from ephs.semantics.primitives.primitives import Kernel, Point
 
@@ -25,7 +26,7 @@ def logarithm_form(edges: tuple[tuple[int, int], ...], rest: Array, stiffness: A
     stiffness
         (6 edges, 6 edges) K, symmetric and non-negative.
     """
-    relation = LogarithmStep(edges)
+    relation = LogarithmStep(PoseEdges(edges))
     kernel = Kernel(label, relation, (*rest.ravel().tolist(), *stiffness.ravel().tolist()))
     numbers, sizes, dims = np.array(kernel.parameters), relations.sizes(relation), np.array(relation.dimensions)
 
@@ -56,7 +57,7 @@ def logarithm_loss(
     resistance
         (6 edges, 6 edges) R, symmetric and non-negative.
     """
-    relation = LogarithmLoss(edges)
+    relation = LogarithmLoss(PoseEdges(edges))
     kernel = Kernel(label, relation, (*rest.ravel().tolist(), *resistance.ravel().tolist()))
     numbers, sizes, dims = np.array(kernel.parameters), relations.sizes(relation), np.array(relation.dimensions)
 

@@ -1,4 +1,4 @@
-"""What all pictures share: colours, figures, pages, and their errors.
+"""Colours, figures, pages and errors of all pictures.
 
 Nothing comes in; the other rooms of pictures take these. Start with `palette`.
 """

@@ -141,7 +141,7 @@ class Model:
         return f"{equation} {path}".strip()
 
     def _owner(self, row: int) -> tuple[str, str, str]:
-        """What the equation of a row is, what the unknown of its number is, and the path that both belong to."""
+        """Kind of a row's equation, kind of the unknown with its number, and the path of both."""
         d, n_rate = self.descriptor, int(self.tables.counts[0])
         at = row - n_rate - int(self.tables.counts[1])
         if row < n_rate:

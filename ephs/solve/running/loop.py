@@ -153,8 +153,8 @@ class _RunLoop(Generic[S]):
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
-        each = self.watch.events or self.production.active or self.breakpoints.active  # step has to be looked at
-        compiled = not each and (self.journal is None or self.journal.snapshot is None or stood is not None)
+        stepwise = self.watch.events or self.production.active or self.breakpoints.active
+        compiled = not stepwise and (self.journal is None or self.journal.snapshot is None or stood is not None)
         while compiled and not self.ended and self.t != self.until:  # leg after leg, while the method has one
             counts = Counts(self.steps, self.rejected, self.shortest, self.longest, self.least, self.h)
             here = self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved

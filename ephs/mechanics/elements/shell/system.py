@@ -24,6 +24,7 @@ from ephs.semantics.primitives import structures
 from ephs.semantics.primitives.logarithms import logarithm_form, logarithm_loss
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage, power_ports
 from ephs.semantics.spaces import SE3, pair
+from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import STATEMENTS
 from ephs.semantics.verdicts.verdict import proved
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 RELATIVE = quantity.relative_pose("free")
+ROUNDING = 24 * 24 * float(np.finfo(float).eps)
+"""Of the eigenvalues of K, relative to the largest: it is a product, summed over 24 numbers twice."""
 OTHERS = (2, 3, 4)
 """Corners whose poses are relative to that of corner 1."""
 
@@ -49,7 +52,7 @@ def shell_spring(rest: Array, stiffness: Array) -> Storage:
     Raises
     ------
     StructureError
-        An array of a wrong shape, a number that is not finite, or K is not symmetric.
+        An array of a wrong shape, a number that is not finite, or K is not symmetric and non-negative.
     """
     rest, k = _checked(rest, stiffness)
     form = logarithm_form(EDGES, rest, k, "shell_spring")
@@ -160,7 +163,7 @@ def shell_element(
     Raises
     ------
     StructureError
-        An array of a wrong shape, a number that is not finite, K is not symmetric, or the damping negative.
+        As of `shell_spring`, or the damping is negative.
     """
     frames, between, free = np.asarray(sections, dtype=float), np.asarray(at_rest, dtype=float), pair("free")
     numbers = np.asarray(rest, dtype=float), np.asarray(stiffness, dtype=float)
@@ -258,10 +261,14 @@ def _checked(given: Array, stiffness: Array) -> tuple[Array, Array]:
     for key, found, sound, expected in (
         ("rest", rest, rest.shape == (4, 6) and bool(np.isfinite(rest).all()), "finite numbers (4, 6)"),
         ("stiffness", k, k.shape == (24, 24) and bool(np.isfinite(k).all()), "finite numbers (24, 24)"),
-        ("stiffness", k, k.shape == k.T.shape and bool(np.array_equal(k, k.T)), "a symmetric matrix"),
+        ("stiffness", k, bool(np.array_equal(k, k.T)), "a symmetric matrix"),
     ):
         if not sound:
             raise StructureError("parameter", "shell", key=key, found=f"shape {found.shape}", expected=expected)
+    least, most = symmetric_eigenvalues(k)[[0, -1]]
+    if least < -ROUNDING * most:
+        text = f"the eigenvalue {least:.3g}"
+        raise StructureError("parameter", "shell", key="stiffness", found=text, expected="none below 0")
     return rest, k
 
 

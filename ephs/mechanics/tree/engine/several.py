@@ -18,7 +18,7 @@ def meet(
 ) -> None:
     """Write a pose to the states of its component, as the one with this place among them.
 
-    Where the component is read to first order, the increment from the point is written.
+    To a component that is expanded about a point goes the increment from that point.
     """
     into, at = work.x, 7 * place
     if read is not None:

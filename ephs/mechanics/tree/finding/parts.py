@@ -214,7 +214,7 @@ class _PartsReader:
         )  # fmt: skip
 
     def _place(self, joint: LinkJoint) -> int:
-        """Which of the relative poses that its potential stores is a joint's."""
+        """Place of a joint's relative pose among those that its potential stores."""
         stored = [state.path for state in self.wiring.components[joint.potential].reads]
         return stored.index(joint.state.path)
 

@@ -41,7 +41,7 @@ class Edge:
     spring, friction, heat
         Components of its potential and its friction, and the entropy that the latter heats; −1 where there is none.
     place
-        Which of the relative poses that the potential stores is the edge's.
+        Place of the edge's relative pose among those that its potential stores.
     """
 
     name: str

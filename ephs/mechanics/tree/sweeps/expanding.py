@@ -136,7 +136,7 @@ class About:
     def relate(self, on: Evaluator, number: Integer, dims: Integers, work: Work, moving: Integer) -> None:
         """Write the flows of a component to the memory, whose state's first increments move so many."""
         n, one = dims[0], self.expanded(number, dims)
-        width, value, slope, off = n + dims[2], one.value, one.slope, on.scratch(7)
+        width, value, slope, off = n + dims[2], one.value, one.slope, on.scratch(1 + MOST)
         on.loop(n, lambda k: write_entry(off, k, work.e[k] - one.effort[k]))
 
         def flow(j: Integer) -> None:

@@ -189,6 +189,7 @@ def test_the_loss_of_a_rate_is_what_the_stress_of_its_strain_rate_does(seed):
         ("stiffness", np.zeros((4, 6)), np.eye(23)),
         ("stiffness", np.zeros((4, 6)), np.eye(24) + np.diag(np.ones(23), 1)),
         ("rest", np.full((4, 6), np.nan), np.eye(24)),
+        ("stiffness", np.zeros((4, 6)), np.diag([1.0] * 23 + [-1e-6])),  # entropy would fall by its loss
     ],
 )
 def test_wrong_numbers_are_refused(key, rest, stiffness):
