@@ -11,7 +11,6 @@ import pytest
 import ephs
 from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.scene.state import Snapshot
 from ephs.solve.auditing import audit as auditing
 from ephs.solve.auditing import rounding
 from ephs.solve.auditing.audit import CLOSED, COARSE, LAWFUL, LAWS, LEAST, PRODUCTION, Bounds, audit
@@ -31,10 +30,11 @@ def brake(rate: float = 6.0) -> ephs.Scene:
     return pendulum(rate, BRAKE)
 
 
-@pytest.fixture(scope="module")
-def sound() -> ephs.Solution:
-    """A run of brake and pendulum that keeps every law."""
-    return ephs.simulate(brake(), 0.2, method="natural", step=0.005)
+@pytest.fixture(scope="module", params=["scene", "system"])
+def sound(request) -> ephs.Solution:
+    """A run of brake and pendulum that keeps every law, of the scene and of its system."""
+    model = brake() if request.param == "scene" else brake().system()
+    return ephs.simulate(model, 0.2, method="natural", step=0.005)
 
 
 def bent(sol: ephs.Solution, **ledgers) -> ephs.Solution:
@@ -82,8 +82,7 @@ def broken(law: str, sol: ephs.Solution, times: float) -> ephs.Solution:
         stats = {**sol.stats, "jumps": {"declared": 0, "found": found, "divided_steps": 0}}
         return ephs.Solution(sol.name, sol.t, sol.states, lambda: ledgers, stats, sol.problem, sol.labels)
     if law == "constraint":
-        length = Snapshot.of(sol.scene).scale(sol.scene.world.gravity).length
-        return opened(sol, times * CLOSED * length)
+        return opened(sol, times * CLOSED * sol.problem.length)
     path, held = next((path, s) for path, s in ledgers.entropies.items() if np.ptp(s))
     return bent(
         sol, entropies={**ledgers.entropies, path: held + np.linspace(0.0, times * LEAST * entropies, len(held))}

@@ -1,52 +1,47 @@
-"""Position residuals over a motion: joint frames by coordinates against those by bodies, and lengths of tendons."""
+"""Position residuals over a motion: joint frames by coordinates against those by bodies."""
 
-from collections.abc import Iterable, Mapping
-from typing import Protocol
+from collections.abc import Iterator, Sequence
+from typing import Final, TypeAlias
 
 import numpy as np
 
-from ephs.mechanics.motion.batch import compose, gap, product
-from ephs.mechanics.scene.model import Joint
-from ephs.mechanics.scene.tendons import Tendon
+from ephs.mechanics.motion.batch import gap, product
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.spaces import translation
+
+CHUNK: Final = 512
+"""Instants that are treated together; bounds the memory."""
+MANY: Final = 40
+"""Joints beyond which fewer instants are."""
+Opening: TypeAlias = tuple[Array, Array, Array, Array, Array]
+"""Poses (n, 7) of body 1, frame (7,) of the joint in it, poses (n, 7) of C2 in C1, then poses of body 2, and frame."""
 
 
-class Read(Protocol):
-    """Poses (n, 7) of bodies, and of C2 in C1 by the coordinates of a joint."""
-
-    def poses(self, name: str) -> Array:
-        """(n, 7) of a body, or of the ground."""
-        ...
-
-    def inclusion(self, name: str) -> Array:
-        """(n, 7) of a joint."""
-        ...
+def largest_opening(joints: Sequence[Opening], instants: int) -> Array:
+    """(n,) largest angle in rad or distance in m of a joint."""
+    if not joints:
+        return np.zeros(instants)
+    each = [_openings(joints, at).max(axis=(0, 1)) for at in chunks_of(instants, len(joints))]
+    return np.concatenate(each) if each else np.zeros(0)
 
 
-def open_by(joints: Mapping[str, Joint], read: Read, chunks: Iterable[slice]) -> Array:
-    """(2, joints, instants) angles in rad and distances in m, all joints at once, chunk after chunk of instants."""
-    each = list(joints.values())
-    if not each:
-        return np.zeros((2, 0, 0))
-    poses = [
-        [read.poses(joint.body1) for joint in each],
-        [read.poses(joint.body2) for joint in each],
-        [read.inclusion(name) for name in joints],
-    ]
-    frame1, frame2 = (np.array(frames).T[:, :, None] for frames in ([j.frame1 for j in each], [j.frame2 for j in each]))
-    out: list[Array] = []
-    for at in chunks:
-        body1, body2, moved = (np.stack([pose[at].T for pose in of], axis=1) for of in poses)
-        out.append(np.array(gap(product(body1, product(frame1, moved)), product(body2, frame2))))
-    return np.concatenate(out, axis=2) if out else np.zeros((2, len(each), 0))
+def relative_openings(joints: Sequence[Opening], every: int, length: float) -> Array:
+    """(joints, instants) angles in rad or parts of a length at every so many instants, the last one first."""
+    if not joints:
+        return np.zeros((0, 0))
+    angles, distances = _openings(joints, slice(None, None, -every))
+    return np.maximum(angles, distances / length)
 
 
-def span_of(tendon: Tendon, read: Read) -> Array:
-    """(n,) sum of the distances between the points of each segment, in m, by the poses of the bodies."""
+def _openings(joints: Sequence[Opening], at: slice) -> Array:
+    """(2, joints, instants) angles in rad and distances in m."""
+    poses1, frames1, inside, poses2, frames2 = zip(*joints, strict=True)
+    body1, moved, body2 = (np.stack([pose[at].T for pose in of], axis=1) for of in (poses1, inside, poses2))
+    frame1, frame2 = (np.array(frames).T[:, :, None] for frames in (frames1, frames2))
+    return np.array(gap(product(body1, product(frame1, moved)), product(body2, frame2)))
 
-    def point(end: tuple[str, list[float]]) -> Array:
-        poses = read.poses(end[0])
-        return compose(poses, np.broadcast_to(translation(end[1]), poses.shape))[:, 4:]
 
-    return np.sum([np.linalg.norm(point(two) - point(one), axis=1) for one, two in tendon.segments], axis=0)
+def chunks_of(instants: int, joints: int) -> Iterator[slice]:
+    """Instants that are treated together, which bounds the memory."""
+    size = max(1, CHUNK * MANY // max(MANY, joints))
+    for start in range(0, instants, size):
+        yield slice(start, min(instants, start + size))

@@ -1,19 +1,21 @@
 """Motion of the bodies and joints of a system without scene, by the paths of their boxes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.motion.batch import compose
+from ephs.mechanics.motion.batch import compose, included, inverse
+from ephs.mechanics.motion.gaps import Opening, largest_opening, relative_openings
 from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion
 from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
-from ephs.mechanics.scene.geometry import JointCoupling
+from ephs.mechanics.scene.kinematics import AssemblyJoint
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
+from ephs.mechanics.scene.tree import spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
 from ephs.mechanics.tree.finding.tendons import length_errors
@@ -34,8 +36,8 @@ STILL = frozen(np.zeros(6))
 class LinkMotion:
     """The motion of links and joints, read from a solution."""
 
-    def __init__(self, frames: Frames, solution: "Solution") -> None:
-        self._solution, self._frames = solution, frames
+    def __init__(self, frames: Frames, joints: Sequence[AssemblyJoint], solution: "Solution") -> None:
+        self._solution, self._frames, self._assembled = solution, frames, joints
         self._links = {str(link.path): link for link in frames.links if link.pose is not None}
         self._joints = {str(joint.path): joint for joint in frames.joints}
 
@@ -120,9 +122,7 @@ class LinkMotion:
             ends = joint.first, joint.second
             if not {end.link for end in ends} <= {SOLID, *names}:
                 continue
-            of = JointCoupling(joint.pair)
-            rows = self._solution[joint.state.path].reshape(-1, joint.pair.dim)
-            inside = np.array([of.include(of.element(row)) for row in rows]).reshape(-1, 7)
+            inside = self._inside[name]
             frames = compose(np.broadcast_to(joint.first.offset, inside.shape), inside), joint.second.offset
             residual = -rates[name] @ joint.pair.basis.T
             for end, frame, sign in zip(ends, frames, (-1.0, 1.0), strict=True):
@@ -130,6 +130,45 @@ class LinkMotion:
                     residual = residual + sign * _at_frame(twists[names[end.link]], frame)
             worst = np.maximum(worst, np.abs(residual).max(axis=1))
         return worst
+
+    def constraint_error(self) -> Array:
+        """(n,) largest angle or distance between where a joint's coordinates and its links put the frame C2."""
+        return largest_opening(list(self._openings.values()), len(self._solution))
+
+    def gaps(self, every: int) -> dict[Path, Array]:
+        """Per joint the residual of its position at every so many instants, the last one first: rad, or a part of the
+        mechanism's length."""
+        problem = self._solution.problem
+        worst = relative_openings(list(self._openings.values()), every, 1.0 if problem is None else problem.length)
+        return {Path.of(name): row for name, row in zip(self._openings, worst, strict=True)}
+
+    @cached_property
+    def _openings(self) -> dict[str, Opening]:
+        """Joints between links whose poses are known; those of frames without one are where a joint puts them."""
+        n, placed = len(self._solution), set[int]()
+        poses = {i: self.poses(str(link.path)) for i, link in enumerate(self._frames.links) if link.pose is not None}
+        poses[SOLID] = np.tile(SE3.identity(), (n, 1))
+        for hop in spanning_hops(self._assembled, len(self._frames.links), ()):
+            link = self._assembled[hop.link]
+            known, here, there = link.body1, link.frame1, link.frame2
+            inside = self._inside[link.name]
+            if not hop.forward:
+                known, here, there, inside = link.body2, there, here, inverse(inside)
+            if hop.body not in poses and known in poses:
+                frame = compose(poses[known], np.broadcast_to(here, (n, 7)))
+                poses[hop.body] = compose(compose(frame, inside), np.broadcast_to(SE3.inverse(there), (n, 7)))
+                placed.add(hop.link)
+        return {
+            link.name: (poses[link.body1], link.frame1, self._inside[link.name], poses[link.body2], link.frame2)
+            for number, link in enumerate(self._assembled)
+            if number not in placed and {link.body1, link.body2} <= poses.keys()
+        }
+
+    @cached_property
+    def _inside(self) -> dict[str, Array]:
+        """(n, 7) poses of C2 in C1 by the coordinates of joints."""
+        rows = {name: self._solution[joint.state.path] for name, joint in self._joints.items()}
+        return {of.name: included(of.coupling, rows[of.name].reshape(-1, of.coupling.dim)) for of in self._assembled}
 
     @cached_property
     def _found(self) -> ByPath:

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, included, rotations
 from ephs.mechanics.motion.beams import BeamMotion, beam_motion
 from ephs.mechanics.motion.contacts import ContactMotion, contact_motion, contact_poses
-from ephs.mechanics.motion.gaps import open_by
+from ephs.mechanics.motion.gaps import Opening, chunks_of, largest_opening, relative_openings
 from ephs.mechanics.motion.leaps import leaps
 from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
@@ -36,10 +36,6 @@ if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
 Item = TypeVar("Item")
-CHUNK = 512
-"""Instants that are projected together; bounds the memory."""
-MANY = 40
-"""Joints beyond which velocities are projected by sparse matrices."""
 
 
 @final
@@ -244,19 +240,22 @@ class SceneMotion:
 
     def constraint_error(self) -> Array:
         """(n,) largest distance or angle between where a joint's coordinates and its bodies put the frame C2."""
-        if not self._joints:
-            return np.zeros(len(self._solution))
-        return np.max(open_by(self._joints, self, self.chunks()), axis=(0, 1), initial=0.0)
+        return largest_opening(self._openings(), len(self._solution))
 
     def gaps(self, every: int) -> dict[Path, Array]:
         """Per joint the residual of its position at every so many instants: rad, or a part of the mechanism's length.
 
         The last instant is the first of these.
         """
-        angles, distances = open_by(self._joints, self, [slice(None, None, -every)])
         problem = self._solution.problem
-        worst = np.maximum(angles, distances / (1.0 if problem is None else problem.length))
+        worst = relative_openings(self._openings(), every, 1.0 if problem is None else problem.length)
         return {component_path("joints", name): row for name, row in zip(self._joints, worst, strict=True)}
+
+    def _openings(self) -> list[Opening]:
+        return [
+            (self.poses(joint.body1), joint.frame1, self.inclusion(name), self.poses(joint.body2), joint.frame2)
+            for name, joint in self._joints.items()
+        ]
 
     def leaps(self, h: float) -> Iterator[tuple[Path, int, float]]:
         """Contacts that a step of at most h s passed: path, instant after it, the step's way in thicknesses."""
@@ -339,7 +338,7 @@ class SceneMotion:
         return state
 
     def _rows(self) -> Iterator[tuple[slice, str, Array, Array, Array]]:
-        for at in self.chunks():
+        for at in chunks_of(len(self._solution), len(self._joints)):
             for name, first, second, basis in self.joint_rows(at):
                 yield at, name, first, second, basis
 
@@ -365,13 +364,6 @@ class SceneMotion:
     @cached_property
     def _inclusions(self) -> dict[str, Array]:
         return {name: included(coupling, self.coordinates(name)) for name, coupling in self._couplings.items()}
-
-    def chunks(self) -> Iterator[slice]:
-        """Instants that are treated together, which bounds the memory."""
-        n = len(self._solution)
-        size = max(1, CHUNK * MANY // max(MANY, len(self._joints)))
-        for start in range(0, n, size):
-            yield slice(start, min(n, start + size))
 
     # ---- summary -----------------------------------------------------------------------------------------------
 

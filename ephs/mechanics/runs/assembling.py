@@ -13,13 +13,12 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.constraints.holding import ConfiguredMechanism
-from ephs.mechanics.motion.batch import compose, inverse
 from ephs.mechanics.scene.adjust import mass_roots
 from ephs.mechanics.scene.assembly import gyration
 from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.scene.kinematics import AssemblyJoint, extent
 from ephs.mechanics.scene.tree import spanning_hops
-from ephs.mechanics.tree.finding.frames import GROUND, Frames, frames_of
+from ephs.mechanics.tree.finding.frames import Frames, frames_of
 from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -31,7 +30,6 @@ from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.systems.system import System
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
-from ephs.solve.result.solution import Solution
 from ephs.solve.running.ending import solution_of
 
 OPEN = 1e-6
@@ -62,41 +60,10 @@ class FlatJoints:
     poses: tuple[Path | None, ...]
     frames: Frames
 
-    def gaps(self, solution: Solution) -> Array:
-        """(n,) largest distance in m or angle in rad between where a joint and its bodies put the frame C2."""
-        n = len(solution)
-        worst = np.zeros(n)
-        poses = {body: solution[path] for body, path in enumerate(self.poses) if path is not None}
-        poses[GROUND] = np.tile(SE3.identity(), (n, 1))
-        hops = spanning_hops(self.links, len(self.poses), ())
-        placing = [hop for hop in hops if self.poses[hop.body] is None]
-        for hop in placing:  # frames without a pose are where the joint before them puts them
-            link, inside = self.links[hop.link], self._inside(solution, hop.link)
-            if not hop.forward:
-                inside = inverse(inside)
-            here, there = (link.frame1, link.frame2) if hop.forward else (link.frame2, link.frame1)
-            first = compose(poses[link.body1 if hop.forward else link.body2], np.broadcast_to(here, (n, 7)))
-            poses[hop.body] = compose(compose(first, inside), np.broadcast_to(SE3.inverse(there), (n, 7)))
-        for number in set(range(len(self.links))) - {hop.link for hop in placing}:
-            link = self.links[number]
-            if {link.body1, link.body2} <= poses.keys():
-                ends = ((link.body1, link.frame1), (link.body2, link.frame2))
-                first, second = (compose(poses[body], np.broadcast_to(frame, (n, 7))) for body, frame in ends)
-                gap = compose(inverse(second), compose(first, self._inside(solution, number)))
-                angle = 2.0 * np.linalg.norm(gap[:, 1:4], axis=1)  # of small ones, and half turns still show
-                worst = np.maximum(worst, np.maximum(angle, np.linalg.norm(gap[:, 4:], axis=1)))
-        return worst
-
     @property
     def holding(self) -> bool:
         """Whether a joint holds anything."""
         return any(link.coupling.dim < 6 for link in self.links)
-
-    def _inside(self, solution: Solution, number: int) -> Array:
-        """(n, 7) relative poses of a joint."""
-        n, of = len(solution), self.links[number].coupling
-        rows = solution[self.relative[number]].reshape(n, of.dim)
-        return np.array([of.include(of.element(row)) for row in rows]).reshape(n, 7)
 
 
 def flat_joints(d: Descriptor) -> FlatJoints:

@@ -148,7 +148,7 @@ def _motion(problem: Problem, given: Collection[str]) -> Iterator[CheckItem]:
         yield CheckItem("motion", False, str(error))
         return
     gap, slip = float(start.constraint_error[0]), float(start.velocity_error[0])
-    if problem.motion is not None or problem.gaps is not None:
+    if problem.mechanical:
         detail = f"largest gap {gap:.1e} m or rad, largest velocity residual {slip:.1e}"
         yield CheckItem("closure", gap < ASSEMBLY * problem.length, detail)
     error, ledgers = float(start.energy_error.max()), start.ledgers

@@ -81,10 +81,9 @@ def _of_mechanism(problem: Problem, given: Mapping[Path, Array], *, assemble: bo
 
     joints = flat_joints(problem.descriptor)
     state = start_of(joints, problem.system, given) if assemble and joints.links else problem.initial
-    gaps = joints.gaps if joints.links else None
-    linked = (lambda solution: LinkMotion(joints.frames, solution)) if joints.frames.links else None
+    linked = (lambda solution: LinkMotion(joints.frames, joints.links, solution)) if joints.frames.links else None
     length = length_of(joints, state) if linked else 1.0
-    made = replace(problem, initial=state, gaps=gaps, linked=linked, length=length)
+    made = replace(problem, initial=state, linked=linked, length=length)
     if not joints.holding:
         return made
     held = cache(lambda: constraints_of(joints, made))

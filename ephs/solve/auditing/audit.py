@@ -226,7 +226,7 @@ def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> It
 def _constraint(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """Joints are closed."""
     every = len(solution) // INSTANTS + 1
-    for path, residual in solution.motion.gaps(every).items() if solution.motion is not None else ():
+    for path, residual in solution.linked.gaps(every).items() if solution.linked is not None else ():
         worst = _worst(residual)
         yield Breach(float(residual[worst]), _nothing, len(solution) - 1 - worst * every, path)
 

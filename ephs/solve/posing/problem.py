@@ -129,6 +129,15 @@ class Linked(Protocol):
         """The motion of a joint."""
         ...
 
+    def constraint_error(self) -> Array:
+        """(n,) largest position residual of any joint, in m or rad."""
+        ...
+
+    def gaps(self, every: int) -> Mapping[Path, Array]:
+        """Per joint the residual of its position at every so many instants, the last one first: rad, or a part of the
+        mechanism's length."""
+        ...
+
     def velocity_error(self) -> Array:
         """(n,) largest residual of the reported velocities, in m/s or rad/s."""
         ...
@@ -178,15 +187,6 @@ class MechanicalMotion(Outlined, Protocol):
         """The states at the i-th instant, as arguments of the continuous relations."""
         ...
 
-    def constraint_error(self) -> Array:
-        """(n,) largest position residual of any joint, in m or rad."""
-        ...
-
-    def gaps(self, every: int) -> Mapping[Path, Array]:
-        """Per joint the residual of its position at every so many instants, the last one first: rad, or a part of the
-        mechanism's length."""
-        ...
-
     def contact_poses(self) -> Iterable[tuple[Path, Path | None, Array]]:
         """States that follow from others up to rounding: path, a path before with the same rotation, place (n, 3)."""
         ...
@@ -224,8 +224,6 @@ class Problem:
     shown
         What was computed of this problem, as a record with statistics of the one that it was made from, which
         solutions are of; None where none was.
-    gaps
-        Makes of a solution (n,) the largest gap of a joint, m or rad, where no motion does.
     linked
         Makes of a solution the motion of its bodies and joints by the paths of their boxes, where no motion does.
     given
@@ -255,7 +253,6 @@ class Problem:
     dependences: Callable[[], str] | None = None
     shaky: Callable[[], bool] | None = None
     shown: "Callable[[RunRecord, Mapping[str, Any]], tuple[Problem, RunRecord, Mapping[str, Any]]] | None" = None
-    gaps: Callable[["Solution"], Array] | None = None
     linked: Callable[["Solution"], Outlined] | None = None
     given: Callable[[State], State] | None = None
     view: Callable[[State], Mapping[Path, Array]] = States

@@ -191,16 +191,12 @@ class Solution:
     @cached_property
     def constraint_error(self) -> Array:
         """(n,) largest position residual of any joint, in m or rad; zero for systems without joints."""
-        if self.motion is None and self.problem is not None and self.problem.gaps is not None:
-            return self.problem.gaps(self)
-        return np.zeros(len(self)) if self.motion is None else self.motion.constraint_error()
+        return np.zeros(len(self)) if self.linked is None else self.linked.constraint_error()
 
     @cached_property
     def velocity_error(self) -> Array:
         """(n,) largest residual of the reported velocities, in m/s or rad/s; zero for systems without joints."""
-        if self.motion is None and self.problem is not None and self.problem.linked is not None:
-            return self.problem.linked(self).velocity_error()
-        return np.zeros(len(self)) if self.motion is None else self.motion.velocity_error()
+        return np.zeros(len(self)) if self.linked is None else self.linked.velocity_error()
 
     @property
     def system(self) -> System | None:
