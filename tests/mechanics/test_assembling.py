@@ -103,3 +103,51 @@ def test_velocity_residuals_are_measured_as_of_scenes(name, monkeypatch):
     monkeypatch.setattr(LinkMotion, "rates", property(lambda self: {k: 1.5 * r for k, r in rates.fget(self).items()}))
     off = max(np.abs(rate / 3.0).max() for rate in sol.problem.linked(sol).rates.values())
     assert sol.problem.linked(sol).velocity_error().max() == pytest.approx(off, rel=1e-9)
+
+
+def rod_on_a_pin(folder, size):
+    """A rod of one shape and density, which turns at 2 rad/s."""
+    thick = size**5
+    (folder / "rod.toml").write_text(
+        f"""
+        format = 1
+        [world]
+        gravity = [0.0, 0.0, 0.0]
+        [bodies.rod]
+        mass = {size**3}
+        inertia = [{thick}, {thick}, {0.2 * thick}]
+        position = [0.0, 0.0, {-size}]
+        [joints.pin]
+        type = "revolute"
+        bodies = ["ground", "rod"]
+        at = [0.0, 0.0, 0.0]
+        axis = [0.0, 1.0, 0.0]
+        rate = 2.0
+        """
+    )
+    return ephs.load(folder / "rod.toml")
+
+
+@pytest.mark.parametrize(
+    ("method", "size"), [*(("rk54", size) for size in (1e-6, 1.0, 1e3)), *(("natural", size) for size in (1e-6, 1.0))]
+)
+def test_momenta_off_the_joints_are_refused_at_any_size(size, method, tmp_path):
+    system = rod_on_a_pin(tmp_path, size).system()
+    momentum = np.array(system.initial[ephs.Path.of("bodies.rod.ke.p")])
+    run = {"method": method, "step": 1e-3, "initial": {"bodies.rod.ke.p": momentum}}
+    assert ephs.simulate(system, 0.01, **run).joint("joints.pin").rate[-1, 0] == pytest.approx(2.0, rel=1e-12)
+    momentum[4] += 0.01 * np.abs(momentum[3:]).max()  # along the pin
+    with pytest.raises(ephs.SimulationError, match=r"bodies\.rod\.ke\.p: an initial state that contradicts"):
+        ephs.simulate(system, 0.01, **run)
+
+
+@pytest.mark.parametrize("method", ["rk54", "natural"])
+def test_ports_of_a_system_are_those_of_its_scene(method):
+    """By natural, momenta between steps are off the joints by its error; ports are asked at momenta on them."""
+    scene = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
+    run = {"until": 0.1, "method": method, "step": 0.02, "audit": "off"}
+    inputs = {str(path): {"flow": one.value} for path, one in scene_inputs(scene).items()}
+    one, two = ephs.simulate(scene, **run), ephs.simulate(scene.system(), inputs=inputs, **run)
+    for port in inputs:
+        assert np.abs(one.port(port).power).max() > 0.0
+        np.testing.assert_allclose(two.port(port).power, one.port(port).power, rtol=1e-12)

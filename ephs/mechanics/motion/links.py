@@ -92,9 +92,21 @@ class LinkMotion:
         pose = self._links[name].pose
         return np.tile(SE3.identity(), (len(self._solution), 1)) if pose is None else self._solution[pose.path]
 
+    def state(self, i: int) -> dict[Path, Array]:
+        """The states at the i-th instant, momenta projected on the joints."""
+        state = self._solution.state_at(i)
+        for name, link in self._links.items():
+            if link.momentum is not None:
+                state[link.momentum.path] = link.inertia @ self.twists[name][i]
+        return state
+
     @property
     def twists(self) -> dict[str, Array]:
         """(n, 6) by body."""
+        return self._twists
+
+    @cached_property
+    def _twists(self) -> dict[str, Array]:
         return {str(path): twist for path, twist in self._found.twists.items()}
 
     @property

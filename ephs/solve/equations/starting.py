@@ -3,6 +3,7 @@
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
@@ -20,8 +21,6 @@ JUMP = 1e-6
 """Jumps below this fraction of the states of their kind count as rounding of the given values."""
 SEVERAL = 4.0
 """Times the jump that a step leaves: as much as steps one after the other leave of it."""
-SMALL = 1e-6
-"""Least scale of the states of a kind, in its unit."""
 
 
 def _jump(method: Natural, problem: Problem, x: Array, instant: float) -> tuple[Array, Array] | None:
@@ -35,13 +34,13 @@ def _jump(method: Natural, problem: Problem, x: Array, instant: float) -> tuple[
     return sizes, d.advance(x, 0.5 * moved)
 
 
-def _left(method: Natural, problem: Problem, x: Array, h: float) -> Array:
+def _left(method: Natural, problem: Problem, x: Array, h: float) -> tuple[Array, Array]:
     """Jumps (states,) that a step h of the method itself leaves, from a state on the constraints: its momenta keep off
-    them by its error.
+    them by its error; and the states after the step.
     """
     there, chunk = method.advance(method.init(x), h, 1)
     found = None if chunk.failure is not None else _jump(method, problem, there.x, 0.5 * INSTANT * h)
-    return np.zeros(len(problem.descriptor.states)) if found is None else SEVERAL * found[0]
+    return (np.zeros(len(problem.descriptor.states)), x) if found is None else (SEVERAL * found[0], there.x)
 
 
 def check_start(problem: Problem, model: Model, h: float) -> None:
@@ -81,13 +80,20 @@ def _jumping(problem: Problem, model: Model, x: Array, h: float) -> str:
     jumps = [_jump(method, problem, x, instant) for instant in (INSTANT * h, 0.5 * INSTANT * h)]
     if jumps[0] is None or jumps[1] is None:
         return ""
+    off = np.where(jumps[1][0] > 0.75 * jumps[0][0], jumps[1][0], 0.0)
+    if not np.any(off > JUMP * _sizes(d, x)):
+        return ""
+    left, there = _left(method, problem, jumps[1][1], h)
+    limits = np.maximum(JUMP * _sizes(d, x, there), np.finfo(float).tiny)
+    share = np.where(off > left, off / limits, 0.0)
+    return str(d.states[int(np.argmax(share))].path) if share.max(initial=0.0) > 1.0 else ""
+
+
+def _sizes(d: Descriptor, *states: Array) -> Array:
+    """(states,) largest number of a state of the same kind; 1 of a pose."""
     sizes: dict[str, float] = {}
     for slot in d.states:
         flat = manifold(slot.quantity.space).code == VECTOR
-        size = float(np.abs(x[slot.point]).max(initial=0.0)) if flat else 1.0
+        size = max(float(np.abs(x[slot.point]).max(initial=0.0)) for x in states) if flat else 1.0
         sizes[slot.quantity.kind] = max(sizes.get(slot.quantity.kind, 0.0), size)
-    limits = np.array([JUMP * max(sizes[slot.quantity.kind], SMALL) for slot in d.states])
-    share = np.where(jumps[1][0] > 0.75 * jumps[0][0], jumps[1][0] / limits, 0.0)
-    if share.max(initial=0.0) > 1.0 and np.any(share > _left(method, problem, jumps[1][1], h) / limits):
-        return str(d.states[int(np.argmax(share))].path)
-    return ""
+    return np.array([sizes[slot.quantity.kind] for slot in d.states])

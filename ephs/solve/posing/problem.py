@@ -129,6 +129,10 @@ class Linked(Protocol):
         """The motion of a joint."""
         ...
 
+    def state(self, i: int) -> dict[Path, Array]:
+        """The states at the i-th instant, as arguments of the continuous relations."""
+        ...
+
     def constraint_error(self) -> Array:
         """(n,) largest position residual of any joint, in m or rad."""
         ...
@@ -181,10 +185,6 @@ class MechanicalMotion(Outlined, Protocol):
 
     def shell(self, name: str) -> Any:
         """Motion of a shell."""
-        ...
-
-    def state(self, i: int) -> dict[Path, Array]:
-        """The states at the i-th instant, as arguments of the continuous relations."""
         ...
 
     def contact_poses(self) -> Iterable[tuple[Path, Path | None, Array]]:

@@ -59,7 +59,7 @@ def port_motion(solution: "Solution", path: Path) -> PortMotion:
     flow, effort = np.zeros((n, slot.quantity.space.dim)), np.zeros((n, slot.quantity.space.dim))
     step = DELTA * float(solution.t[-1] - solution.t[0]) if n > 1 else DELTA
     for i, t in enumerate(solution.t):
-        state = solution.state_at(i) if solution.motion is None else solution.motion.state(i)
+        state = solution.state_at(i) if solution.linked is None else solution.linked.state(i)
         inputs = problem.inputs(float(t), state)
         rising = {
             port: _slope(signal, float(t), step, state) for port, signal in problem.signals.items() if signal.effort

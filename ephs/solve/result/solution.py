@@ -141,7 +141,7 @@ class Solution:
         """Prescribed values at each outer port, with names and units: ``.values`` (n, d)."""
         if self._inputs is not None or self.problem is None:
             return self._inputs or {}
-        return sampled_inputs(self.problem, self.t, self.state_at if self.motion is None else self.motion.state)
+        return sampled_inputs(self.problem, self.t, self.state_at if self.linked is None else self.linked.state)
 
     @property
     def energy(self) -> Array:

@@ -370,7 +370,9 @@ class ReducedEquations:
         state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(2 + len(self.reduced.made))))
         self.led.start(lambda: self.row(state).energies)
         state = self.accounts.opened(state)
-        self._paper.check(state.q, state.r, self.heats.entropies(state.heats))
+        y = np.concatenate([np.zeros(self.nv), state.r, state.heats, state.totals])
+        entropies, freedoms = self.heats.entropies(state.heats), slice(self.nv, self.nv + self.n)
+        self._paper.check(state.q, state.r, entropies, lambda: self.rates(t, state.q, y)[freedoms])
         if self.careful:
             self._without_repeated(state)
         return state

@@ -1,6 +1,6 @@
 """Between the reduced form and the paper's states: every state of the system from joints' elements, and back."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, final
 
 import numpy as np
@@ -19,8 +19,9 @@ from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import Problem
 
 NEAR, OFF = 1e-6, 1e-3
-"""Initial positions and momenta may differ by this from what the joints make of them, relative to their size where that
-is above 1: nodal momenta of some methods do differ, to their order."""
+"""Initial positions and momenta may differ by this from what the joints make of them: positions relative to their size
+where that is above 1; momenta, by the roots of their energies, relative to all of them, or to what the mechanism gains
+along its length at its accelerations: nodal momenta of some methods do differ, to their order."""
 CHARTED = 0.1
 """Part of an allowed increment within which numbers of a state imply it: an increment is at most four times as large as
 the largest difference of the numbers."""
@@ -131,8 +132,10 @@ class PaperStates:
         s = np.array([float(initial[path][0]) for path in reduced.entropies])
         return q, self._rates_of(q), s
 
-    def check(self, q: Array, r: Array, s: Array) -> None:
+    def check(self, q: Array, r: Array, s: Array, accelerations: Callable[[], Array]) -> None:
         """Compare the closed initial state with the given one.
+
+        ``accelerations`` (n,) of the tree's freedoms are asked for where momenta seem off the joints.
 
         Raises
         ------
@@ -140,6 +143,7 @@ class PaperStates:
             They differ: the initial states contradict the joints.
         """
         made, given = self.rows(q[None], r[None], s[None])[0], self.rest
+        self._check_momenta(made, lambda: self.rows(q[None], accelerations()[None], s[None])[0])
         far, states = np.flatnonzero(np.abs(made - given) > CHARTED * NEAR), self.problem.descriptor.states
         for number in np.unique(np.searchsorted([slot.at for slot in states], far, side="right") - 1):
             slot = states[number]
@@ -147,6 +151,27 @@ class PaperStates:
             found = float(np.abs(manifold(slot.quantity.space).increment(made[slot.point], given[slot.point])).max())
             if found > near:
                 raise SolveError(Outcome.INCONSISTENT, str(slot.path), f"it is off by {found:.1e}")
+
+    def _check_momenta(self, made: Array, pushed: Callable[[], Array]) -> None:
+        """Compare momenta of bodies, all states (size,) as the joints make them of rates and of accelerations."""
+        bodies = [(i, link.momentum) for i, link in enumerate(self.reduced.places) if link.momentum is not None]
+        if not bodies:
+            return
+        at = np.array([np.arange(slot.point.start, slot.point.stop) for _, slot in bodies])
+        inertia = self.reduced.tables.inertia[[i for i, _ in bodies]]
+
+        def roots(momenta: Array) -> Array:
+            return np.sqrt(np.einsum("ij,ij->i", momenta, np.linalg.solve(inertia, momenta[..., None])[..., 0]))
+
+        off = roots(made[at] - self.rest[at])
+        worst = int(np.argmax(off))
+        size = float(np.linalg.norm(roots(self.rest[at])))
+        if off[worst] > OFF * size:
+            heavy = float(np.sqrt(inertia[:, 5, 5].sum()))
+            size = max(size, float(np.sqrt(np.linalg.norm(roots(pushed()[at])) * heavy * self.problem.length)))
+        if off[worst] > OFF * size:
+            found = f"it is off by {off[worst] / size:.1e} of what moves" if size else "nothing moves"
+            raise SolveError(Outcome.INCONSISTENT, str(bodies[worst][1].path), found)
 
     def _rates_of(self, q: Array) -> Array:
         """The tree's rates from the bodies' momenta: from each body to the nearest one with inertia before it."""
