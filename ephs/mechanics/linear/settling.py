@@ -12,7 +12,7 @@ from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
-from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.posing.errors import OptionError, SolveError
@@ -40,10 +40,12 @@ def settled(problem: Problem) -> At:
         return _at_rest(problem, pencil, d.pack(problem.initial))
     x = d.pack(start)
     try:
-        rates = pencil.unknowns(x)[: pencil.n_w][pencil.counted]
+        rates = pencil.unknowns(x)[: pencil.n_w]
     except SolveError as error:
         raise restless(error.path, error.equation or error.outcome.value) from error.cause
-    left = float(np.abs(rates).max(initial=0.0)) / max(float(np.abs(x).max(initial=0.0)), LEAST)
+    for slot in _momenta(d):  # its forces are balanced, as a part of their sizes, which no state is
+        rates[slot.rates] = 0.0
+    left = float(np.abs(rates[pencil.counted]).max(initial=0.0)) / max(float(np.abs(x).max(initial=0.0)), LEAST)
     return (start, left, steps) if left <= STALLED else _at_rest(problem, pencil, x)
 
 
@@ -55,8 +57,7 @@ def _balance(problem: Problem) -> tuple[dict[Path, Array] | None, int]:
     SimulationError
         There is none.
     """
-    momenta = [link.momentum for link in frames_of(problem.descriptor).links if link.momentum is not None]
-    still = {slot.path: np.zeros(6) for slot in momenta}
+    still = {slot.path: np.zeros(6) for slot in _momenta(problem.descriptor)}
     try:
         model = mechanism_of(replace(problem, initial={**problem.initial, **still}))
     except OptionError:  # what has no place in joint coordinates settles as other systems do
@@ -68,6 +69,11 @@ def _balance(problem: Problem) -> tuple[dict[Path, Array] | None, int]:
             raise restless(f"joints.{name}", "its motion is prescribed")
     state, _, steps, _ = balanced(model)
     return model.states(state), steps
+
+
+def _momenta(d: Descriptor) -> list[StateSlot]:
+    """The momenta of bodies."""
+    return [link.momentum for link in frames_of(d).links if link.momentum is not None]
 
 
 def _at_rest(problem: Problem, pencil: Pencil, x: Array) -> At:

@@ -52,7 +52,7 @@ class Outcome(StrEnum):
     TINY = "a step below the smallest allowed one"
     MANY = "more steps than are allowed"
     UNDETERMINED = "the motion is not determined"
-    RESTLESS = "no state in which nothing moves"
+    RESTLESS = "no state found in which nothing moves"
     INPUT = "an input's function has no value"
     EVENT = "an event's function has no value"
     UNWRITTEN = "the journal cannot be written"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.elements.shell import statics
 from ephs.solve.auditing.growth import apart
 from examples.failing import scene
 
@@ -63,3 +64,34 @@ def test_a_joint_that_is_moved_within_the_first_second_has_no_equilibrium(motion
     """Also one that is at rest at the beginning of it, or at the end."""
     with pytest.raises(ephs.SimulationError, match=r"joints\.hinge1.*its motion is prescribed"):
         ephs.equilibrium(chain("parallel", 1, motion=motion))
+
+
+def test_a_stiff_sheets_system_settles_where_the_sheet_does(tmp_path):
+    """Rounding of membrane forces is large beside the size of its states: forces are measured by forces."""
+    file = tmp_path / "sheet.toml"
+    file.write_text(
+        """
+        format = 1
+        [shells.sheet]
+        corners = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.1, 0.0], [0.0, 0.1, 0.0]]
+        elements = [3, 1]
+        thickness = 4e-3
+        E = 2e9
+        nu = 0.3
+        rho = 900.0
+        damping = 2e-3
+        edges = ["free", "free", "free", "ground"]
+        """
+    )
+    sheet = ephs.load(file)
+    rest, settled = ephs.equilibrium(sheet), ephs.equilibrium(sheet.system())
+    for path, value in rest.states.items():
+        np.testing.assert_array_equal(settled.states[path], value)
+    made = next(each for _, each in sheet.all_shells()).shell()
+    free = np.ones((len(made.points), 6), dtype=bool)
+    free[made.points[:, 0] == 0.0] = False
+    load = np.zeros((len(made.points), 6))
+    load[:, 5] = made.shares(-9.81 * 900.0 * 4e-3 * made.areas)
+    poses, _ = statics.equilibrium(made, load, free)
+    tip = rest.states[ephs.Path.of("shells.sheet.node7.pe.q")]
+    np.testing.assert_allclose(tip[4:], poses[7, 4:], atol=1e-9)
