@@ -3,7 +3,7 @@
 import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
-from ephs.mechanics.linear.continuation import StaticPath, follow
+from ephs.mechanics.linear.continuation import StaticPath, follow, metric_of
 from ephs.mechanics.linear.freedoms import freedoms_of, unbalanced
 from ephs.mechanics.tree.finding.frames import frames_of
 from ephs.mechanics.tree.finding.spanning import Edge
@@ -15,11 +15,13 @@ from ephs.solve.posing.errors import Outcome, SimulationError
 from ephs.solve.posing.problem import NO_STATE
 
 STALLED = 1e-9
-"""Allowed unbalanced fraction of the forces where iterations stagnate."""
+"""Allowed unbalanced fraction of the forces, those of a strain by 1 rad or m included."""
 UNFELT = 1e-9
 """Fraction of the forces along directions without stiffness that counts as rounding."""
-ENOUGH = 1e-12
-"""Allowed unbalanced fraction of the applied forces."""
+ENOUGH, ROUNDED = 1e-10, 1e-5
+"""Change of a Newton step that is its last one, rad or parts of the length: the next one is below rounding; and of one
+that no longer gets smaller, as rounding of stiff parts moves soft ones. Forces do not tell: those of stiff parts are
+large however little these are strained."""
 STRIDE = 0.3
 """Largest change of a mechanism in one step, in rad or m."""
 STEPS = 200
@@ -46,16 +48,13 @@ def balanced(model: Dynamics) -> tuple[State, float, int, StaticPath | None]:
 
 def _settled(model: Dynamics) -> tuple[State, float, int]:
     """The equilibrium, its unbalanced fraction of the forces, and the number of steps."""
-    lengths = lengths_of(model)
+    lengths, metric = lengths_of(model), np.sqrt(metric_of(model, model.problem.length)[:-1])
     state, shift, before = _followed(model, _without_rates(model, model.state0), lengths), 0.0, np.inf
     best, stalled = np.inf, 0
     for step in range(STEPS):
         free = freedoms_of(model, state)
         by, Z = model.derivatives(state), free.Z
         left = unbalanced(model, state, free, by.force_q)
-        if left <= ENOUGH or (left <= STALLED and stalled >= 3):
-            return state, left, step
-        best, stalled = (left, 0) if left < 0.5 * best else (best, stalled + 1)
         if left > before:
             shift = max(4.0 * shift, 1e-3)
         else:
@@ -70,7 +69,12 @@ def _settled(model: Dynamics) -> tuple[State, float, int]:
         flat = size <= ELIMINATION * size.max(initial=0.0)
         push = ways.T @ force
         push[flat & (np.abs(push) <= UNFELT * np.abs(push).max(initial=0.0))] = 0.0
-        stretch = push / np.where(flat, max(float(size.max(initial=0.0)), TINY), size + shift * size.max(initial=0.0))
+        most = max(float(size.max(initial=0.0)), TINY)
+        reach = float(np.abs(metric * (Z @ (ways @ (push / np.maximum(size, ELIMINATION * most))))).max(initial=0.0))
+        best, stalled = (reach, 0) if reach < 0.5 * best else (best, stalled + 1)
+        if left <= STALLED and (reach <= ENOUGH or (reach <= ROUNDED and stalled >= 3)):
+            return state, left, step
+        stretch = push / np.where(flat, most, size + shift * most)
         change = Z @ (ways @ stretch)
         change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
         state = _followed(model, _nearest(model, state, change), lengths)

@@ -82,7 +82,7 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
     length
         Of the mechanism, m: what a displacement is measured by.
     """
-    metric = _metric(model, length)
+    metric = metric_of(model, length)
     here = _balance(model, start, 0.0)
     shares, points, unstable, critical = [0.0], [start], [here.unstable], list[float]()
     share, step = 0.0, 0.25
@@ -126,7 +126,7 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
     return None
 
 
-def _metric(model: Dynamics, length: float) -> Array:
+def metric_of(model: Dynamics, length: float) -> Array:
     """(n + 1,) weights: angles, displacements by the length, the part of the loads."""
     weights = np.ones(model.layout.n + 1)
     for name, parts in model.layout.edges.items():

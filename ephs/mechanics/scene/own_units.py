@@ -121,6 +121,7 @@ def in_own_units(problem: Problem) -> Problem:
         shown=shown,
         given=given,
         seconds=units.time,
+        length=problem.length / units.length,
     )
 
 
