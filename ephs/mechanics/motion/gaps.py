@@ -1,6 +1,6 @@
 """Position residuals over a motion: joint frames by coordinates against those by bodies."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -16,26 +16,24 @@ Opening: TypeAlias = tuple[Array, Array, Array, Array, Array]
 """Poses (n, 7) of body 1, frame (7,) of the joint in it, poses (n, 7) of C2 in C1, then poses of body 2, and frame."""
 
 
-def largest_opening(joints: Sequence[Opening], instants: int) -> Array:
-    """(n,) largest angle in rad or distance in m of a joint."""
-    if not joints:
-        return np.zeros(instants)
-    each = [_openings(joints, at).max(axis=(0, 1)) for at in chunks_of(instants, len(joints))]
-    return np.concatenate(each) if each else np.zeros(0)
+def largest_opening(joints: Callable[[slice], Sequence[Opening]], instants: int, count: int) -> Array:
+    """(n,) largest angle in rad or distance in m of about so many joints, which are asked for chunk by chunk."""
+    each = [_openings(found).max(axis=(0, 1)) for at in chunks_of(instants, count) if (found := joints(at))]
+    return np.concatenate(each) if each else np.zeros(instants)
 
 
-def relative_openings(joints: Sequence[Opening], every: int, length: float) -> Array:
-    """(joints, instants) angles in rad or parts of a length at every so many instants, the last one first."""
+def relative_openings(joints: Sequence[Opening], length: float) -> Array:
+    """(joints, n) angles in rad or parts of a length."""
     if not joints:
         return np.zeros((0, 0))
-    angles, distances = _openings(joints, slice(None, None, -every))
+    angles, distances = _openings(joints)
     return np.maximum(angles, distances / length)
 
 
-def _openings(joints: Sequence[Opening], at: slice) -> Array:
-    """(2, joints, instants) angles in rad and distances in m."""
+def _openings(joints: Sequence[Opening]) -> Array:
+    """(2, joints, n) angles in rad and distances in m."""
     poses1, frames1, inside, poses2, frames2 = zip(*joints, strict=True)
-    body1, moved, body2 = (np.stack([pose[at].T for pose in of], axis=1) for of in (poses1, inside, poses2))
+    body1, moved, body2 = (np.stack([pose.T for pose in of], axis=1) for of in (poses1, inside, poses2))
     frame1, frame2 = (np.array(frames).T[:, :, None] for frames in (frames1, frames2))
     return np.array(gap(product(body1, product(frame1, moved)), product(body2, frame2)))
 

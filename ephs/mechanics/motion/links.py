@@ -15,7 +15,7 @@ from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.scene.kinematics import AssemblyJoint
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
-from ephs.mechanics.scene.tree import spanning_hops
+from ephs.mechanics.scene.tree import Hop, spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
 from ephs.mechanics.tree.finding.tendons import length_errors
@@ -129,12 +129,13 @@ class LinkMotion:
     def velocity_error(self) -> Array:
         """(n,) largest component of the velocity residual of any joint between bodies and the ground, m/s or rad/s."""
         worst, twists, rates = np.zeros(len(self._solution)), self.twists, self.rates
+        assembled = {of.name: of for of in self._assembled}
         names = {i: str(link.path) for i, link in enumerate(self._frames.links) if str(link.path) in self._links}
         for name, joint in self._joints.items():
             ends = joint.first, joint.second
             if not {end.link for end in ends} <= {SOLID, *names}:
                 continue
-            inside = self._inside[name]
+            inside = self._inside(assembled[name], slice(None))
             frames = compose(np.broadcast_to(joint.first.offset, inside.shape), inside), joint.second.offset
             residual = -rates[name] @ joint.pair.basis.T
             for end, frame, sign in zip(ends, frames, (-1.0, 1.0), strict=True):
@@ -145,25 +146,29 @@ class LinkMotion:
 
     def constraint_error(self) -> Array:
         """(n,) largest angle or distance between where a joint's coordinates and its links put the frame C2."""
-        return largest_opening(list(self._openings.values()), len(self._solution))
+        return largest_opening(lambda at: [*self._openings(at).values()], len(self._solution), len(self._assembled))
 
     def gaps(self, every: int) -> dict[Path, Array]:
         """Per joint the residual of its position at every so many instants, the last one first: rad, or a part of the
         mechanism's length."""
         problem = self._solution.problem
-        worst = relative_openings(list(self._openings.values()), every, 1.0 if problem is None else problem.length)
-        return {Path.of(name): row for name, row in zip(self._openings, worst, strict=True)}
+        found = self._openings(slice(None, None, -every))
+        worst = relative_openings([*found.values()], 1.0 if problem is None else problem.length)
+        return {Path.of(name): row for name, row in zip(found, worst, strict=True)}
 
-    @cached_property
-    def _openings(self) -> dict[str, Opening]:
+    def _openings(self, at: slice) -> dict[str, Opening]:
         """Joints between links whose poses are known; those of frames without one are where a joint puts them."""
-        n, placed = len(self._solution), set[int]()
-        poses = {i: self.poses(str(link.path)) for i, link in enumerate(self._frames.links) if link.pose is not None}
+        poses = {i: self.poses(str(of.path))[at] for i, of in enumerate(self._frames.links) if of.pose is not None}
+        n, placed, within = (
+            len(self._solution.t[at]),
+            set[int](),
+            {of.name: self._inside(of, at) for of in self._assembled},
+        )
         poses[SOLID] = np.tile(SE3.identity(), (n, 1))
-        for hop in spanning_hops(self._assembled, len(self._frames.links), ()):
+        for hop in self._hops:
             link = self._assembled[hop.link]
             known, here, there = link.body1, link.frame1, link.frame2
-            inside = self._inside[link.name]
+            inside = within[link.name]
             if not hop.forward:
                 known, here, there, inside = link.body2, there, here, inverse(inside)
             if hop.body not in poses and known in poses:
@@ -171,16 +176,19 @@ class LinkMotion:
                 poses[hop.body] = compose(compose(frame, inside), np.broadcast_to(SE3.inverse(there), (n, 7)))
                 placed.add(hop.link)
         return {
-            link.name: (poses[link.body1], link.frame1, self._inside[link.name], poses[link.body2], link.frame2)
+            link.name: (poses[link.body1], link.frame1, within[link.name], poses[link.body2], link.frame2)
             for number, link in enumerate(self._assembled)
             if number not in placed and {link.body1, link.body2} <= poses.keys()
         }
 
     @cached_property
-    def _inside(self) -> dict[str, Array]:
-        """(n, 7) poses of C2 in C1 by the coordinates of joints."""
-        rows = {name: self._solution[joint.state.path] for name, joint in self._joints.items()}
-        return {of.name: included(of.coupling, rows[of.name].reshape(-1, of.coupling.dim)) for of in self._assembled}
+    def _hops(self) -> list[Hop]:
+        return spanning_hops(self._assembled, len(self._frames.links), ())
+
+    def _inside(self, joint: AssemblyJoint, at: slice) -> Array:
+        """(n, 7) poses of C2 in C1 by the coordinates of a joint."""
+        rows = self._solution[self._joints[joint.name].state.path].reshape(len(self._solution), joint.coupling.dim)
+        return included(joint.coupling, rows[at])
 
     @cached_property
     def _found(self) -> ByPath:

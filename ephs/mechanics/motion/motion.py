@@ -240,7 +240,7 @@ class SceneMotion:
 
     def constraint_error(self) -> Array:
         """(n,) largest distance or angle between where a joint's coordinates and its bodies put the frame C2."""
-        return largest_opening(self._openings(), len(self._solution))
+        return largest_opening(self._openings, len(self._solution), len(self._joints))
 
     def gaps(self, every: int) -> dict[Path, Array]:
         """Per joint the residual of its position at every so many instants: rad, or a part of the mechanism's length.
@@ -248,12 +248,18 @@ class SceneMotion:
         The last instant is the first of these.
         """
         problem = self._solution.problem
-        worst = relative_openings(self._openings(), every, 1.0 if problem is None else problem.length)
+        worst = relative_openings(self._openings(slice(None, None, -every)), 1.0 if problem is None else problem.length)
         return {component_path("joints", name): row for name, row in zip(self._joints, worst, strict=True)}
 
-    def _openings(self) -> list[Opening]:
+    def _openings(self, at: slice) -> list[Opening]:
         return [
-            (self.poses(joint.body1), joint.frame1, self.inclusion(name), self.poses(joint.body2), joint.frame2)
+            (
+                self.poses(joint.body1)[at],
+                joint.frame1,
+                self.inclusion(name)[at],
+                self.poses(joint.body2)[at],
+                joint.frame2,
+            )
             for name, joint in self._joints.items()
         ]
 
