@@ -67,7 +67,7 @@ class LinkMotion:
 
     def summary(self) -> dict[str, Any]:
         """Bodies and joints at the end."""
-        return ends(self, self._links, self._joints)
+        return ends(LinkMotion(self._frames, self._solution[-1:]), self._links, self._joints)
 
     def outline(self) -> Scene:
         """Bodies, and joints between these and the ground, as a scene to be drawn; bodies have no shapes."""
@@ -93,12 +93,12 @@ class LinkMotion:
     @property
     def twists(self) -> dict[str, Array]:
         """(n, 6) by body."""
-        return {str(path): twist for path, twist in self._found.twists.items()}
+        return self._velocities[0]
 
     @property
     def rates(self) -> dict[str, Array]:
         """(n, d) by joint."""
-        return {name: self._found.rate(joint.path) for name, joint in self._joints.items()}
+        return self._velocities[1]
 
     def wrench(self, name: str) -> Array:
         """(n, 6) of a joint."""
@@ -130,6 +130,12 @@ class LinkMotion:
                     residual = residual + sign * _at_frame(twists[names[end.link]], frame)
             worst = np.maximum(worst, np.abs(residual).max(axis=1))
         return worst
+
+    @cached_property
+    def _velocities(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Twists by body and rates by joint."""
+        twists = {str(path): twist for path, twist in self._found.twists.items()}
+        return twists, {name: self._found.rate(joint.path) for name, joint in self._joints.items()}
 
     @cached_property
     def _found(self) -> ByPath:
