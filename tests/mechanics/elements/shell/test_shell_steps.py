@@ -26,12 +26,12 @@ EPS = float(np.finfo(float).eps)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def patch(elements=(3, 2), damping=1e-3, **options):
+def patch(elements=(3, 2), damping=1e-3, gravity=(0.0, 0.0, -9.81), **options):
     """A curved sheet that is clamped on one side."""
     points, at, cells = grid(lambda u, v: (0.4 * u, 0.2 * v, 0.05 * u * u), elements)
     shell = Shell.of(points, cells, ShellSection.isotropic(0.02, E=1e5, nu=0.3, rho=1000.0))
     held = np.flatnonzero(at[:, 0] == 0.0)
-    return shell_system(shell, damping=damping, held=held, gravity=(0.0, 0.0, -9.81), **options)
+    return shell_system(shell, damping=damping, held=held, gravity=gravity, **options)
 
 
 PATCH = problem_of_system(patch())
@@ -79,6 +79,18 @@ def test_a_loss_slows_down_and_warms():
         state = strained(equations, np.random.default_rng(1))
         rates.append(equations.rates(0.0, state.q, equations.vector(state))[equations.nv :][: equations.n].copy())
     assert np.abs(rates[0] - rates[1]).max() > 1e-3 * np.abs(rates[0]).max()
+
+
+def test_a_linearised_damped_sheet_has_the_modes_of_kelvin_and_voigt():
+    """λ² + τ ω² λ + ω² = 0, with the frequencies ω of the sheet without damping."""
+    tau = 1e-3
+    still, damped = (ephs.linearize(patch((2, 1), damping, (0.0, 0.0, 0.0))).eigenvalues for damping in (0.0, tau))
+    squares = np.sort(still.imag[still.imag > 0.0] ** 2)
+    waves = damped[damped.imag > 0.0]
+    assert np.abs(2.0 * waves.real + tau * np.abs(waves) ** 2).max() <= 1e-10 * np.abs(waves).max()
+    found = np.sort(np.abs(waves) ** 2)
+    # squares are eigenvalues of matrices whose entries are known to 100 roundings of their largest
+    assert np.abs(found - squares[: found.size]).max() <= 1000 * EPS * squares[-1]
 
 
 # ---- sparse matrices ------------------------------------------------------------------------------------------------
