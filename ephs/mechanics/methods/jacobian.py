@@ -115,14 +115,14 @@ class Jacobian:
     @property
     def _calls(self) -> list[Call]:
         """What is asked of the tangents."""
-        return once(self.equations.reduced, "calls for slopes", self._found)
+        return once(self.equations.reduced, "calls for slopes", self._planned)
 
     @property
     def _share(self) -> float:
         """Part of the entries that are asked for."""
         return sum(rows.size for _, rows, _, _ in self._calls) / self.size**2
 
-    def _found(self) -> list[Call]:
+    def _planned(self) -> list[Call]:
         eq, tables = self.equations, self.equations.reduced.tables
         warm = np.flatnonzero(tables.node != -1)  # the environment's temperature is constant
         if not (eq.engine.looped or eq.reduced.attaching.network.attached):

@@ -97,7 +97,7 @@ class RateSlopes:
         tables = with_derivatives(engine.tables, reduced.tables.address)
         work = {name: array.copy() for name, array in engine.work.items()}
         work |= {"e": np.zeros(64), "jac": np.zeros(1024), "scratch": np.zeros(4096)}
-        self._fault, self._sparse = work["fault"], _Entries(calls, size) if sparse else None
+        self._fault, self._sparse = work["fault"], _SlopeEntries(calls, size) if sparse else None
         net, q = reduced.attaching.network, np.zeros(coordinates)
         about = memory_about(reduced.tables.evaluated, net.known, len(reduced.attaching.bent))
         about["increment"] = np.zeros(engine.work["still"].size)
@@ -139,7 +139,7 @@ class RateSlopes:
 
 
 @final
-class _Entries:
+class _SlopeEntries:
     """Places of the derivatives of all calls in a sparse matrix, column by column."""
 
     def __init__(self, calls: Sequence[Call], size: int) -> None:
