@@ -1,5 +1,7 @@
 """Shells against published values: displacements, large displacements, snaps, frequencies; time beside size.
 
+Of damped sheets that swing by radau: time of set-up and of a step for each element; ratios are to the smallest one.
+
 Linear: Scordelis and Lo's roof, MacNeal and Harder (1985) with Simo's 0.0930 of the hemisphere, Cook. Large: Sze, Liu
 and Lo (2004). Frequencies: NAFEMS FV12 and FV16, Rayleigh's ring. Values are ratios to the published ones.
 """
@@ -11,11 +13,13 @@ from typing import Any
 
 import numpy as np
 
+import ephs
 from benchmarks.report import Report, table_of
 from ephs.mechanics.elements.shell import spectra, statics
 from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.section import ShellSection
 from ephs.mechanics.elements.shell.shell import Shell
+from ephs.mechanics.elements.shell.system import shell_system
 
 WX, WY, WZ, X, Y, Z = range(6)
 ALL = tuple(range(6))
@@ -317,6 +321,23 @@ LARGE: dict[str, tuple[Callable[[], tuple[float, ...]], tuple[float, ...]]] = {
 }
 
 
+def swung(n: int) -> tuple[float, float]:
+    """Processor time in s for each of n × n damped elements: to a problem that is ready to step; and of a step."""
+
+    def run(span: float) -> tuple[float, int]:
+        start = time.process_time()
+        points, at, cells = grid(lambda u, v: (0.4 * u, 0.2 * v, 0.0), (n, n))
+        shell = Shell.of(points, cells, ShellSection.isotropic(0.002, 1e7, 0.3, 1000.0))
+        held = np.flatnonzero(at[:, 0] == 0.0)
+        sheet = shell_system(shell, gravity=(0.0, 0.0, -9.81), damping=1e-3, held=held)
+        solution = ephs.simulate(sheet, span, method="radau", audit="off")
+        return time.process_time() - start, int(solution.stats["steps"])
+
+    run(1e-7)  # compile
+    few, many = run(1e-7), run(1e-3)
+    return few[0] / n**2, (many[0] - few[0]) / (many[1] - few[1]) / n**2
+
+
 def limit(path: statics.ShellPath) -> float:
     """The first largest share of a path."""
     falls = np.flatnonzero(np.diff(path.shares) < 0.0)
@@ -340,4 +361,10 @@ def report() -> Report:
         for have, want in zip(found, known, strict=False):  # of equal frequencies all are found
             row = {"problem": name, "published": want, "found": float(have), "ratio": float(have) / want}
             rows.append(row | {"seconds": seconds})
+    times = {n: swung(n) for n in (8, 16, 32)}
+    for k, name in enumerate(("swinging sheet, set-up of an element in s", "a step of an element in s")):
+        rows += [
+            {"problem": name, "elements": n, "found": found[k], "ratio": found[k] / times[8][k]}
+            for n, found in times.items()
+        ]
     return Report(table_of(rows, COLUMNS), rows)

@@ -98,7 +98,7 @@ class Auto(ReducedMethod):
             self._active = self._implicit = self._implicit or self._made()
         else:
             self._active = self._explicit
-        self.exponent, self.share = self._active.exponent, self._active.share
+        self.exponent, self.share, self.hold = self._active.exponent, self._active.share, self._active.hold
 
     def _made(self) -> "Implicit":
         from ephs.mechanics.methods.radau import Implicit  # with derivatives, which explicit runs do not need

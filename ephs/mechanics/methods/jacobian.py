@@ -1,6 +1,6 @@
 """The exact Jacobian of the reduced form."""
 
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -14,9 +14,14 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.kept import once
 from ephs.solve.march import Status
 
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
 RELATIVE = 6e-6
 """Relative length of the central differences in place of tangents: the cube root of rounding."""
 
+MANY, FULL = 400, 0.1
+"""Degrees of freedom from which on, and part of the entries up to which matrices are sparse."""
 TANGENT, MADE = 8, 100
 """Evaluations that cost as much as one along several directions, and as all else that a matrix takes."""
 
@@ -27,6 +32,12 @@ class Jacobian:
 
     It is made of differences where inputs are Python functions of the state.
     With ``counts`` the matrices are counted there, as ``jacobians``; ``holding`` is what held contacts in the last one.
+
+    Attributes
+    ----------
+    sparse
+        Whether matrices by tangents are sparse: of many degrees of freedom each of which acts on few others. Where
+        surfaces touch they are dense, as are those of compiled steps.
     """
 
     def __init__(self, equations: ReducedEquations, counts: dict[str, Any] | None = None) -> None:
@@ -37,6 +48,8 @@ class Jacobian:
         self._slopes: RateSlopes | None = None
         self._linear: Linearised | None = None
         self.holding = equations.holding
+        touches = bool(equations.reduced.tables.support.any()) or equations.problem.descriptor.strikes is not None
+        self.sparse = equations.n >= MANY and not touches and self._share <= FULL
 
     @property
     def cost(self) -> int:
@@ -45,7 +58,7 @@ class Jacobian:
             return 0
         return (MADE + TANGENT * self._slopes.calls) * self._counts["jacobians"]
 
-    def at(self, state: ReducedState) -> Array:
+    def at(self, state: ReducedState) -> "Array | csc_array":
         """The matrix (size, size) of a state.
 
         Raises
@@ -57,21 +70,20 @@ class Jacobian:
         value = self._by_tangents(state)
         if value is None:
             value = self._by_differences(state)
-        elif self.holding is not None:
+        elif self.holding is not None and isinstance(value, np.ndarray):
             rates = slice(self.equations.nv, self.equations.nv + self.equations.n)
             value[rates] += self.holding.slopes(state, value[rates])
         self._counts["jacobians"] += 1
         return value
 
-    def _by_tangents(self, state: ReducedState) -> Array | None:
+    def _by_tangents(self, state: ReducedState) -> "Array | csc_array | None":
         """By tangents of the rates under the inputs there, where these know no state; by those of the dense equations
         where constraints nearly repeat each other."""
         eq = self.equations
         if not (eq.constant or eq.timed):
             return None
         if self._slopes is None or self._slopes.engine is not eq.engine:
-            calls = once(eq.reduced, "calls for slopes", self._calls)
-            self._slopes = RateSlopes(eq.engine, eq.reduced, calls, self.size)
+            self._slopes = RateSlopes(eq.engine, eq.reduced, self._calls, self.size, sparse=self.sparse)
         eq.load(state.t, state.q, state.r, state.heats)
         status, value = self._slopes.at(state.q, eq.vector(state))
         if status == Status.DEPENDENT:
@@ -100,7 +112,17 @@ class Jacobian:
                 value[where, where] -= 0.5 * edge.pair.manifold.ad(rates[where])
         return value
 
+    @property
     def _calls(self) -> list[Call]:
+        """What is asked of the tangents."""
+        return once(self.equations.reduced, "calls for slopes", self._planned)
+
+    @property
+    def _share(self) -> float:
+        """Part of the entries that are asked for."""
+        return sum(rows.size for _, rows, _, _ in self._calls) / self.size**2
+
+    def _planned(self) -> list[Call]:
         eq, tables = self.equations, self.equations.reduced.tables
         warm = np.flatnonzero(tables.node != -1)  # the environment's temperature is constant
         if not (eq.engine.looped or eq.reduced.attaching.network.attached):

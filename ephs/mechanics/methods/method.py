@@ -38,6 +38,8 @@ class ReducedMethod(ABC):
         How a step's part of the tolerance depends on its length, see `Proportional`.
     atol, rtol
         (counted,) of what counts in an error.
+    hold
+        Factor up to which steps that may grow stay as they are, since their matrices are factorised.
     stiffness
         h·|λ| of the fastest mode, as the last step showed it; 0 of methods that do not look.
     rough
@@ -50,6 +52,7 @@ class ReducedMethod(ABC):
     name: str
     exponent: float
     share: float = 0.0
+    hold: float = 1.0
     stiffness: float = 0.0
     rough: tuple[Array, ...] = ()
 

@@ -25,6 +25,8 @@ from ephs.solve.running.stepping import Attempt, Leg, Span
 
 FEWEST = 3
 """Stages of order 5."""
+HELD = 1.2
+"""`ReducedMethod.hold` where matrices are sparse: their factors take longer than stages."""
 
 
 def tableau(scheme: Collocation) -> Mapping[str, Any]:
@@ -54,6 +56,7 @@ class Implicit(ReducedMethod):
         self._embedded = self.scheme.defect @ np.linalg.inv(self.scheme.coefficients) / self.scheme.gamma
         self._stages = Stages(equations, control, self.scheme, self.counts)
         self.rtol, self.atol = self._stages.rtol, self._stages.atol
+        self.hold = HELD if self._stages.jacobian.sparse else 1.0
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds: of three stages, where constraints lose rank and more have no solution.
@@ -94,7 +97,7 @@ class Implicit(ReducedMethod):
         """Steps of trees, many in one compiled call, if no step needs Python, until another method wins a contest."""
         eq = self.equations
         looped, attached = eq.engine.looped or eq.driven.size > 0, bool(eq.reduced.attaching.network.attached)
-        if looped or attached or not eq.constant:
+        if looped or attached or not eq.constant or self._stages.jacobian.sparse:
             return None
         return March(self, tableau(self.scheme), span, left=left, kept=KeptJacobian(self._stages), contest=contest)
 

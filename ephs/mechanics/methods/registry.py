@@ -116,7 +116,7 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
 
             stepper = Impacts(stepper)
         return stepper, None if setting.control.step is not None else Proportional(
-            lambda: stepper.exponent, lambda: stepper.share
+            lambda: stepper.exponent, lambda: stepper.share, lambda: stepper.hold
         )
 
     return made
@@ -209,7 +209,7 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
 
     stepper = Radau(setting.problem, setting.t0, setting.control)
     return stepper, None if setting.control.step is not None else Proportional(
-        lambda: stepper.exponent, hold=Radau.hold
+        lambda: stepper.exponent, hold=lambda: Radau.hold
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.jacobian import Jacobian
+from ephs.mechanics.methods.sparse import NOTHING, PIVOTS, SparseSystems
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
@@ -17,7 +18,7 @@ from ephs.solve.march import Newton
 from ephs.solve.march.iteration import iterate
 from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.kept import KeptMatrices
-from ephs.solve.methods.solvers import Solver, dense
+from ephs.solve.methods.solvers import Solver, Solvers, dense
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.running.control import Control
 
@@ -27,8 +28,6 @@ ROUNDING = 1e-14
 """Tolerances to which stages are solved at constant steps."""
 KEPT = 0.3
 """As `Stages.enough`, at constant steps: with a kept matrix errors fall by a rate, and not as squares."""
-NOTHING = 1e-14
-"""Size beside the largest entry of a matrix at which derivatives by heats are rounding."""
 PIVOTING = ("swaps", "ends")
 """Integers of the factors, by the names of `ephs.solve.march.Stiff`."""
 FACTORS, FACTORED, SUBSTITUTED = 2, 500, 40
@@ -36,8 +35,9 @@ FACTORS, FACTORED, SUBSTITUTED = 2, 500, 40
 
 An evaluation takes some 400 n operations, factors of a real and a complex matrix 10 n³/3, four times as many of them in
 the same time, as their inner loops are long; solutions with them take 10 n²."""
-FAST = 2e-3
-"""Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration."""
+FAST, PATIENT = 2e-3, 0.3
+"""Rate of convergence at which a new matrix does not pay: it costs about as much as an iteration; as dozens of them,
+where it is sparse."""
 
 
 def costs(freedoms: int, stages: int) -> tuple[int, int]:
@@ -94,7 +94,11 @@ class Stages:
         self.jacobian = Jacobian(equations, counts)
         # Off the constraints the exact matrix grows with the inverse of this, and so does an old one's error.
         self._separation = equations.separation()
-        self.kept: KeptMatrices[ReducedState, Array] = KeptMatrices(scheme, self._made, self._solver, counts)
+        self.kept: KeptMatrices[ReducedState, Array | SparseSystems] = KeptMatrices(
+            scheme, self._made, self._solver, counts
+        )
+        self._solvers = Solvers(lambda _: "", PIVOTS)
+        self._fast = PATIENT if self.jacobian.sparse else FAST
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
 
     def solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
@@ -123,13 +127,17 @@ class Stages:
             return True
         return bool(np.any(np.abs(np.log2(found / self._separation)) > 1.0))
 
-    def _made(self, state: ReducedState) -> Array:
+    def _made(self, state: ReducedState) -> Array | SparseSystems:
         """The Jacobian at a state, with what its constraints are apart by."""
         value, self._separation = self.jacobian.at(state), self.equations.separation()
-        return value
+        if isinstance(value, np.ndarray):
+            return value
+        return SparseSystems(value, self.equations.nv, self.equations.n, self._solvers)
 
-    def _solver(self, matrix: Array, length: complex) -> Solver:
+    def _solver(self, matrix: Array | SparseSystems, length: complex) -> Solver:
         """Solver with 1/(h μ) − J for the eigenvalue μ of the coefficients."""
+        if isinstance(matrix, SparseSystems):
+            return matrix.solver(length)
         return dense(np.eye(len(matrix)) / length - matrix, _singular)
 
     def _solve(self, state: ReducedState, y0: Array, h: float) -> tuple[Array, Array, bool]:
@@ -153,7 +161,7 @@ class Stages:
             stages[:] += change
             return float(np.max(worst, initial=0.0))
 
-        found = iterate(PLAIN, correct, self.enough, self.rough, FAST)
+        found = iterate(PLAIN, correct, self.enough, self.rough, self._fast)
         if found.solved:
             return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
         path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
@@ -199,6 +207,7 @@ class KeptJacobian:
             A component cannot be evaluated there, or the mass matrix is singular.
         """
         found, f = self._stages.kept.renew(state), self._stages.equations.n
+        assert isinstance(found, np.ndarray)
         by_rates, by_places, by_heats = found[f : 2 * f, f : 2 * f], found[:f, :f], found[f:, 2 * f :]
         self.memory["matrix"][:] = found
         self.memory["damping"][:] = by_rates + by_places

@@ -69,7 +69,7 @@ class LinkMotion:
 
     def summary(self) -> dict[str, Any]:
         """Bodies and joints at the end."""
-        return ends(self, self._links, self._joints)
+        return ends(LinkMotion(self._frames, self._solution[-1:]), self._links, self._joints)
 
     def outline(self) -> Scene:
         """Bodies, and joints between these and the ground, as a scene to be drawn; bodies have no shapes."""
@@ -103,16 +103,12 @@ class LinkMotion:
     @property
     def twists(self) -> dict[str, Array]:
         """(n, 6) by body."""
-        return self._twists
-
-    @cached_property
-    def _twists(self) -> dict[str, Array]:
-        return {str(path): twist for path, twist in self._found.twists.items()}
+        return self._velocities[0]
 
     @property
     def rates(self) -> dict[str, Array]:
         """(n, d) by joint."""
-        return {name: self._found.rate(joint.path) for name, joint in self._joints.items()}
+        return self._velocities[1]
 
     def wrench(self, name: str) -> Array:
         """(n, 6) of a joint."""
@@ -159,11 +155,8 @@ class LinkMotion:
     def _openings(self, at: slice) -> dict[str, Opening]:
         """Joints between links whose poses are known; those of frames without one are where a joint puts them."""
         poses = {i: self.poses(str(of.path))[at] for i, of in enumerate(self._frames.links) if of.pose is not None}
-        n, placed, within = (
-            len(self._solution.t[at]),
-            set[int](),
-            {of.name: self._inside(of, at) for of in self._assembled},
-        )
+        within = {of.name: self._inside(of, at) for of in self._assembled}
+        n, placed = len(self._solution.t[at]), set[int]()
         poses[SOLID] = np.tile(SE3.identity(), (n, 1))
         for hop in self._hops:
             link = self._assembled[hop.link]
@@ -189,6 +182,12 @@ class LinkMotion:
         """(n, 7) poses of C2 in C1 by the coordinates of a joint."""
         rows = self._solution[self._joints[joint.name].state.path].reshape(len(self._solution), joint.coupling.dim)
         return included(joint.coupling, rows[at])
+
+    @cached_property
+    def _velocities(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Twists by body and rates by joint."""
+        twists = {str(path): twist for path, twist in self._found.twists.items()}
+        return twists, {name: self._found.rate(joint.path) for name, joint in self._joints.items()}
 
     @cached_property
     def _found(self) -> ByPath:

@@ -73,8 +73,7 @@ class ReducedMotion:
         at, dim = int(t.r_at[i]), int(t.dim[i])
         if t.kind[i] == TREE:
             return self._r[:, at : at + dim]
-        places = (self._impulses.outward(state.q, state.r) for state in self._states)
-        return np.array([self._transmission.slip(i, one) for one in places]).reshape(-1, dim)
+        return self._slips[:, self._transmission.slip_at[i]][:, :dim]
 
     def wrench(self, joint: Path) -> Array:
         """(n, 6) of the joint with this box: λ on body 2 in C2, NaN in components that are indeterminate."""
@@ -87,6 +86,11 @@ class ReducedMotion:
         """(n, 3) force of the point of a hard contact with this box on the second body, in world axes; and at each
         instant (3, m) its share of those that balance each other."""
         return self._pressed[point]
+
+    @cached_property
+    def _slips(self) -> Array:
+        """(n, joints apart from the tree, 6) their rates."""
+        return np.array([self._transmission.slips(self._impulses.outward(s.q, s.r)) for s in self._states])
 
     @cached_property
     @in_one_thread

@@ -38,6 +38,11 @@ class Transmission:
         (links, 7) poses of the bodies in their links' frames.
     inertia
         (links, 6, 6) in the links' frames.
+
+    Attributes
+    ----------
+    slip_at
+        (edges,) rows of `slips`, −1 of joints of the tree.
     """
 
     def __init__(self, reduced: Reduced, inside: Array, inertia: Array) -> None:
@@ -52,6 +57,11 @@ class Transmission:
                 here = turn[link] @ own, turn[link] @ edge.offset2[4:] + inside[link, 4:]
             self._ends.append((link, *here))
         self._cut = [i for i in range(len(reduced.edges)) if t.kind[i] == CUT]
+        self._apart = np.flatnonzero(t.kind != TREE)
+        self.slip_at = np.where(t.kind == TREE, -1, np.cumsum(t.kind != TREE) - 1)
+        ends = [self._ends[i] for i in self._apart]
+        self._turns = np.array([turn for _, turn, _ in ends]).reshape(-1, 3, 3)
+        self._places = np.array([at for *_, at in ends]).reshape(-1, 3)
         self._held = {i: annihilator(reduced.edges[i].pair.basis) for i in self._cut}
         self._link = np.repeat(np.arange(reduced.links), t.dim[: reduced.links])
         self._signs = np.zeros((reduced.links, len(self._cut)))
@@ -73,14 +83,19 @@ class Transmission:
         own = np.einsum("lij,lj->li", self.inertia, inside).reshape(-1, 2, 3)
         return np.einsum("lhij,lhj->lhi", turn, own).reshape(-1, 6)
 
-    def slip(self, i: int, places: Array) -> Array:
-        """(d,) the rate of a cut joint by the links' places (links, …)."""
-        t = self._reduced.tables
-        turn, at = self._second(i, places)
-        one, two = (_twist_outward(places[k]) if k >= 0 else np.zeros(6) for k in (int(t.first[i]), int(t.second[i])))
-        relative = two - one
-        own = np.concatenate([turn.T @ relative[:3], turn.T @ (relative[3:] - np.cross(at, relative[:3]))])
-        return t.left[i, : int(t.dim[i])] @ own
+    def slips(self, places: Array) -> Array:
+        """(joints apart from the tree, 6) their rates by the links' places (links, …), with zeros after the last."""
+        t, ground = self._reduced.tables, np.zeros((1, places.shape[1]))
+        ground[0, TURN] = np.eye(3).ravel()
+        whole = np.concatenate([places, ground])  # the last row is the ground's, number −1
+        angular = whole[:, TWIST][:, :3]
+        outward = np.hstack([angular, whole[:, TWIST][:, 3:] + np.cross(whole[:, PLACE], angular)])
+        one, two = t.first[self._apart], t.second[self._apart]
+        own, relative = whole[two, TURN].reshape(-1, 3, 3), outward[two] - outward[one]
+        turn, at = own @ self._turns, whole[two, PLACE] + np.einsum("eij,ej->ei", own, self._places)
+        moving = relative[:, 3:] - np.cross(at, relative[:, :3])
+        inside = np.hstack([np.einsum("eji,ej->ei", turn, part) for part in (relative[:, :3], moving)])
+        return np.einsum("eij,ej->ei", t.left[self._apart], inside)
 
     def wrenches(self, places: Array, accelerations: Array, pushed: Array, force: Array, pulled: Array) -> Array:
         """(edges, 6) λ of the joints on their bodies 2 in C2, NaN in components that are indeterminate.
@@ -191,12 +206,6 @@ class Transmission:
             out[i, :3] = turn.T @ (wrench[:3] - np.cross(at, wrench[3:], axisb=0, axisc=0))
             out[i, 3:] = turn.T @ wrench[3:]
         return out
-
-
-def _twist_outward(place: Array) -> Array:
-    """(6,) the twist of a link about the world's origin."""
-    angular, linear = np.split(place[TWIST], 2)
-    return np.concatenate([angular, linear + np.cross(place[PLACE], angular)])
 
 
 def _wrench_outward(turn: Array, at: Array, wrenches: Array) -> Array:

@@ -106,7 +106,10 @@ class Proportional:
     """Least step as a fraction of the run."""
 
     def __init__(
-        self, exponent: Callable[[], float], share: Callable[[], float] = lambda: 0.0, hold: float = 1.0
+        self,
+        exponent: Callable[[], float],
+        share: Callable[[], float] = lambda: 0.0,
+        hold: Callable[[], float] = lambda: 1.0,
     ) -> None:
         self._exponent, self._share, self._hold = exponent, share, hold
         self._control: Any = MarchControl.table(1)[0]
@@ -117,7 +120,7 @@ class Proportional:
         """Whether a step is accepted, and the length of the next one or of the next try; span: of the whole run."""
         c = self._control
         c.span, c.step, c.exponent, c.share = span, h, self._exponent(), self._share()
-        accepted = judge(PLAIN, c, h, error if error < BEYOND else BEYOND, self._hold)
+        accepted = judge(PLAIN, c, h, error if error < BEYOND else BEYOND, self._hold())
         return bool(accepted), float(c.step)
 
     def wanted(self, h: float, error: float, span: float) -> float:

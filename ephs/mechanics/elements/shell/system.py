@@ -17,6 +17,7 @@ from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.stiffness import EDGES
 from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
+from ephs.operad.collector import paused_collector
 from ephs.semantics import library
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
@@ -179,6 +180,7 @@ def shell_element(
     return System.of(shell_pattern(damped=damped, heat=damped and heat), parts)
 
 
+@paused_collector()
 def shell_system(
     shell: Shell,
     *,
@@ -225,6 +227,7 @@ def shell_system(
     junctions |= {port: junction(momentum, exposed=True) for port in bodies}
     boxes: dict[str, dict[str, str]] = {}
     parts: dict[str, System | Primitive] = {}
+    made: dict[bytes, System] = {}  # bodies, which nodes with one inertia share
     for i, point in enumerate(shell.points):
         pose = np.concatenate([unit, point])
         if i in welded:
@@ -233,8 +236,10 @@ def shell_system(
             parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
         else:
             boxes[f"node{i}"] = {"p": f"p{i}"}
-            body = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
-            parts[f"node{i}"] = body.with_initial({"pe.q": pose})
+            key = inertia[i].tobytes()
+            if key not in made:
+                made[key] = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
+            parts[f"node{i}"] = made[key].with_initial({"pe.q": pose})
     if len(held):
         junctions["p_ground"] = junction(momentum)
         boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()

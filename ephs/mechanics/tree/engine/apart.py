@@ -1,15 +1,11 @@
 """Columns of a Jacobian that have no row in common: one direction gives them all (Curtis, Powell and Reid, 1974)."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ephs.mechanics.tree.finding.tables import TREE, MechanismTables
 from ephs.solve.equations.sparse import Index
-
-if TYPE_CHECKING:
-    from ephs.semantics.bundles.bundle import Array
 
 Column = tuple[int, Index]
 """A column, and the rows in which it may have entries."""
@@ -58,12 +54,15 @@ def columns_of_trees(t: MechanismTables, increments: int, freedoms: int, warm: I
 def directions(columns: Sequence[Column], size: int) -> list[list[Column]]:
     """Columns of each direction, each in the first one where none has a row of it; rows are below ``size``."""
     found: list[list[Column]] = []
-    taken: list[Array] = []
+    taken = [0] * size  # of each row, the directions that have it, as bits
     for column, rows in columns:
-        place = next((k for k, mask in enumerate(taken) if not mask[rows].any()), len(found))
-        if place == len(found):
+        others, places = 0, rows.tolist()
+        for row in places:
+            others |= taken[row]
+        free = ~others & (others + 1)
+        for row in places:
+            taken[row] |= free
+        if free.bit_length() > len(found):
             found.append([])
-            taken.append(np.zeros(size, dtype=bool))
-        found[place].append((column, rows))
-        taken[place][rows] = True
+        found[free.bit_length() - 1].append((column, rows))
     return found

@@ -367,7 +367,8 @@ def _forces(
         edges.append(
             [kind, one, two, int(t.dim[i]), int(t.q_at[i]), int(t.q_size[i]), int(t.r_at[i]), number.get(i, -1)]
         )
-        shared.append([int(t.several[i]), int(t.poses[i])])
+        resisted = int(t.dims[friction, 0]) - 1 if friction >= 0 else 0  # rates
+        shared.append([int(t.several[i]), int(t.poses[i]), resisted // 6 if resisted > t.dim[i] else 0])
         parts.append([int(t.spring[i]), friction, int(t.heat[i]), int(t.support[i])])
         reach.append(t.reach[i])
         frames.append(frame)
@@ -375,7 +376,7 @@ def _forces(
     return Forces(
         edge=np.array(edges, dtype=np.int64).reshape(-1, 8),
         part=np.array(parts, dtype=np.int64).reshape(-1, 4),
-        shared=np.array(shared, dtype=np.int64).reshape(-1, 2),
+        shared=np.array(shared, dtype=np.int64).reshape(-1, 3),
         frame=np.array(frames).reshape(-1, 24),
         left=np.array(left).reshape(-1, 36),
         reach=np.array(reach).reshape(-1, 9),

@@ -223,10 +223,10 @@ def _push(on: Evaluator, drags: Drags, motion: Mechanism) -> None:
 
 
 def frictions(tables: Mapping[str, Any]) -> list[int]:
-    """Numbers of the components of friction, edge by edge."""
+    """Numbers of the components of friction between two links or in a joint, edge by edge."""
     acting: Any = tables["acting"]
-    numbers = [int(acting[i].friction) for i in range(int(acting.size))]
-    return [number for number in numbers if number >= 0]
+    rows = [acting[i] for i in range(int(acting.size))]
+    return [int(row.friction) for row in rows if row.friction >= 0 and not row.resisted]
 
 
 def resisting(tables: Mapping[str, Any], onsager: Mapping[int, int]) -> dict[str, Any]:

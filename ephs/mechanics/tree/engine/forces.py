@@ -8,7 +8,17 @@ from ephs.mechanics.road.cuts import Relative, frame_on, motion_of, place_of, po
 from ephs.mechanics.road.needs import NO_INTEGERS
 from ephs.mechanics.road.tree import shift_back, turned
 from ephs.mechanics.tree.engine.near import Near
-from ephs.mechanics.tree.engine.several import dims_of, gather, meet
+from ephs.mechanics.tree.engine.several import (
+    dims_of,
+    gather,
+    left_row,
+    meet,
+    pull_links,
+    pull_several,
+    push,
+    rates_along,
+    rates_of_several,
+)
 from ephs.mechanics.tree.sweeps.acting import (
     ON_BODIES,
     ON_TREE,
@@ -20,16 +30,11 @@ from ephs.mechanics.tree.sweeps.acting import (
 from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.mechanics.tree.sweeps.network import Net
 from ephs.semantics.linear.dense import copy
-from ephs.semantics.spaces.vectors import dot, scale, sub
-from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Variable, Vector, staged
+from ephs.semantics.spaces.vectors import dot, sub
+from ephs.semantics.stage import Evaluator, Integer, Real, Variable, Vector, staged
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.drags import Drags
-
-
-def _grow(pushed: Matrix, link: Integer, by: list[Real]) -> None:
-    for k, x in enumerate(by):
-        pushed[link, k] = pushed[link, k] + x
 
 
 @staged
@@ -152,7 +157,7 @@ class _ActingEvaluation:
             turn, at = frame_on(place, body.turn, body.at)
             here = shift_back(turned(turn, [self.tables.wrench[b, k] for k in range(6)]), sub(at, place.at))
             self.totals[1] = self.totals[1] + dot(here, place.twist)
-            _grow(w.pushed, body.link, here)
+            push(w.pushed, body.link, here)
 
         self.on.when(body.link >= 0, given)
 
@@ -211,7 +216,7 @@ class _ActingEvaluation:
 
         def aside() -> None:
             twist = motion_of(self.work.relative, edge.cut).twist
-            rate.value = dot(self._left(edge, port.freedom), twist)
+            rate.value = dot(left_row(edge, port.freedom), twist)
 
         on.when(on.same(edge.kind, ON_TREE), in_tree, aside)
         return rate.value
@@ -219,7 +224,8 @@ class _ActingEvaluation:
     def edge(self, edge: Acting, number: Integer) -> None:
         """Add the forces of an edge with this number to those on joints, or to the wrenches on links."""
         on = self.on
-        bare = on.both(on.same(edge.kind, ON_BODIES), on.both(edge.spring < 0, edge.friction < 0))
+        still = on.either(edge.friction < 0, edge.resisted > 0)
+        bare = on.both(on.same(edge.kind, ON_BODIES), on.both(edge.spring < 0, still))
         on.when(bare, lambda: None, lambda: self._edge(edge, number))
         on.when(edge.poses > 0, lambda: self.unless_refused(lambda: self._several(edge, number)))
 
@@ -234,7 +240,7 @@ class _ActingEvaluation:
 
         def aside() -> None:
             on.when(between_bodies, lambda: self._between(edge, motion), lambda: self._cut(edge, motion))
-            self._along(edge, motion.twist, rate)
+            rates_along(on, edge, motion.twist, rate)
 
         on.when(tree, in_tree, aside)
         on.when(between_bodies, lambda: None, lambda: self._drive(edge, rate, pull))
@@ -245,9 +251,8 @@ class _ActingEvaluation:
             pressed.value = on.select(on.both(edge.support > 0, w.c[0] <= 0.0), 0, 1)
 
         def friction() -> None:
-            on.when(
-                on.both(edge.friction >= 0, on.same(pressed.value, 1)), lambda: self._friction(edge, number, rate, pull)
-            )
+            rubs = on.both(edge.friction >= 0, on.same(edge.resisted, 0))
+            on.when(on.both(rubs, on.same(pressed.value, 1)), lambda: self._friction(edge, number, rate, pull))
 
         on.when(edge.spring >= 0, spring)
         self.unless_refused(friction)
@@ -261,7 +266,7 @@ class _ActingEvaluation:
         def keep() -> None:
             copy(on, pull.part(0, edge.dim), w.pulled.part(edge.r_at, edge.dim))
 
-        on.when(tree, in_joint, lambda: self._on_links(edge, motion, pull))
+        on.when(tree, in_joint, lambda: pull_links(on, self.tables, w, edge, motion, pull))
         on.when(between_bodies, lambda: None, keep)
 
     def _cut(self, edge: Acting, motion: Relative) -> None:
@@ -278,16 +283,6 @@ class _ActingEvaluation:
         component = on.select(edge.spring < 0, edge.friction, edge.spring)
         component = on.select(component < 0, edge.several, component)
         meet(on, self.tables, self.work, self.read, component, pose, 0)
-
-    def _left(self, edge: Acting, j: Integer) -> list[Real]:
-        row = Vector(edge.reals, edge.real_start + Acting.left.offset + 6 * j, 6)
-        return [row[k] for k in range(6)]
-
-    def _along(self, edge: Acting, twist: list[Real], rate: Vector) -> None:
-        def each_freedom(j: Integer) -> None:
-            rate[j] = dot(self._left(edge, j), twist)
-
-        self.on.loop(edge.dim, each_freedom)
 
     def _drive(self, edge: Acting, rate: Vector, pull: Vector) -> None:
         """Start from the given forces on a joint, whose element goes to the states of components."""
@@ -325,21 +320,27 @@ class _ActingEvaluation:
         out[1], out[2] = out[1] + energy[0], out[2] + on.absolute(energy[0])
 
     def _several(self, edge: Acting, number: Integer) -> None:
-        """Add the forces of a potential of the relative poses of an edge and the next ones."""
+        """Add the forces of a potential of the relative poses of an edge and the next ones, and of their friction."""
         on, w = self.on, self.work
         gather(on, self.tables, self.work, self.read, edge, number)
         self._evaluate(edge.several, stored=True)
+        pull_several(on, self.tables, w, edge, number, w.e)
+        on.when(edge.resisted > 0, lambda: self.unless_refused(lambda: self._resist_several(edge, number)))
 
-        def each_pose(k: Integer) -> None:
-            one, pull = self.tables.acting[number + k], on.scratch(6)
-            motion = Relative(NO_INTEGERS, 0, on.scratch(Relative.real_width).cells, 0)
-            far = place_of(on, w.places(self.tables), one.second)
-            motion.turn, motion.at = frame_on(far, one.outer_turn, one.outer_at)
-            for j in range(6):
-                pull[j] = -w.e[6 * k + j]
-            self._on_links(one, motion, pull)
+    def _resist_several(self, edge: Acting, number: Integer) -> None:
+        """Add the friction of relative poses that the memory of components has."""
+        on, w, heat = self.on, self.work, edge.heat
+        rates = 6 * edge.resisted
 
-        on.loop(edge.poses, each_pose)
+        def lose(j: Integer) -> None:
+            self.totals[0] = self.totals[0] + w.f[j] * w.e[j]
+
+        rates_of_several(on, self.tables, w, edge, number, w.e)
+        w.e[rates] = w.temperature[heat]
+        self._evaluate(edge.friction, moving=rates)
+        on.loop(rates, lose)
+        pull_several(on, self.tables, w, edge, number, w.f)
+        self._heat_by(edge, w.f[rates])
 
     def _spring(self, edge: Acting, pull: Vector) -> None:
         self._evaluate(edge.spring, stored=True)
@@ -363,26 +364,12 @@ class _ActingEvaluation:
             self.totals[0] = self.totals[0] + w.f[j] * rate[j]
 
         self.on.loop(d, each_freedom)
-        self.s_rate[heat] = self.s_rate[heat] - w.f[d]
-        self.made[self.tables.component[edge.friction].made] = -w.f[d]
+        self._heat_by(edge, w.f[d])
 
-    def _on_links(self, edge: Acting, motion: Relative, pull: Vector) -> None:
-        """Add a pull in an edge to the wrenches on its links."""
-        on, wide, pushed = self.on, [self.on.variable(0.0) for _ in range(6)], self.work.pushed
-
-        def each_freedom(j: Integer) -> None:
-            for total, x in zip(wide, self._left(edge, j), strict=True):
-                total.value = total.value + x * pull[j]
-
-        on.loop(edge.dim, each_freedom)
-        whole = turned(motion.turn, [total.value for total in wide])
-
-        def push(link: Integer, by: list[Real]) -> None:
-            way = sub(motion.at, place_of(on, self.work.places(self.tables), link).at)
-            _grow(pushed, link, shift_back(by, way))
-
-        on.when(edge.second >= 0, lambda: push(edge.second, whole))
-        on.when(edge.first >= 0, lambda: push(edge.first, scale(-1.0, whole)))
+    def _heat_by(self, edge: Acting, flow: Real) -> None:
+        """Let the friction of an edge heat by a flow of its entropy."""
+        self.s_rate[edge.heat] = self.s_rate[edge.heat] - flow
+        self.made[self.tables.component[edge.friction].made] = -flow
 
     def conduct(self, row: ConductingComponent) -> None:
         """Add the conduction of a component to the rates of two entropies, and note what leaves the first."""

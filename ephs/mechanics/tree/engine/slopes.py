@@ -10,6 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final, final
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from ephs.mechanics.tree.engine.apart import Column
 from ephs.mechanics.tree.engine.attachment import with_derivatives
@@ -77,6 +78,8 @@ class RateSlopes:
         What is asked for, by `calls_of`; all other derivatives are 0.
     size
         How many numbers of y have rates of interest: the first ones.
+    sparse
+        Whether matrices have the entries that are asked for alone.
 
     Attributes
     ----------
@@ -84,7 +87,9 @@ class RateSlopes:
         As given.
     """
 
-    def __init__(self, engine: Engine, reduced: "Reduced", calls: Sequence[Call], size: int) -> None:
+    def __init__(
+        self, engine: Engine, reduced: "Reduced", calls: Sequence[Call], size: int, *, sparse: bool = False
+    ) -> None:
         coordinates, whole = engine.sizes
         self.engine, self._size, self._calls = engine, size, calls
         self._base, self._y, self._out = (np.zeros(count) for count in (coordinates, whole, whole))
@@ -92,7 +97,7 @@ class RateSlopes:
         tables = with_derivatives(engine.tables, reduced.tables.address)
         work = {name: array.copy() for name, array in engine.work.items()}
         work |= {"e": np.zeros(64), "jac": np.zeros(1024), "scratch": np.zeros(4096)}
-        self._fault = work["fault"]
+        self._fault, self._sparse = work["fault"], _SlopeEntries(calls, size) if sparse else None
         net, q = reduced.attaching.network, np.zeros(coordinates)
         about = memory_about(reduced.tables.evaluated, net.known, len(reduced.attaching.bent))
         about["increment"] = np.zeros(engine.work["still"].size)
@@ -115,17 +120,37 @@ class RateSlopes:
         """Number of the component or degree of freedom at which the evaluation failed last."""
         return int(self._fault[0])
 
-    def at(self, q: Array, y: Array) -> tuple[int, Array]:
+    def at(self, q: Array, y: Array) -> "tuple[int, Array | csc_array]":
         """A status, and ∂ẏ/∂y (size, size) where joints' elements are q·exp(v), at v = 0."""
         self._base[:], self._y[:] = q, y
-        found, status = np.zeros((self._size, self._size)), int(self._keep())
-        for seeds, rows, columns, along in self._calls:
+        status, values = int(self._keep()), list[Array]()
+        for seeds, rows, _, along in self._calls:
             if not status:
                 self._seed[seeds] = 1.0
                 status = int(self._run())
                 self._seed[seeds] = 0.0
-                found[rows, columns] = self._slope[rows, along]
+            values.append(self._slope[rows, along])
+        if self._sparse is not None:
+            return status, self._sparse.matrix(np.concatenate(values))
+        found = np.zeros((self._size, self._size))
+        for (_, rows, columns, _), entries in zip(self._calls, values, strict=True):
+            found[rows, columns] = entries
         return status, found
+
+
+@final
+class _SlopeEntries:
+    """Places of the derivatives of all calls in a sparse matrix, column by column."""
+
+    def __init__(self, calls: Sequence[Call], size: int) -> None:
+        rows, columns = (np.concatenate([call[k] for call in calls]) for k in (1, 2))
+        self._order, self._size = np.lexsort((rows, columns)), size
+        starts = np.append(0, np.cumsum(np.bincount(columns, minlength=size)))
+        self._indices, self._starts = rows[self._order].astype(np.int32), starts.astype(np.int32)
+
+    def matrix(self, values: Array) -> csc_array:
+        """The matrix of values in the order of the calls."""
+        return csc_array((values[self._order], self._indices, self._starts), shape=(self._size, self._size))
 
 
 def _tangents(engine: Engine) -> Any:

@@ -30,7 +30,8 @@ class Forces(NamedTuple):
 
     edge: Index  # (edges, 8): kind, link of body 1, of body 2, freedoms, place of q, its size, place of r, cut joint
     part: Index  # (edges, 4): component of the potential, of friction, entropy that takes its heat, −1: none; support
-    shared: Index  # (edges, 2): component of a potential of several relative poses, −1: none; how many from here on
+    shared: Index  # (edges, 3): component of a potential of several relative poses, −1: none; how many poses that
+    # has, and how many friction resists, from here on
     frame: Array  # (edges, 24): rows of R and p of both joint frames in their links' frames
     left: Array  # (edges, 36): (BᵀB)⁻¹Bᵀ, row by row
     reach: Array  # (edges, 9): from where on nothing acts; margin and half lengths of boxes, angle of segments

@@ -31,7 +31,8 @@ class Booking:
         t, m = equations.model.tables, equations.model.memory()
         kept = np.flatnonzero(t.kind == STORING)
         places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
-        self.storages = table_of(StorageRow, np.hstack([t.address[kept, None], t.dims[kept], places]))
+        resting = equations.model.resting(kept)[kept]
+        self.storages = table_of(StorageRow, np.hstack([resting[:, None], t.dims[kept], places]))
         self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
         number = {slot.path: i for i, slot in enumerate(equations.problem.descriptor.components)}
         self._makers = np.array([number[path] for path in equations.reduced.made], dtype=int)

@@ -75,6 +75,7 @@ class ReducedEquations:
         self.prescribed = Prescribed(reduced)
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
+        self._owner = np.repeat(np.arange(reduced.links), t.dim[: reduced.links])
         self.counted = np.r_[np.arange(self.n), self.nv : self.nv + self.n + self.ns]
         self.heats = heats_of(reduced, model.reference.temperature)
         self.led = Led(
@@ -303,10 +304,9 @@ class ReducedEquations:
         """Reference of a relative tolerance: for increments 1 rad or m, for rates the joint's as a whole."""
         size = np.maximum(np.abs(y0), np.abs(y1))[self.counted]
         size[: self.n] = 1.0
-        for i in range(self.reduced.links):
-            at = self.n + int(self.reduced.tables.r_at[i])
-            where = slice(at, at + int(self.reduced.tables.dim[i]))
-            size[where] = size[where].max(initial=0.0)
+        rates, most = size[self.n : 2 * self.n], np.zeros(self.reduced.links)
+        np.maximum.at(most, self._owner, rates)
+        rates[:] = most[self._owner]
         return size
 
     def along(self, estimate: Array) -> Array:

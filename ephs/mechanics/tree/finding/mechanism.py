@@ -214,7 +214,7 @@ def _tables(
         stored = 0 if edge.spring < 0 else len(model.descriptor.components[edge.spring].reads)
         spring[i] = -1 if stored != 1 or _stores_nothing(model, edge.spring) else edge.spring
         several[i], shared[i] = (edge.spring, 0 if edge.place else stored) if stored > 1 else (-1, 0)
-        idle = edge.friction < 0 or _idle(model, edge.friction)
+        idle = edge.friction < 0 or _idle(model, edge.friction) or (edge.place > 0 and _shared(model, edge.friction))
         friction[i] = -1 if idle else edge.friction
         if kind == SPRING:
             support[i], reach[i] = _support(model, [c for c in (spring[i], friction[i]) if c >= 0])
@@ -323,6 +323,11 @@ def _idle(model: Model, component: int) -> bool:
     entries: dict[str, Any] = dict(primitive.parameters)
     given = entries.get("mu", entries.get("damping"))
     return given is not None and not isinstance(given, str) and not np.any(given)
+
+
+def _shared(model: Model, component: int) -> bool:
+    """Whether it resists the rates of several joints."""
+    return len(model.descriptor.components[component].reads) > 1
 
 
 def _strikes(model: Model, component: int) -> bool:

@@ -113,6 +113,7 @@ class _PartsReader:
         self.entropy: dict[int, int] = {}
         self.entropies: dict[Path, int] = {}
         self.rates = {joint.rate: joint.pair.dim for joint in self.found.joints}
+        self._rate = {joint.state.path: joint.rate for joint in self.found.joints}
         for number, role in enumerate(self.roles):
             if role in (Role.HEAT, Role.ENVIRONMENT) and self._booked(number):
                 self.entropy[next(iter(self.wiring.ports(number).values()))] = len(self.entropies)
@@ -166,7 +167,14 @@ class _PartsReader:
         """
         left = [number for number in range(len(self.roles)) if number not in self.placed]
         for number in left:
-            if self.roles[number] not in (Role.OTHER, Role.FRICTION, Role.CONDUCTION, Role.HEAT, Role.ENVIRONMENT):
+            if self.roles[number] not in (
+                Role.OTHER,
+                Role.FRICTION,
+                Role.RESISTANCE,
+                Role.CONDUCTION,
+                Role.HEAT,
+                Role.ENVIRONMENT,
+            ):
                 raise Unplaced(self.wiring.components[number].path, "belongs to no body and no joint")
         found = network_of(self.wiring, left, self.rates, self.entropy, self._prescribed, self._bare)
         check_determined(found, self.wiring.components)
@@ -198,12 +206,9 @@ class _PartsReader:
         taken[name] = start + d
         friction = heat = -1
         for number, _ in self.wiring.neighbours(joint.rate, joint.relation):
-            if self.roles[number] is not Role.FRICTION:
+            if friction >= 0 or not self._resists(number, joint):
                 continue
-            read = {state.path for state in self.wiring.components[number].reads}
             *_, hot = self.wiring.ports(number).values()
-            if friction >= 0 or read - {joint.state.path} or hot not in self.entropy:
-                continue
             friction, heat = number, self.entropy[hot]
             self.placed.add(number)
         port = self.wiring.outer.get(joint.rate)
@@ -212,6 +217,17 @@ class _PartsReader:
             None if port is None else self._motion(port, d), np.array(self.problem.initial[joint.state.path]),
             slice(start, start + d), joint.state.path, port, joint.potential, friction, heat, self._place(joint),
         )  # fmt: skip
+
+    def _resists(self, number: int, joint: LinkJoint) -> bool:
+        """Whether a component is friction of a joint, or of all those whose relative poses one potential stores."""
+        read = [state.path for state in self.wiring.components[number].reads]
+        *rates, hot = self.wiring.ports(number).values()
+        if self.roles[number] is Role.FRICTION:
+            own = set(read) <= {joint.state.path}
+        else:
+            stored = [state.path for state in self.wiring.components[joint.potential].reads]
+            own = self.roles[number] is Role.RESISTANCE and read == stored and rates == [self._rate[p] for p in stored]
+        return own and hot in self.entropy
 
     def _place(self, joint: LinkJoint) -> int:
         """Place of a joint's relative pose among those that its potential stores."""

@@ -10,7 +10,7 @@ from ephs.semantics.primitives.primitives import Irreversible, Primitive, Revers
 from ephs.semantics.primitives.pullback import pulled_ports
 from ephs.solve.equations.heats import exponential_law
 
-FREE = quantity.relative_pose("free")
+FREE, RATE = quantity.relative_pose("free"), quantity.joint_momentum("free")
 
 
 class Role(Enum):
@@ -36,6 +36,8 @@ class Role(Enum):
     """Stores the relative poses of several free joints, with one potential."""
     FRICTION = auto()
     """Resists the rate of a joint, and heats."""
+    RESISTANCE = auto()
+    """Resists the rates of several free joints, and heats."""
     DRAG = auto()
     """Resists the twist of a body, and heats."""
     CONDUCTION = auto()
@@ -95,8 +97,12 @@ def _of_storage(primitive: Storage, kinds: list[str], on_bodies: list[bool]) -> 
 
 
 def _of_irreversible(primitive: Irreversible, kinds: list[str], on_bodies: list[bool]) -> Role:
-    if primitive.kernel is None or len(kinds) != 2 or kinds[1] != "entropy":
+    if primitive.kernel is None or len(kinds) < 2 or kinds[-1] != "entropy":
         return Role.OTHER
+    if len(kinds) > 2:
+        resisted = {q for _, _, q in primitive.bundle.items()} == {RATE, quantity.entropy}
+        alike = {primitive.interface[port].quantity for port in primitive.reads} == {FREE}
+        return Role.RESISTANCE if resisted and alike and kinds.count("entropy") == 1 else Role.OTHER
     read = {primitive.interface[port].quantity.kind for port in primitive.reads}
     if kinds[0] == "entropy":
         return Role.OTHER if read else Role.CONDUCTION

@@ -35,7 +35,7 @@ class MechanismTables(NamedTuple):
     spring: Index  # (edges,): component of the potential, −1: none
     several: Index  # (edges,): component whose energy is of its relative pose and others', −1: none
     poses: Index  # (edges,): how many relative poses that has, in this edge and those that follow; 0 in the latter
-    friction: Index  # (edges,): component, −1: none
+    friction: Index  # (edges,): component, −1: none; of several relative poses at the first one
     heat: Index  # (edges,): entropy that takes the friction's heat
     support: Index  # (edges,): 0, or where both components vanish, see `ephs.mechanics.tree.sweeps.acting.Acting`
     reach: Array  # (edges, 9): from which height or distance on; margin, half lengths of the boxes, angle of segments

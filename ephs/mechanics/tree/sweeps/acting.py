@@ -131,6 +131,8 @@ class Acting(Record):
     several, poses
         Component of a potential of several relative poses, −1: none, and their number: those of this edge and of the
         next ones, which have 0.
+    resisted
+        Number of relative poses whose rates friction resists, those of this edge and the next ones; 0: the joint's own.
     support, reach
         `ABOVE` or `BEYOND`: where the second frame's place in the first is higher or farther, nothing acts; else 0.
     halves, margin
@@ -158,6 +160,7 @@ class Acting(Record):
     heat = integer()
     several = integer()
     poses = integer()
+    resisted = integer()
     inner_at = reals(3)
     outer_at = reals(3)
     reach = real()
