@@ -55,7 +55,7 @@ def live_page(
     made = exported(image_of(scene, inputs=inputs, parameters=chosen, until=until), "live")
     times = np.linspace(0.0, until, round(FRAMES * until) + 1)
     solution = simulate(scene, until, method="rk87", save_at=times, audit="off")
-    stage = stage_of(solution, wrenches=False, heat=False, fps=FRAMES, duration=until)
+    stage = stage_of(solution, fps=FRAMES, duration=until)
     places = {each.name: each.place for each in made.outputs}
     scalar = [each for each in made.outputs if each.name.endswith(".coordinate")][:CURVES]
     curves = [

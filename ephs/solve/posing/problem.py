@@ -150,6 +150,10 @@ class Outlined(Linked, Protocol):
         """Bodies and joints as a scene, to be drawn."""
         ...
 
+    def shell(self, name: str) -> Any:
+        """Motion of a shell."""
+        ...
+
 
 class MechanicalMotion(Outlined, Protocol):
     """A motion in terms of mechanics: the solver itself has only states, efforts and flows."""
@@ -168,10 +172,6 @@ class MechanicalMotion(Outlined, Protocol):
 
     def beam(self, name: str) -> Any:
         """Motion of a beam."""
-        ...
-
-    def shell(self, name: str) -> Any:
-        """Motion of a shell."""
         ...
 
     def state(self, i: int) -> dict[Path, Array]:
