@@ -1,5 +1,6 @@
 """Shells in pictures: faces are where their nodes are, colours are values of their elements, all in one range."""
 
+import json
 import re
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 from PIL import Image
 
 import ephs
+from ephs.exporting.image import image_of
+from ephs.exporting.module import exported
 from ephs.mechanics import Shell, ShellSection
 from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.system import shell_system
@@ -178,3 +181,15 @@ def test_a_shell_inside_of_a_larger_system_is_drawn(flap):
     part = Inside(sol, "flap", flap.scene)
     (shown,) = stage(part, "energy").shades
     assert shown.faces["skin"][-1] == pytest.approx(stage(flap, "energy").shades[0].faces["skin"][-1], rel=1e-3)
+
+
+def test_a_page_that_simulates_knows_where_poses_of_nodes_are():
+    """It is told where the module writes the pose of each body that it draws, shells' nodes among them."""
+    loose = scene_of_text(FLAP.replace("damping = 1e-3\n", ""))
+    page = ephs.live_page(loose, parameters=["bodies.hub.mass"], until=UNTIL).html
+    told = json.loads(re.findall(r'<script type="application/json" id="live">(.*?)</script>', page, re.DOTALL)[0])
+    places = {
+        each.name: each.place for each in exported(image_of(loose, parameters=["bodies.hub.mass"]), "live").outputs
+    }
+    boxes = ["bodies.hub", *(f"shells.skin.node{i}" for i in (2, 3, 4, 5))]
+    assert told["poses"] == [places[f"{box}.quaternion.w"] for box in boxes]

@@ -10,6 +10,7 @@ import numpy as np
 from ephs.mechanics.elements.shell.mesh import Indices
 from ephs.mechanics.elements.shell.system import SPRING
 from ephs.mechanics.motion.batch import compose
+from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.faces import Faces
 from ephs.mechanics.scene.model import Body, Scene, frozen
@@ -148,6 +149,15 @@ def shell_motion(
     found = np.array([shell.resultants(each) for each in poses])
     energy = np.array([shell.energy(each) for each in poses])
     return ShellMotion(poses[..., 4:], shell.cells, found[..., :3], found[..., 3:6], found[..., 6:], energy)
+
+
+def nodes_of(scene: Scene) -> dict[str, Path]:
+    """The free nodes of its shells: name in pictures -> path of the box."""
+    return {
+        f"{name.removesuffix(sheet.name)}{sheet.node(i)}": component_path("shells", name) / f"node{i}"
+        for name, sheet in scene.all_shells()
+        for i in sheet.free()
+    }
 
 
 def with_nodes(scene: Scene) -> Scene:
