@@ -1,19 +1,24 @@
-"""Shells against published values: displacements, large displacements, snaps, frequencies; time beside size.
+"""Shells against published values: displacements, large displacements, snaps, frequencies; time beside size; motion.
 
 Of damped sheets that swing by radau: time of set-up and of a step for each element; ratios are to the smallest one.
 
 Linear: Scordelis and Lo's roof, MacNeal and Harder (1985) with Simo's 0.0930 of the hemisphere, Cook. Large: Sze, Liu
 and Lo (2004). Frequencies: NAFEMS FV12 and FV16, Rayleigh's ring. Values are ratios to the published ones.
+
+A sheet that falls from level, clamped at a side: error over processor time, here, and by Exudyn where it is installed.
+The error is the largest distance of the free corner from a refined run at 21 instants, over the length.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 import ephs
+from benchmarks.peers.exudyn_plates import falling
 from benchmarks.report import Report, table_of
 from ephs.mechanics.elements.shell import spectra, statics
 from ephs.mechanics.elements.shell.mesh import grid
@@ -27,6 +32,45 @@ COLUMNS = {
     "problem": ("problem", 1.0), "elements": ("elements", 1.0), "published": ("published", 1.0),
     "found": ("found", 1.0), "ratio": ("ratio", 1.0), "time [s]": ("seconds", 1.0),
 }  # fmt: skip
+MOTION = {
+    "by": ("by", 1.0), "elements": ("elements", 1.0), "steps": ("steps", 1.0), "time [s]": ("seconds", 1.0),
+    "error": ("error", 1.0),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Falling:
+    """A sheet that falls from level, clamped at a short side; SI units."""
+
+    length: float = 1.0
+    width: float = 0.25
+    thickness: float = 0.02
+    E: float = 1e7
+    nu: float = 0.3
+    rho: float = 1000.0
+    gravity: float = 9.81
+    until: float = 1.0
+
+    def own(self, elements: tuple[int, int], method: str, **how: float) -> tuple[Any, dict[str, Any]]:
+        """Places (21, 3) of the free corner, with steps and seconds of processor time, without compilation."""
+        points, at, cells = grid(lambda u, v: (self.length * u, self.width * v, 0.0), elements)
+        shell = Shell.of(points, cells, ShellSection.isotropic(self.thickness, self.E, self.nu, self.rho))
+        held = np.flatnonzero(at[:, 0] == 0.0).tolist()
+        system = shell_system(shell, gravity=(0.0, 0.0, -self.gravity), held=held)
+        options: dict[str, Any] = {"method": method, "audit": "off", **how}
+        ephs.simulate(system, 1e-3 * self.until, **options)  # compiles
+        start = time.process_time()
+        sol = ephs.simulate(system, self.until, save_at=np.linspace(0.0, self.until, 21), **options)
+        seconds = time.process_time() - start
+        return sol[f"node{len(points) - 1}.pe.q"][:, 4:], {"steps": int(sol.stats["steps"]), "seconds": seconds}
+
+
+REFINED: tuple[tuple[int, int], str, dict[str, float]] = ((16, 4), "rk87", {"rtol": 1e-5, "atol": 1e-7})
+OWN: tuple[tuple[tuple[int, int], str, dict[str, float]], ...] = (
+    *(((n, max(1, n // 4)), "rk87", {"rtol": 1e-4, "atol": 1e-5}) for n in (2, 4, 8)),
+    *(((n, max(1, n // 4)), "radau", {"rtol": 1e-3, "atol": 1e-4}) for n in (2, 4, 8)),
+)
+PEER: tuple[tuple[tuple[int, int], int], ...] = (((4, 1), 100), ((4, 1), 200), ((8, 2), 200), ((8, 2), 400))
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,4 +411,17 @@ def report() -> Report:
             {"problem": name, "elements": n, "found": found[k], "ratio": found[k] / times[8][k]}
             for n, found in times.items()
         ]
-    return Report(table_of(rows, COLUMNS), rows)
+    motions = list(fallen())
+    return Report(table_of(rows, COLUMNS) + "\n\n" + table_of(motions, MOTION), [*rows, *motions])
+
+
+def fallen() -> Iterator[dict[str, Any]]:
+    """Runs of a falling sheet, and their errors."""
+    sheet = Falling()
+    exact, _ = sheet.own(REFINED[0], REFINED[1], **REFINED[2])
+    runs = [(method, n, sheet.own(n, method, **how)) for n, method, how in OWN]
+    if find_spec("exudyn"):
+        runs += [("Exudyn, thin plates", n, falling(sheet, n, steps)) for n, steps in PEER]
+    for by, (n, m), (corner, facts) in runs:
+        error = float(np.linalg.norm(corner - exact, axis=1).max()) / sheet.length
+        yield {"by": by, "elements": f"{n} × {m}", "error": error, **facts}

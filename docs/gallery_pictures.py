@@ -6,6 +6,8 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.show.motions.overlays import tint
+
 FRAMES = 50
 INKS = ("#4c78a8", "#e0912f", "#5f9e6e", "#b0557a", "#7a6fb0", "#8a8a3c", "#3d9aa8", "#a86b4c", "#6b7280")
 GROUND, PIN = "#c8ccd2", "#222222"
@@ -171,6 +173,38 @@ def sliding(place: np.ndarray, size: Sequence[float], *, seconds: float, walls: 
     return moving(bodies, lines, view=View(-75.0, 18.0), seconds=seconds)
 
 
+def bending(
+    places: np.ndarray, cells: np.ndarray, values: np.ndarray, said: str, unit: str, *, view: View, seconds: float
+) -> str:
+    """A shell whose faces (k, 4) have the colours of values (n, k), at places (n, m, 3), with a bar of the colours.
+
+    The far faces are drawn first, in the order of the first frame.
+    """
+    seen = places @ view.axes().T
+    corners = seen[:, cells]
+    flat = corners[..., :2]
+    low, high = flat.min(axis=(0, 1, 2)), flat.max(axis=(0, 1, 2))
+    scale = min(480.0 / (high[0] - low[0]), 260.0 / (high[1] - low[1]))
+    shown = np.stack([10.0 + scale * (flat[..., 0] - low[0]), 10.0 + scale * (high[1] - flat[..., 1])], axis=-1)
+    wide, tall = 20.0 + scale * (high - low)
+    inks = ["#{:02x}{:02x}{:02x}".format(*tint(share)) for share in np.linspace(0.0, 1.0, 65)]
+    shares = np.rint(64.0 * values / values.max()).astype(int)
+    parts = [
+        _polygon(shown[:, k], inks[shares[0, k]], "#2b2f36", seconds, [inks[share] for share in shares[:, k]])
+        for k in np.argsort(corners[0, :, :, 2].mean(axis=1))
+    ]
+    stops = "".join(f'<stop offset="{k / 8:g}" stop-color="{inks[8 * k]}"/>' for k in range(9))
+    left, style = 0.5 * wide - 60.0, 'font-family="system-ui,sans-serif" font-size="12" fill="#1a1a1a"'
+    parts.append(f'<defs><linearGradient id="bar">{stops}</linearGradient></defs>')
+    parts.append(f'<rect x="{left:.0f}" y="{tall + 6:.0f}" width="120" height="10" fill="url(#bar)"/>')
+    words = ((left - 6.0, "end", f"{said} 0"), (left + 126.0, "start", f"{values.max():.3g} {unit}"))
+    parts += [
+        f'<text x="{x:.0f}" y="{tall + 15:.0f}" text-anchor="{at}" {style}>{text}</text>' for x, at, text in words
+    ]
+    size = f'viewBox="0 0 {wide:.0f} {tall + 24:.0f}" width="{wide:.0f}" height="{tall + 24:.0f}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{"".join(parts)}</svg>'
+
+
 def _point(sol: Any, body: str, at: np.ndarray) -> np.ndarray:
     if body == "ground":
         return np.broadcast_to(np.asarray(at, dtype=float), (len(sol.t), 3))
@@ -198,10 +232,10 @@ def _words(points: np.ndarray) -> list[str]:
     return [" ".join(f"{x:.1f},{y:.1f}" for x, y in frame) for frame in points]
 
 
-def _polygon(points: np.ndarray, fill: str, stroke: str, seconds: float) -> str:
-    frames = _words(points)
+def _polygon(points: np.ndarray, fill: str, stroke: str, seconds: float, fills: Sequence[str] = ()) -> str:
+    frames, turning = _words(points), _values(fills, seconds, "fill") if fills else ""
     style = f'fill="{fill}" stroke="{stroke}" stroke-width="0.7" stroke-linejoin="round"'
-    return f'<polygon points="{frames[0]}" {style}>{_values(frames, seconds, "points")}</polygon>'
+    return f'<polygon points="{frames[0]}" {style}>{_values(frames, seconds, "points")}{turning}</polygon>'
 
 
 def _polyline(points: np.ndarray, seconds: float) -> str:

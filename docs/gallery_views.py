@@ -6,9 +6,14 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
-from gallery_pictures import View, moving_scene, sliding
+import numpy as np
+from gallery_pictures import View, bending, moving_scene, sliding
 from live_pages import file_of
 
+from ephs.mechanics.elements.shell import statics
+from ephs.mechanics.elements.shell.mesh import grid
+from ephs.mechanics.elements.shell.section import ShellSection
+from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.motion.inside import Inside
 from examples.gallery import UNTIL, entries
 
@@ -55,6 +60,38 @@ SYSTEMS: dict[str, Callable[[Any], str]] = {
     "motor and crank": partial(_engine, "motor_crank"),
     "gas engine": partial(_engine, "gas_engine"),
 }
+
+
+def snapping() -> str:
+    """A flat roof, hinged along two sides, that a force in its middle presses through, as SVG; symmetry is used."""
+    radius, half, x, y, z = 2540.0, 254.0, 3, 4, 5  # mm, N, MPa
+
+    def roof(u: Any, v: Any) -> Any:
+        return radius * np.sin(0.1 * u), half * v, radius * np.cos(0.1 * u)
+
+    points, where, cells = grid(roof, (4, 4))
+    section = ShellSection.isotropic(thickness=12.7, E=3102.75, nu=0.3)
+    shell = Shell.of(points, cells, section, normals=points * [1.0, 0.0, 1.0])
+    free, load = np.ones((len(points), 6), dtype=bool), np.zeros((len(points), 6))
+    for side, held in (
+        (where[:, 0] == 1.0, [0, 2, x, y, z]),
+        (where[:, 0] == 0.0, [1, 2, x]),
+        (where[:, 1] == 0.0, [0, 2, y]),
+    ):
+        free[np.ix_(side, held)] = False
+    load[0, z] = -250.0
+    low = radius - 30.0
+    path = statics.follow(shell, load, free, until=10.0, step=0.1, stop=lambda share, poses: poses[0, 6] < low)
+    there = np.linspace(0.0, len(path.poses) - 1.0, 20).astype(int)
+    poses = path.poses[[*there, *there[::-1]]]
+    signs = [np.array([one, other, 1.0]) for one in (1.0, -1.0) for other in (1.0, -1.0)]
+    whole = np.concatenate([poses[..., 4:] * sign for sign in signs], axis=1)
+    faces = np.concatenate([cells + k * len(points) for k in range(4)])
+    stored = np.array([shell.energy(at) / shell.areas for at in poses])  # N/mm is kJ/m²
+    middle = whole - [0.0, 0.0, radius]
+    return bending(
+        middle, faces, np.tile(1e3 * stored, 4), "strain energy", "J/m²", view=View(-60.0, 24.0), seconds=6.0
+    )
 
 
 def shown(name: str) -> None:

@@ -117,7 +117,7 @@ def test_animate_makes_a_page_of_a_result_folder(tmp_path, capsys):
     folder, page = tmp_path / "out", tmp_path / "pages" / "film.html"
     assert main(["run", str(ROOT / "scenes/slider-crank.toml"), "--until", "0.1", "--out", str(folder)]) == 0
     capsys.readouterr()
-    assert main(["animate", str(folder), "-o", str(page), "--wrenches", "--heat", "--fps", "10"]) == 0
+    assert main(["animate", str(folder), "-o", str(page), "--wrenches", "--colour", "temperature", "--fps", "10"]) == 0
     assert capsys.readouterr().out.strip() == str(page)
     text = page.read_text(encoding="utf-8")
     assert "<title>slider-crank</title>" in text and "force on body 2" in text

@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_800,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 404_200,
+    "ephs/mechanics": 405_300,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_400,
     "ephs/semantics": 193_400,
-    "ephs/show": 62_900,
+    "ephs/show": 65_200,
     "ephs/solve": 123_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 553_100,
+    "tests": 557_000,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

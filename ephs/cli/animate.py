@@ -16,8 +16,7 @@ def animate(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     wrenches: Flag = False,
-    heat: Flag = False,
-    strain: Flag = False,
+    colour: str | None = None,
     fps: float = 30.0,
     duration: float | None = None,
 ) -> int:
@@ -30,11 +29,10 @@ def animate(
     output
         Page to write, FILE.html, or video: FILE.gif, or FILE.mp4 or FILE.webm, which need ffmpeg.
     wrenches
-        Draw joint forces and moments, and contact forces, as arrows; pages only, as the next two.
-    heat
-        Colour bodies by the temperature of their thermal nodes.
-    strain
-        Colour beams by their strain energy per length, where heat is not asked for.
+        Draw joint forces and moments, and contact forces, as arrows; pages only.
+    colour
+        Show by colour: temperature (of thermal nodes), energy (strain of beams and shells), or the size of a force or
+        moment of shells: membrane, moment, shear.
     fps
         Frames a second.
     duration
@@ -49,15 +47,13 @@ def animate(
     if output.suffix not in (".html", *VIDEOS):
         expected = ", ".join((".html", *VIDEOS))
         raise BadInput(TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=expected))
-    overlays = {"wrenches": wrenches, "heat": heat, "strain": strain}
-    drawn = next((name for name, asked in overlays.items() if asked), None)
-    if output.suffix in VIDEOS and drawn is not None:
-        raise BadInput(f"--{drawn}: found a video, {output}, expected a page, FILE.html; leave the option out")
+    if output.suffix in VIDEOS and wrenches:
+        raise BadInput(f"--wrenches: found a video, {output}, expected a page, FILE.html; leave the option out")
     sol = solution_of(folder)
     with addressed(str(folder), output):
         if output.suffix in VIDEOS:
-            write_video(sol, output, fps=fps, duration=duration)
+            write_video(sol, output, colour=colour, fps=fps, duration=duration)
         else:
-            animated(sol, output, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)
+            animated(sol, output, wrenches=wrenches, colour=colour, fps=fps, duration=duration)
     Console().print(str(output), highlight=False, markup=False, soft_wrap=True)
     return 0

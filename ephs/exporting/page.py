@@ -13,6 +13,7 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import webassembly
 from ephs.exporting.module import exported
+from ephs.mechanics.motion.shells import nodes_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.model import Scene
@@ -55,8 +56,8 @@ def live_page(
     made = exported(image_of(scene, inputs=inputs, parameters=chosen, until=until), "live")
     times = np.linspace(0.0, until, round(FRAMES * until) + 1)
     solution = simulate(scene, until, method="rk87", save_at=times, audit="off")
-    stage = stage_of(solution, wrenches=False, heat=False, fps=FRAMES, duration=until)
-    places = {each.name: each.place for each in made.outputs}
+    stage = stage_of(solution, fps=FRAMES, duration=until)
+    places, nodes = {each.name: each.place for each in made.outputs}, nodes_of(scene)
     scalar = [each for each in made.outputs if each.name.endswith(".coordinate")][:CURVES]
     curves = [
         {"name": each.name, "at": each.place, "panel": "coordinates [rad, m]", "colour": CYCLE[k % len(CYCLE)]}
@@ -75,7 +76,7 @@ def live_page(
         "bytes": made.bytes,
         "outputs": len(made.outputs),
         "times": stage.frames.times.tolist(),
-        "poses": [places[f"{component_path('bodies', name)}.quaternion.w"] for name in stage.bodies],
+        "poses": [places[f"{nodes.get(name, component_path('bodies', name))}.quaternion.w"] for name in stage.bodies],
         "curves": [*curves, energy],
         "panels": list(dict.fromkeys(str(curve["panel"]) for curve in (*curves, energy))),
         "parameters": [_slider(each, _span(each)) for each in made.parameters],

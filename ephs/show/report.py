@@ -10,6 +10,7 @@ import numpy as np
 
 from ephs.show.diagrams.kept import pattern_svg
 from ephs.show.motions.player import player
+from ephs.show.motions.sheets import sheets_of
 from ephs.show.motions.stage import stage_of
 from ephs.show.motions.still import still_svg
 from ephs.show.plots.balances import balances
@@ -188,8 +189,8 @@ def _animation(sol: Any) -> str:
     if sol.outline is None:
         return ""
     warm = any(True for _ in sol.outline.all_thermal())
-    bent = any(True for _ in sol.outline.all_beams())
-    stage = stage_of(sol, wrenches=False, heat=warm, strain=bent, fps=30.0, duration=None)
+    bent = any(True for _ in sol.outline.all_beams()) or bool(sheets_of(sol.outline))
+    stage = stage_of(sol, colour="temperature" if warm else "energy" if bent else None, fps=30.0, duration=None)
     return f"<h2>Motion</h2>{player(stage, str(sol.name))}"
 
 

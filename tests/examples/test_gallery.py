@@ -2,7 +2,9 @@
 
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -60,6 +62,17 @@ def test_its_source_is_there(name):
     file, _, model = ENTRIES[name].source.partition(":")
     text = (ROOT / file).read_text(encoding="utf-8")
     assert (f"{model} = " in text) if model else text.startswith(("# ", "<?xml"))
+
+
+def test_the_snapping_roof_turns_over_in_colours_that_a_bar_explains(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    picture = ElementTree.fromstring(import_module("gallery_views").snapping())
+    faces = [element for element in picture if element.tag.endswith("polygon")]
+    moves = [{each.attrib["attributeName"]: each.attrib["values"].split(";") for each in face} for face in faces]
+    assert len(faces) == 4 * 4 * 4 and all({"points", "fill"} <= move.keys() for move in moves)
+    assert all(move["points"][0] == move["points"][-1] for move in moves), "there and back"
+    words = [element.text for element in picture if element.tag.endswith("text")]
+    assert words[0] == "strain energy 0" and words[1].endswith(" J/m²")
 
 
 def turned(sol, body):

@@ -38,7 +38,7 @@ def watched(tab: Tab) -> tuple[np.ndarray, np.ndarray]:
     return first, second
 
 
-@pytest.mark.parametrize("options", [{}, {"wrenches": True, "heat": True}], ids=["plain", "loaded"])
+@pytest.mark.parametrize("options", [{}, {"wrenches": True, "colour": "temperature"}], ids=["plain", "loaded"])
 def test_the_mechanism_is_seen_and_moves_without_a_network(crank, tmp_path, options):
     page = animate(crank, tmp_path / "film.html", duration=3.0, **options)
     with opened(tmp_path / "film.html") as tab:

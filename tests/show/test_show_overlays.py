@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ephs
-from ephs.show import Page, animate
+from ephs.show import Page, ShowError, animate
 from ephs.show.motions.motion import between_instants, film, nearest
-from ephs.show.motions.overlays import heat_of, loads_of, tint
+from ephs.show.motions.overlays import Tones, loads_of, shades_of, tint
 from ephs.show.motions.solids import Solid, box, cylinder, solid_of, sphere
 from ephs.show.motions.stage import stage_of
 
@@ -136,14 +136,16 @@ def test_what_is_indeterminate_has_no_arrow():
 
 def test_glow_follows_the_temperature(tmp_path):
     sol = lamp(tmp_path)
-    heat = heat_of(sol, film(sol, ["lamp"], 30.0, None), ["hook"])
-    shares = [heat.share("hook", frame) for frame in range(31)]
-    assert shares[0] == 1.0 and all(np.diff(shares) < 0.0) and heat.share("environment", 0) == 0.0
+    (heat,) = shades_of(sol, film(sol, ["lamp"], 30.0, None), "temperature")
+    shares = heat.shares(heat.values["hook"])
+    assert shares[0] == 1.0 and all(np.diff(shares) < 0.0) and heat.values.keys() == {"hook"}
     assert (heat.low, heat.high) == (293.15, 310.0)
+    own = (1, 2, 3)
+    assert Tones((heat,), 0).of("hook", own) == tint(1.0) and Tones((heat,), 0).of("environment", own) == own
     assert [sum(tint(share)) for share in (0.0, 0.25, 0.5, 0.75, 1.0)] == sorted(
         sum(tint(share)) for share in (0.0, 0.25, 0.5, 0.75, 1.0)
     )
-    assert "310.00 K" in legend(animate(sol, heat=True))
+    assert "310.00 K" in legend(animate(sol, colour="temperature"))
 
 
 @given(PARTS, PARTS, PARTS)
@@ -221,10 +223,14 @@ def test_strain_energy_is_a_colour(tmp_path):
     file = tmp_path / "bent.toml"
     file.write_text(BENT, encoding="utf-8")
     sol = ephs.simulate(ephs.load(file), 0.1, method="radau", rtol=1e-4)
-    shown = stage_of(sol, wrenches=False, heat=False, strain=True, fps=20.0, duration=None).heat
+    (shown,) = stage_of(sol, colour="energy", fps=20.0, duration=None).shades
     wanted = sol.beam("rod").energy[-1] / 0.1
-    np.testing.assert_allclose([shown.temperatures[f"rod-{i + 1}"][-1] for i in range(6)], wanted, rtol=1e-12)
-    assert shown.temperatures["rod.1"][-1] == pytest.approx(0.5 * (wanted[0] + wanted[1]))
+    np.testing.assert_allclose([shown.values[f"rod-{i + 1}"][-1] for i in range(6)], wanted, rtol=1e-12)
+    assert shown.values["rod.1"][-1] == pytest.approx(0.5 * (wanted[0] + wanted[1]))
     assert shown.ends == ("0 J/m", f"{shown.high:.3g} J/m")
-    assert f"{shown.high:.3g} J/m" in sol.animate(strain=True).html
-    assert stage_of(sol, wrenches=False, heat=False, fps=20.0, duration=None).heat is None
+    assert f"{shown.high:.3g} J/m" in sol.animate(colour="energy").html
+    assert stage_of(sol, fps=20.0, duration=None).shades == ()
+    with pytest.raises(ShowError, match=r"'stress'.*temperature, energy, membrane, moment, shear"):
+        sol.animate(colour="stress")
+    with pytest.raises(ShowError, match="found no moment to show"):
+        sol.animate(colour="moment")

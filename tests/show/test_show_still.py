@@ -60,7 +60,7 @@ def test_the_outline_of_a_system_is_where_the_scene_is():
         )  # fmt: skip
         np.testing.assert_allclose(found.frame1, joint.frame1, atol=1e-12)
         np.testing.assert_allclose(found.frame2, joint.frame2, atol=1e-12)
-    own = stage_of(sol, wrenches=True, heat=False, fps=10.0, duration=None)
+    own = stage_of(sol, wrenches=True, fps=10.0, duration=None)
     for name, _ in scene.all_bodies():
         np.testing.assert_allclose(own.frames.poses[f"bodies.{name}"][-1, 4:], known.body(name).position[-1], atol=1e-6)
     assert own.loads is not None and own.size() > 1.0

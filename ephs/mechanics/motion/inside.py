@@ -8,6 +8,7 @@ import numpy as np
 from ephs.mechanics.motion.motion import BodyMotion, JointMotion, MarkerMotion, SceneMotion, ThermalMotion
 from ephs.mechanics.motion.moving import BoxMotion
 from ephs.mechanics.motion.reduced import motion_of
+from ephs.mechanics.motion.shells import ShellMotion
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.result.labels import Labels
@@ -58,7 +59,7 @@ class Inside:
     @property
     def outline(self) -> "Scene":
         """The drawn scene."""
-        return self.scene
+        return self._motion.outline()
 
     @property
     def freedoms(self) -> Mapping[str, Labels]:
@@ -81,6 +82,10 @@ class Inside:
     def thermal(self, name: str) -> ThermalMotion:
         """The temperature of a thermal node."""
         return self._motion.thermal(name)
+
+    def shell(self, name: str) -> ShellMotion:
+        """The motion of a shell: nodes, membrane and transverse forces, moments and energy."""
+        return self._motion.shell(name)
 
     def marker(self, name: str) -> MarkerMotion:
         """The motion of a marker: position and velocity in the world."""

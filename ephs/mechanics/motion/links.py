@@ -13,6 +13,7 @@ from ephs.mechanics.motion.motion import BodyMotion, JointMotion
 from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
+from ephs.mechanics.motion.shells import LinkedShell, ShellMotion, linked_shell_motion, shells_of_links
 from ephs.mechanics.scene.kinematics import AssemblyJoint
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
 from ephs.mechanics.scene.tree import Hop, spanning_hops
@@ -62,6 +63,21 @@ class LinkMotion:
         joint = self._joints[_known("joint", name, self._joints)]
         return JointMotion(self, name, self._solution[joint.state.path].reshape(-1, joint.pair.dim))
 
+    def shell(self, name: str) -> ShellMotion:
+        """Nodes and energies of the elements in a box, by its path; ``shell`` of those in no box.
+
+        Raises
+        ------
+        KeyError
+            There are none.
+        """
+        stored = self._solution.ledgers.storages
+        return linked_shell_motion(self._shells[_known("shell", name, self._shells)], self.poses, stored.__getitem__)
+
+    @cached_property
+    def _shells(self) -> dict[str, LinkedShell]:
+        return shells_of_links(self._frames)
+
     @property
     def freedoms(self) -> dict[str, Labels]:
         """Names and units of the coordinates of each joint, by the path of its box."""
@@ -85,11 +101,12 @@ class LinkMotion:
             ends = [(named[frame.link], frame.offset) for frame in (joint.first, joint.second)]
             if None not in (ends[0][0], ends[1][0]):
                 joints[name] = _drawn(name, joint, ends, np.array(self._solution[joint.state.path][0]))
-        return Scene(self._solution.name, World(), bodies, joints)
+        sheets: Any = self._shells
+        return Scene(self._solution.name, World(), bodies, joints, shells=sheets)
 
     def poses(self, name: str) -> Array:
-        """(n, 7) of a body."""
-        pose = self._links[name].pose
+        """(n, 7) of a body, or of the ground."""
+        pose = None if name == GROUND else self._links[name].pose
         return np.tile(SE3.identity(), (len(self._solution), 1)) if pose is None else self._solution[pose.path]
 
     def state(self, i: int) -> dict[Path, Array]:

@@ -19,7 +19,7 @@ from ephs.mechanics.motion.moving import ByPath, Moving
 from ephs.mechanics.motion.own_motion import OwnMotion, own_motion
 from ephs.mechanics.motion.readout import freedoms_of, summary, variables
 from ephs.mechanics.motion.reduced import motion_of
-from ephs.mechanics.motion.shells import ShellMotion, shell_motion, with_nodes
+from ephs.mechanics.motion.shells import ShellMotion, nodes_of, shell_motion, with_nodes
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import GROUND, Joint, Scene
@@ -152,11 +152,7 @@ class SceneMotion:
         self._joints = dict(scene.all_joints())
         self._implicit = dict(scene.implicit_joints())
         self._couplings = {name: coupling_of(joint) for name, joint in self._joints.items()}
-        self._nodes = {
-            f"{name.removesuffix(sheet.name)}{sheet.node(i)}": component_path("shells", name) / f"node{i}"
-            for name, sheet in scene.all_shells()
-            for i in sheet.free()
-        }
+        self._nodes = nodes_of(scene)
 
     @property
     def freedoms(self) -> Mapping[str, Labels]:

@@ -1,7 +1,7 @@
 """Shells: flat or slightly warped sheets between four corners, in elements whose nodes are bodies."""
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, final
+from collections.abc import Mapping
+from typing import Annotated, final
 
 import numpy as np
 from pydantic import Field
@@ -12,6 +12,7 @@ from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.system import shell_system
 from ephs.mechanics.scene.custom import Element, key
 from ephs.mechanics.scene.element import ENVIRONMENT, FREE_END, GROUND
+from ephs.mechanics.scene.faces import Faces
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import NonNegative, Number, Positive, Text, Vector
 from ephs.mechanics.scene.site import Site
@@ -91,19 +92,19 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         """Name of a node in pictures."""
         return f"{self.name}-node{number}"
 
-    def lines(self, site: Site) -> Iterator[tuple[str, Any, str, Any]]:
-        """Edges of its elements; where its nodes are no bodies, as they are at the start."""
+    def faces(self, site: Site) -> Faces:
+        """Its elements; of a scene whose nodes are no bodies where these are at the start."""
         shell, welded = self.shell(), {node: body for body, nodes in self.welds().items() for node in nodes}
         bodies = {name for name, _ in site.scene.all_bodies()}
-        ways = np.stack([shell.cells, np.roll(shell.cells, -1, axis=1)], axis=2).reshape(-1, 2)
 
         def end(i: int) -> tuple[str, Array]:
             body, at = welded.get(i, self.node(i)), shell.points[i]
-            own = SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:] if body in bodies else at
-            return body if body in bodies else GROUND, own
+            if body not in bodies:
+                return GROUND, at
+            return body, SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:]
 
-        for one, two in np.unique(np.sort(ways, axis=1), axis=0).tolist():
-            yield *end(one), *end(two)
+        ends = tuple(end(i) for i in range(len(shell.points)))
+        return Faces(ends, shell.cells, frozenset(map(self.node, self.free())))
 
     def build(self, site: Site) -> None:
         welds, warm = dict(self.welds()), site.heated(self.heat) if self.damping else {}

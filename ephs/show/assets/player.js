@@ -7,8 +7,9 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
   const times = floats(data.times), poses = floats(data.poses), middle = floats(data.middle);
   const count = times.length, bodies = data.names.length;
   for (const solid of data.solids) solid.vertices = floats(solid.vertices);
+  const drawn = data.solids.filter((solid) => solid.own);
   for (const arrow of data.arrows) { arrow.from = floats(arrow.from); arrow.to = floats(arrow.to); }
-  if (data.heat) for (const name in data.heat.shares) data.heat.shares[name] = floats(data.heat.shares[name]);
+  for (const values of [data.shades.shares, data.shades.faces]) for (const name in values) values[name] = floats(values[name]);
 
   // ---- controls
   const make = (tag, attributes = {}, text = "") => Object.assign(document.createElement(tag), attributes, { textContent: text });
@@ -31,7 +32,7 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
   bar.append(play, slider, clock, speed, ...Object.values(switches).map((s) => s.label), home);
   const key = make("div", { className: "key" });
   key.innerHTML = data.arrows.map((a) => `<b style="color:rgb(${a.colour})">→</b> ${a.label}`)
-    .concat(data.heat ? [`${data.heat.ends[0]} <span style="display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,${data.heat.scale.map((c) => `rgb(${c})`)})"></span> ${data.heat.ends[1]}`] : []).join("<br>");
+    .concat(data.shades.bars.map(({ said, ends }) => `${said} ${ends[0]} <span style="display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,${data.shades.scale.map((c) => `rgb(${c})`)})"></span> ${ends[1]}`)).join("<br>");
   host.append(canvas, key, bar);
   const context = canvas.getContext("2d");
   const is = (name) => switches[name]?.box.checked;
@@ -83,10 +84,11 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
 
   // ---- drawing
   const shade = (colour, factor) => `rgb(${colour.map((c) => Math.round(Math.min(255, c * factor)))})`;
+  const scaled = (share) => data.shades.scale[Math.round((data.shades.scale.length - 1) * Math.max(0, Math.min(1, share)))];
   function tinted(colour, node) {
-    const shares = data.heat?.shares[node];
+    const shares = data.shades.shares[node];
     if (!shares) return colour;
-    const share = shares[frame], warm = data.heat.scale[Math.round(16 * Math.max(0, Math.min(1, share)))], fade = Math.min(1, 10 * share);
+    const share = shares[frame], warm = scaled(share), fade = Math.min(1, 10 * share);
     return colour.map((c, n) => (1 - fade) * c + fade * warm[n]);
   }
   function path(points, close) {
@@ -109,6 +111,18 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
     }
     for (const stick of solid.sticks || []) line(stick, move, project, shade(solid.colour, 0.75), 0.016 * data.size, out);
     if (solid.axis) line(solid.axis, move, project, "rgb(198,58,40)", 0, out);
+  }
+  function bent(sheet, project, out) {
+    const world = sheet.ends.map(([body, at]) => mover(body)(...at)), at = world.map((p) => project(...p));
+    const values = data.shades.faces[sheet.shell], count = sheet.faces.length;
+    sheet.faces.forEach((face, k) => {
+      const [p, q, r, s] = face.map((n) => world[n]), corners = face.map((n) => at[n]);
+      const u = [r[0] - p[0], r[1] - p[1], r[2] - p[2]], w = [s[0] - q[0], s[1] - q[1], s[2] - q[2]];
+      const normal = [u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]];
+      const light = Math.abs(0.3 * normal[0] - 0.5 * normal[1] + 0.8 * normal[2]) / (Math.hypot(...normal) || 1);
+      const colour = values ? shade(scaled(values[frame * count + k]), 0.9 + 0.1 * light) : shade(sheet.colour, 0.72 + 0.3 * light);
+      out.push({ depth: corners.reduce((sum, corner) => sum + corner[2], 0) / 4, corners, fill: colour, edge: "rgba(20,24,30,.35)" });
+    });
   }
   function line(ends, move, project, stroke, width, out) {
     const a = project(...move(...ends.slice(0, 3))), b = project(...move(...ends.slice(3)));
@@ -137,13 +151,14 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
     context.clearRect(0, 0, canvas.width, canvas.height);
     context.lineJoin = context.lineCap = "round";
     ground(project);
-    if (is("traces")) for (let body = 0; body < bodies; body++) {
+    if (is("traces")) for (const { body, colour } of drawn) {
       const points = [];
       for (let n = 0; n < count; n++) { const at = 7 * (n * bodies + body) + 4; points.push(project(poses[at], poses[at + 1], poses[at + 2])); }
-      path(points); context.strokeStyle = `rgba(${data.solids[body].colour},.7)`; context.lineWidth = 1.3 * dots; context.stroke();
+      path(points); context.strokeStyle = `rgba(${colour},.7)`; context.lineWidth = 1.3 * dots; context.stroke();
     }
     const parts = [];
     for (const solid of data.solids) polygons(solid, project, parts);
+    for (const sheet of data.sheets) bent(sheet, project, parts);
     for (const spring of data.springs) {
       const [a, b] = spring.ends.map(([body, at]) => project(...mover(body)(...at)));
       parts.push({ depth: (a[2] + b[2]) / 2, corners: spring.coiled ? zigzag(a, b) : [a, b], stroke: shade(tinted([70, 76, 84], spring.heat), 1), width: 0 });
@@ -152,7 +167,7 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
     for (const part of parts) {
       path(part.corners, part.fill);
       if (part.fill) {
-        context.fillStyle = context.strokeStyle = part.fill; context.lineWidth = 0.7 * dots; context.fill(); context.stroke();
+        context.fillStyle = part.fill; context.strokeStyle = part.edge || part.fill; context.lineWidth = 0.7 * dots; context.fill(); context.stroke();
       } else {
         const one = project(0, 0, 0), metre = Math.hypot(project(0, 0, 1)[1] - one[1], project(1, 0, 0)[0] - one[0]);
         context.strokeStyle = part.stroke; context.lineWidth = Math.max(1.8 * dots, part.width * metre); context.stroke();
@@ -180,7 +195,7 @@ for (const host of document.querySelectorAll(".player:not([data-ready])")) {
     context.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
     context.textAlign = "center"; context.lineWidth = 3 * devicePixelRatio; context.strokeStyle = "#fff";
     const say = (text, p, ink) => { context.strokeText(text, p[0], p[1]); context.fillStyle = ink; context.fillText(text, p[0], p[1]); };
-    data.names.forEach((name, body) => say(name, project(...mover(body)(0, 0, 0)), "#1a1a1a"));
+    for (const { body } of drawn) say(data.names[body], project(...mover(body)(0, 0, 0)), "#1a1a1a");
     for (const solid of data.solids) if (solid.label) { const p = project(...mover(solid.body)(...solid.place)); say(solid.label, [p[0], p[1] - 12 * devicePixelRatio], "#6b7280"); }
   }
 

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.show.motions.motion import Array, best_side, between, frame_all, point_of
-from ephs.show.motions.overlays import GROUND, Arrows, Heat, tint
+from ephs.show.motions.overlays import GROUND, Arrows, Shades, Tones, tint
 from ephs.show.motions.player import player
 from ephs.show.motions.solids import held_at
 from ephs.show.motions.stage import Stage, stage_of
@@ -36,8 +36,7 @@ def animate(
     path: str | FilePath | None = None,
     *,
     wrenches: bool = False,
-    heat: bool = False,
-    strain: bool = False,
+    colour: str | None = None,
     fps: float = 30.0,
     duration: float | None = None,
     host: str = "127.0.0.1",
@@ -57,11 +56,10 @@ def animate(
     wrenches : bool
         Whether joint forces and moments on body 2, and contact forces on the second body, are drawn as arrows; none
         where a joint leaves them indeterminate.
-    heat : bool
-        Whether joints and springs glow by the temperature of the thermal node that takes their heat, and bodies by the
-        node of their name.
-    strain : bool
-        Whether beams are coloured by their strain energy per length, where `heat` is not asked for.
+    colour : str, optional
+        What is shown by colour: ``"temperature"``, of the thermal node that takes the heat of a joint, spring or shell,
+        or that has a body's name; ``"energy"``, strain energy of beams per length and of shells per area;
+        ``"membrane"``, ``"moment"`` or ``"shear"``, the size of that force or moment of shells of scenes.
     fps : float
         Frames a second of playing time.
     duration : float, optional
@@ -77,9 +75,10 @@ def animate(
     Raises
     ------
     ShowError
-        If the solution has no bodies, or no instants, viser is not installed, or `fps` or `duration` is not positive.
+        If the solution has no bodies, no instants or nothing of the colour, viser is not installed, or `fps` or
+        `duration` is not positive.
     """
-    stage = stage_of(sol, wrenches=wrenches, heat=heat, strain=strain, fps=fps, duration=duration)
+    stage = stage_of(sol, wrenches=wrenches, colour=colour, fps=fps, duration=duration)
     if find_spec("viser") is None:
         raise ShowError("viser")
     drawn = _Drawn(stage)
@@ -123,7 +122,7 @@ class _Drawn:
         _set(server, seen, np.concatenate([reaches, np.zeros(len(seen) - len(places))]), size, side)
         nodes: dict[str, Any] = {}
         warm: list[_Warm] = []
-        for index, name in enumerate(self.stage.bodies):
+        for index, name in enumerate(self.stage.solids):
             pose = self.stage.frames.poses[name][0]
             nodes[name] = server.scene.add_frame(_node(name), show_axes=False, wxyz=pose[:4], position=pose[4:])
             solid, opacity = self.stage.solids[name], None if self.stage.loads is None else THROUGH
@@ -135,16 +134,13 @@ class _Drawn:
         for name, joint in self.stage.joints.items():
             parent = "/ground" if joint.body1 == GROUND else _node(joint.body1)
             metal = add_joint(server, f"{parent}/joint {name}", joint, self.stage.symbol_size(joint, size))
-            warm += [_Warm(joint.heat, drawn, "color", METAL) for drawn in metal] if self.stage.heat else []
+            warm += [_Warm(joint.heat, drawn, "color", METAL) for drawn in metal]
         coils = {
             name: add_spring(server, f"/springs/{name}", size * spring.coiled)
             for name, spring in self.stage.springs.items()
         }
-        warm += [
-            _Warm(self.stage.springs[name].heat, coil, "colors", METAL)
-            for name, coil in coils.items()
-            if self.stage.heat
-        ]
+        warm += [_Warm(self.stage.springs[name].heat, coil, "colors", METAL) for name, coil in coils.items()]
+        sheets = self._sheets(server)
         arrows = self._arrows(server, size, shown)
         recording = server.get_scene_serializer()
         for frame in range(len(self.stage.frames.times)):
@@ -158,8 +154,9 @@ class _Drawn:
             for node, points in arrows:
                 node.points = points[frame]
             for each in warm:
-                if self.stage.heat is not None:
-                    each.glow(self.stage.heat, frame)
+                each.glow(self.stage.shades, frame)
+            for sheet in sheets:
+                sheet.bend(self.stage.shades, frame)
             # Only Python's own float will do here.
             recording.insert_sleep(float(self.stage.frames.pause))
         return str(recording.as_html())
@@ -174,13 +171,11 @@ class _Drawn:
                 rows.append(f"{arrow} {each.label}")
             if self.stage.loads.loose:
                 rows.append(f"indeterminate, so in part not drawn: {html.escape(', '.join(self.stage.loads.loose))}")
-        if self.stage.heat is not None and self.stage.heat.high > self.stage.heat.low:
+        for each in self.stage.shades:
             stops = ",".join("rgb({},{},{})".format(*tint(k / 8)) for k in range(9))
             bar = f"display:inline-block;width:7em;height:.7em;background:linear-gradient(90deg,{stops})"
-            low, high = self.stage.heat.ends
-            rows.append(f'{low} <span style="{bar}"></span> {high}')
-        elif self.stage.heat is not None:
-            rows.append(f"everything at {self.stage.heat.ends[0]}")
+            low, high = each.ends
+            rows.append(f'{each.said} {low} <span style="{bar}"></span> {high}')
         rows += [html.escape(solid.note) for solid in self.stage.solids.values() if solid.note]
         if not rows:
             return ""
@@ -189,6 +184,28 @@ class _Drawn:
             "background:rgba(255,255,255,.85);font:13px/1.6 system-ui,sans-serif;color:#1a1a1a;pointer-events:none"
         )
         return f'<div id="legend" style="{style}">{"<br>".join(rows)}</div>'
+
+    def _sheets(self, server: Any) -> "list[_Bent]":
+        """A mesh for each shell, or one for each element where these have colours of their own."""
+        found: list[_Bent] = []
+        for index, (name, sheet) in enumerate(self.stage.sheets.items()):
+            places = sheet.places(self.stage.frames.poses)
+            several = any(name in each.faces for each in self.stage.shades)
+            parts = [cell[None] for cell in sheet.cells] if several else [sheet.cells]
+            own = ink(len(self.stage.solids) + index)
+            for k, cells in enumerate(parts):
+                used, where = np.unique(cells, return_inverse=True)
+                corners = where.reshape(cells.shape)
+                mesh = server.scene.add_mesh_simple(
+                    f"/shells/{name.replace('/', '|')}/{k}",
+                    vertices=places[0, used].astype(np.float32),
+                    faces=np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]),
+                    color=own,
+                    side="double",
+                    flat_shading=several,
+                )
+                found.append(_Bent(name, k if several else None, mesh, places[:, used]))
+        return found
 
     @staticmethod
     def _arrows(server: Any, size: float, shown: Sequence[Arrows]) -> list[tuple[Any, Any]]:
@@ -225,17 +242,29 @@ class _Warm:
     name: str
     cold: Colour
 
-    def glow(self, heat: Heat, frame: int) -> None:
+    def glow(self, shades: tuple[Shades, ...], frame: int) -> None:
         """Colour it; unchanged colours are not repeated, which keeps the page small."""
-        share, before = heat.share(self.node, frame), heat.share(self.node, max(0, frame - 1))
-        if self.node in heat.temperatures and (frame == 0 or self._colour(share) != self._colour(before)):
-            setattr(self.drawn, self.name, self._colour(share))
+        now, before = (Tones(shades, k).of(self.node, self.cold) for k in (frame, max(0, frame - 1)))
+        if now != before or (frame == 0 and now != self.cold):
+            setattr(self.drawn, self.name, now)
 
-    def _colour(self, share: float) -> Colour:
-        # below a tenth the own colour fades into that of warm metal
-        fade = min(1.0, 10.0 * share)
-        red, green, blue = (round((1.0 - fade) * a + fade * b) for a, b in zip(self.cold, tint(share), strict=True))
-        return red, green, blue
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class _Bent:
+    """A mesh of a shell, or of one of its elements with its colour; places (n, m, 3) of its corners at n frames."""
+
+    shell: str
+    element: int | None
+    drawn: Any
+    places: Array
+
+    def bend(self, shades: tuple[Shades, ...], frame: int) -> None:
+        """Move its corners, and colour it."""
+        self.drawn.vertices = self.places[frame].astype(np.float32)
+        now, before = (Tones(shades, k).faces(self.shell) for k in (frame, max(0, frame - 1)))
+        if now and before and self.element is not None and (frame == 0 or now[self.element] != before[self.element]):
+            self.drawn.color = now[self.element]
 
 
 @contextlib.contextmanager

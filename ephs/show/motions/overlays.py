@@ -1,4 +1,4 @@
-"""Overlays of an animation: forces and moments of joints and forces of contacts as arrows, warmth as glow."""
+"""Overlays of an animation: forces and moments as arrows, temperatures and stresses as colour."""
 
 from dataclasses import dataclass
 from typing import Any, final
@@ -7,12 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.show.motions.motion import Array, Film, between_instants, nearest, point_of, rotate
+from ephs.show.motions.sheets import sheets_of
 from ephs.show.motions.symbols import METAL, Colour
+from ephs.show.shared.errors import ShowError
 
 ARROWS: dict[str, Colour] = {
     "force": (214, 51, 108), "moment": (112, 72, 232), "contact": (9, 146, 104), "slip": (245, 159, 0),
 }  # fmt: skip
 _WARM = np.array([METAL, (148, 46, 36), (226, 92, 28), (255, 172, 48), (255, 236, 170)], dtype=float)
+COLOURS = {
+    "temperature": "temperature", "energy": "strain energy", "membrane": "membrane force", "moment": "moment",
+    "shear": "transverse force",
+}  # fmt: skip
+"""What can be shown by colour, in words."""
 GROUND = "ground"
 NOISE = 1e-9
 """Forces and moments below this share of the other at the joints' arms, and of a millinewton, are rounding."""
@@ -72,16 +79,27 @@ class Loads:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Heat:
-    """Values shown by colour at the frames of a film: (m,) by thermal node or body, and their range.
+class Shades:
+    """Values shown by colour at the frames of a film, and their range.
 
-    Temperatures in K; or strain energy per length, in J/m, of beams.
+    Attributes
+    ----------
+    said, unit : str
+        What they are, and of which unit.
+    values : dict of str to (m,)
+        By thermal node, joint or body.
+    faces : dict of str to (m, n)
+        Of n elements, by shell.
+    low, high : float
+        The range.
     """
 
-    temperatures: dict[str, Array]
+    said: str
+    unit: str
+    values: dict[str, Array]
+    faces: dict[str, Array]
     low: float
     high: float
-    unit: str = "K"
 
     @property
     def ends(self) -> tuple[str, str]:
@@ -89,11 +107,33 @@ class Heat:
         form = ".2f" if self.unit == "K" else ".3g"
         return f"{self.low:{form}} {self.unit}", f"{self.high:{form}} {self.unit}"
 
-    def share(self, node: str, frame: int) -> float:
-        """Temperature of a node in the range, from 0 to 1; 0 without a node."""
-        if node not in self.temperatures or not self.high > self.low:
-            return 0.0
-        return float((self.temperatures[node][frame] - self.low) / (self.high - self.low))
+    def shares(self, values: Array) -> Array:
+        """Values in the range, from 0 to 1."""
+        return (values - self.low) / (self.high - self.low) if self.high > self.low else np.zeros_like(values)
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Tones:
+    """Colours of things at one frame."""
+
+    shades: tuple[Shades, ...]
+    frame: int
+
+    def of(self, name: str, own: Colour) -> Colour:
+        """Of a thermal node, joint or body; its own colour fades into that of warm metal below a tenth."""
+        shade = next((each for each in self.shades if name in each.values), None)
+        if shade is None:
+            return own
+        share = float(shade.shares(shade.values[name][self.frame]))
+        fade = min(1.0, 10.0 * share)
+        red, green, blue = (round((1.0 - fade) * a + fade * b) for a, b in zip(own, tint(share), strict=True))
+        return red, green, blue
+
+    def faces(self, shell: str) -> list[Colour] | None:
+        """Of the elements of a shell; None where they have no values."""
+        shade = next((each for each in self.shades if shell in each.faces), None)
+        return None if shade is None else [tint(share) for share in shade.shares(shade.faces[shell][self.frame])]
 
 
 def loads_of(sol: Any, frames: Film, joints: dict[str, Any]) -> Loads:
@@ -140,32 +180,81 @@ def _contacts(sol: Any, instants: NDArray[np.int64]) -> list[Arrows]:
     ]
 
 
-def heat_of(sol: Any, frames: Film, nodes: list[str]) -> Heat:
-    """Temperatures at the frames."""
-    t = np.asarray(sol.t, dtype=float)
-    values = {name: np.asarray(sol.thermal(name).temperature, dtype=float) for name in nodes}
-    found = {name: between_instants(t, frames.times, value) for name, value in values.items()}
+def shades_of(sol: Any, frames: Film, colour: str | None) -> tuple[Shades, ...]:
+    """What is shown by colour, one of `COLOURS`, or nothing.
+
+    Raises
+    ------
+    ShowError
+        There is no such choice, or the solution has nothing of it.
+    """
+    if colour is None:
+        return ()
+    if colour not in COLOURS:
+        raise ShowError("colour", found=colour, expected=", ".join(COLOURS))
+    if colour == "temperature":
+        return (_temperatures(sol, frames),)
+    found = (*(_strains(sol, frames) if colour == "energy" else ()), *_stresses(sol, frames, colour))
+    if not found:
+        raise ShowError("nothing", path=str(sol.name), found=f"{COLOURS[colour]} to show", expected="beams or shells")
+    return found
+
+
+def _temperatures(sol: Any, frames: Film) -> Shades:
+    """Of thermal nodes, of elements of beams with a store of their own, and of shells that of the node they warm."""
+    names = [name for name, _ in sol.outline.all_thermal()]
+    found = {name: _at(frames, sol, np.asarray(sol.thermal(name).temperature, dtype=float)) for name in names}
     for _, beam in sol.outline.all_beams():
         if all(joint in found for joint in beam.joints):
             found |= _at_nodes(beam, found)
     around = float(sol.outline.world.temperature)
     low = min([around, *(float(v.min()) for v in found.values())])
     high = max([around, *(float(v.max()) for v in found.values())])
-    return Heat(found, low, high)
+    sheets = sheets_of(sol.outline).items()
+    faces = {name: np.repeat(found[of.heat][:, None], len(of.cells), axis=1) for name, of in sheets if of.heat in found}
+    return Shades(COLOURS["temperature"], "K", found, faces, low, high)
 
 
-def strain_of(sol: Any, frames: Film) -> Heat:
-    """Strain energy per length at the frames: of the elements' joints, and of nodes the mean of those beside them."""
-    t, found = np.asarray(sol.t, dtype=float), dict[str, Array]()
+def _strains(sol: Any, frames: Film) -> tuple[Shades, ...]:
+    """Strain energy of beams per length: of the elements' joints, and of nodes the mean of those beside them."""
+    found: dict[str, Array] = {}
     for name, beam in sol.outline.all_beams():
         motion = sol.beam(name)
         lengths = [each.length for each in (sol.outline.joint(joint).strain for joint in beam.joints) if each]
-        along = motion.energy / np.array(beam.lengths or lengths)
-        found |= {
-            joint: between_instants(t, frames.times, row) for joint, row in zip(beam.joints, along.T, strict=True)
-        }
+        along = _at(frames, sol, motion.energy / np.array(beam.lengths or lengths))
+        found |= dict(zip(beam.joints, along.T, strict=True))
         found |= _at_nodes(beam, found)
-    return Heat(found, 0.0, max((float(v.max(initial=0.0)) for v in found.values()), default=0.0), "J/m")
+    return (Shades(f"{COLOURS['energy']} of beams", "J/m", found, {}, 0.0, _highest(found)),) if found else ()
+
+
+def _stresses(sol: Any, frames: Film, colour: str) -> tuple[Shades, ...]:
+    """Strain energy of shells per area at the first instant, or the size of a stress resultant."""
+    found: dict[str, Array] = {}
+    for name in sheets_of(sol.outline):
+        motion = sol.shell(name)
+        if colour == "energy":
+            corner = motion.position[0][motion.cells]
+            across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+            values = motion.energy / (0.5 * np.linalg.norm(across, axis=1))
+        else:
+            given = getattr(motion, colour)
+            twice = np.array([1.0, 1.0, 2.0])[: given.shape[2]]  # 12 and 21 are one number
+            values = np.sqrt(np.square(given) @ twice)
+        if not np.isnan(values).any():
+            found[name] = _at(frames, sol, values)
+    unit = {"energy": "J/m²", "moment": "N"}.get(colour, "N/m")
+    return (Shades(f"{COLOURS[colour]} of shells", unit, {}, found, 0.0, _highest(found)),) if found else ()
+
+
+def _at(frames: Film, sol: Any, values: Array) -> Array:
+    """Values (n,) or (n, k) of a solution at the frames."""
+    t = np.asarray(sol.t, dtype=float)
+    columns = [between_instants(t, frames.times, column) for column in values.reshape(len(t), -1).T]
+    return np.stack(columns, axis=1).reshape(len(frames.times), *values.shape[1:])
+
+
+def _highest(found: dict[str, Array]) -> float:
+    return max((float(v.max(initial=0.0)) for v in found.values()), default=0.0)
 
 
 def _at_nodes(beam: Any, of_elements: dict[str, Array]) -> dict[str, Array]:

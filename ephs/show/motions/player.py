@@ -3,6 +3,7 @@
 import base64
 import html
 import json
+from collections.abc import Iterable
 from importlib.resources import files
 from typing import Any
 
@@ -59,12 +60,19 @@ def _data(stage: Stage) -> dict[str, Any]:
         "size": size,
         "low": low,
         "way": best_side(points.reshape(-1, 3)).tolist(),
-        "solids": [_solid(k, name, stage, size) for k, name in enumerate(names)]
+        "solids": [_solid(k, name, stage, size) for k, name in enumerate(names) if name in stage.solids]
         + [part for name, joint in stage.joints.items() for part in _symbol(name, joint, names, stage, size)],
+        "sheets": [
+            {
+                "ends": _ends(sheet.ends, names), "faces": sheet.cells.tolist(), "shell": name,
+                "colour": list(ink(len(stage.solids) + k)),
+            }
+            for k, (name, sheet) in enumerate(stage.sheets.items())
+        ],
         "springs": [_spring(spring, names) for spring in stage.springs.values()],
         "arrows": _arrows(stage, size),
-        "heat": _heat(stage),
-    }
+        "shades": _shades(stage),
+    }  # fmt: skip
 
 
 def _solid(index: int, name: str, stage: Stage, size: float) -> dict[str, Any]:
@@ -76,7 +84,7 @@ def _solid(index: int, name: str, stage: Stage, size: float) -> dict[str, Any]:
         stick for point in held_at(name, stage.joints.values(), stage.springs.values()) if (stick := solid.stick(point))
     ]
     colour = MUTED if solid.kind == "stand-in" else ink(index)
-    return _entry(index, vertices, faces, colour, heat=name, sticks=[[*a, *b] for a, b in at])
+    return _entry(index, vertices, faces, colour, heat=name, own=True, sticks=[[*a, *b] for a, b in at])
 
 
 def _few(solid: Solid) -> tuple[Array, Any]:
@@ -135,10 +143,16 @@ def _entry(body: int, vertices: Array, faces: Any, colour: Any, **more: Any) -> 
 def _spring(spring: Any, names: list[str]) -> dict[str, Any]:
     ends = ((spring.body1, spring.at1), (spring.body2, spring.at2))
     return {
-        "ends": [[-1 if b == GROUND else names.index(b), np.asarray(at, dtype=float).tolist()] for b, at in ends],
+        "ends": _ends(ends, names),
         "heat": spring.heat,
         "coiled": spring.coiled,
     }
+
+
+def _ends(ends: Iterable[tuple[str, Any]], names: list[str]) -> list[Any]:
+    """Number of a body, −1 for the ground, and place in it, of each end."""
+    numbers = {GROUND: -1} | {name: k for k, name in enumerate(names)}
+    return [[numbers[body], np.asarray(at, dtype=float).tolist()] for body, at in ends]
 
 
 def _arrows(stage: Stage, size: float) -> list[dict[str, Any]]:
@@ -149,13 +163,11 @@ def _arrows(stage: Stage, size: float) -> list[dict[str, Any]]:
     ]
 
 
-def _heat(stage: Stage) -> dict[str, Any] | None:
-    heat = stage.heat
-    if heat is None or not heat.high > heat.low:
-        return None
-    shares = {name: _text((values - heat.low) / (heat.high - heat.low)) for name, values in heat.temperatures.items()}
-    scale = [list(tint(k / 16)) for k in range(17)]
-    return {"shares": shares, "scale": scale, "ends": heat.ends}
+def _shades(stage: Stage) -> dict[str, Any]:
+    shares = {name: _text(each.shares(row)) for each in stage.shades for name, row in each.values.items()}
+    faces = {name: _text(each.shares(rows)) for each in stage.shades for name, rows in each.faces.items()}
+    bars = [{"said": each.said, "ends": each.ends} for each in stage.shades]
+    return {"shares": shares, "faces": faces, "scale": [list(tint(k / 64)) for k in range(65)], "bars": bars}
 
 
 def _text(values: Any) -> str:

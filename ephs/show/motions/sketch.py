@@ -11,8 +11,10 @@ import numpy as np
 
 from ephs.show.motions.lines import lines_of
 from ephs.show.motions.motion import Array, best_side, point_of, rotate
+from ephs.show.motions.overlays import Tones
+from ephs.show.motions.sheets import DrawnShell, sheets_of
 from ephs.show.motions.solids import Solid, coarse, held_at, solids_of
-from ephs.show.motions.symbols import MUTED, ink
+from ephs.show.motions.symbols import MUTED, Colour, ink
 from ephs.show.shared.palette import GREY, INK, PAPER
 
 GROUND = "ground"
@@ -84,7 +86,13 @@ class Sketch:
         return points.min(axis=0), points.max(axis=0)
 
 
-def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None, extent: float | None = None) -> Sketch:
+def sketch(
+    scene: Any,
+    poses: dict[str, Array],
+    way: Array | None = None,
+    extent: float | None = None,
+    tones: Tones | None = None,
+) -> Sketch:
     """The schematic of a mechanism, seen from far off.
 
     Parameters
@@ -96,29 +104,36 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None, extent
     extent
         Of the mechanism in m, for the size of symbols, in frames of a film: these have no names and no scale bar. By
         default it is that of the mechanism at these poses.
+    tones
+        Colours of bodies and shells.
     """
     out = Sketch()
+    shown = Tones((), 0) if tones is None else tones
     joints, springs = dict(scene.all_joints()), lines_of(scene)
-    solids = solids_of(scene)
+    solids, sheets = solids_of(scene), sheets_of(scene)
     ends = {name: _ends(spring, poses) for name, spring in springs.items()}
     places = {name: point_of(poses.get(j.body1, _STILL), np.asarray(j.frame1)[4:]) for name, j in joints.items()}
-    corners = {name: poses[name][4:] + rotate(poses[name][:4], solid.vertices) for name, solid in solids.items()}
-    cloud = np.concatenate(
-        [*corners.values(), *(np.array(e) for e in ends.values()), *(p[None] for p in places.values())]
-    )
+    corners = [poses[name][4:] + rotate(poses[name][:4], solid.vertices) for name, solid in solids.items()]
+    faces = [sheet.places(poses) for sheet in sheets.values()]
+    points = [*corners, *faces, *(np.array(e) for e in ends.values()), *(p[None] for p in places.values())]
+    cloud = np.concatenate(points)
     view = _view(best_side(cloud) if way is None else way)
     size = extent or float(np.linalg.norm(np.ptp(cloud @ view[:, :2], axis=0))) or 1.0
-    order = sorted(solids, key=lambda name: float((corners[name] @ view[:, 2]).mean()))
-    for name in order:  # the far bodies first
-        solid, tone = solids[name], MUTED if solids[name].kind == "stand-in" else ink(list(solids).index(name))
-        fine = coarse(solid, size / DOTS)
-        faces, colours, edges = _surface(fine, corners[name] @ view, 0.4 + 0.6 * np.array(tone) / 255.0)
+    order = np.argsort([float((at @ view[:, 2]).mean()) for at in (*corners, *faces)], kind="stable")
+    for k in order:  # the far ones first
+        if k >= len(solids):
+            name, sheet = list(sheets.items())[k - len(solids)]
+            _draw_sheet(out, sheet, faces[k - len(solids)] @ view, shown.faces(name), ink(int(k)))
+            continue
+        name, solid = list(solids.items())[k]
+        tone = np.array(shown.of(name, MUTED if solid.kind == "stand-in" else ink(int(k)))) / 255.0
+        sides, colours, edges = _surface(coarse(solid, size / DOTS), corners[k] @ view, 0.4 + 0.6 * tone)
         for point in held_at(name, joints.values(), springs.values()):
             if stick := solid.stick(point):
                 across = (poses[name][4:] + rotate(poses[name][:4], np.array(stick))) @ view
-                out.line(across[:, :2], 2.0, 0.75 * np.array(tone) / 255.0)
-        for face, colour in zip(faces, colours, strict=True):
-            out.area(face, 0.4, colour, colour)
+                out.line(across[:, :2], 2.0, 0.75 * tone)
+        for side, colour in zip(sides, colours, strict=True):
+            out.area(side, 0.4, colour, colour)
         for edge in edges:
             out.line(edge, 0.7)
     for name, (start, end) in ends.items():
@@ -132,8 +147,7 @@ def sketch(scene: Any, poses: dict[str, Array], way: Array | None = None, extent
                 draw(out, joint, places[name] @ view, axis @ view, 0.022 * size)
     if extent is None:
         _bar(out, cloud @ view, size)
-        nodes = tuple(f"{shell}-node" for shell, _ in scene.all_shells())  # too many to be named
-        told = {name: poses[name][4:] @ view for name in solids if not name.startswith(nodes)}
+        told = {name: poses[name][4:] @ view for name in solids}
         _names(out, told, {n: p @ view for n, p in places.items()}, size)
     return out
 
@@ -170,6 +184,19 @@ def _surface(solid: Solid, at: Array, colour: Array) -> tuple[list[Array], list[
         if any(seen) and (not all(seen) or bent or len(normals) == 1):
             edges.append(at[[a, b], :2])
     return [face for _, face, _ in shown], [shade for _, _, shade in shown], edges
+
+
+def _draw_sheet(out: Sketch, sheet: DrawnShell, at: Array, colours: list[Colour] | None, own: Colour) -> None:
+    """The faces of a shell, the far ones first: shaded, or less so in colours that mean something."""
+    corner = at[sheet.cells]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    length = np.linalg.norm(normal, axis=1)
+    light = np.abs(normal @ (_LIGHT / np.linalg.norm(_LIGHT))) / np.where(length > 0.0, length, 1.0)
+    tones = 0.4 + 0.6 * np.array(own)[None] / 255.0 if colours is None else np.array(colours) / 255.0
+    deep = 0.4 if colours is None else 0.15
+    shades = tones * (1.0 - deep + deep * light[:, None])
+    for k in np.argsort(corner[..., 2].mean(axis=1), kind="stable"):
+        out.area(corner[k, :, :2], 0.5, shades[k], 0.7 * shades[k])
 
 
 def _ends(spring: Any, poses: dict[str, Array]) -> tuple[Array, Array]:

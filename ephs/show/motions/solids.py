@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ephs.mechanics.scene.text import MESHES
 from ephs.show.motions.motion import Array, equivalent_box, rotate
+from ephs.show.motions.sheets import sheets_of
 from ephs.show.shared.errors import ShowError
 
 MOST_MB = 100
@@ -125,12 +126,15 @@ def held_at(body: str, joints: Iterable[Any], springs: Iterable[Any]) -> list[Ar
 
 
 def solids_of(scene: Any) -> dict[str, Solid]:
-    """The solids of a scene's bodies by name; those of their surfaces where bodies have no shapes."""
+    """The solids of a scene's bodies by name; those of their surfaces where bodies have none; no nodes of shells."""
+    nodes = {node for sheet in sheets_of(scene).values() for node in sheet.nodes}
     surfaces: dict[str, list[Any]] = {}
     for _, surface in scene.all_surfaces():
         surfaces.setdefault(surface.body, []).extend(_shapes_of(surface))
     found: dict[str, Solid] = {}
     for name, body in scene.all_bodies():
+        if name in nodes:
+            continue
         bare = body.shape is None and not body.shapes
         found[name] = solid_of(replace(body, shapes=tuple(surfaces[name])) if bare and name in surfaces else body, name)
     return found

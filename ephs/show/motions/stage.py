@@ -7,7 +7,8 @@ import numpy as np
 
 from ephs.show.motions.lines import BodyLine, lines_of
 from ephs.show.motions.motion import Array, Film, film, point_of
-from ephs.show.motions.overlays import GROUND, Heat, Loads, heat_of, loads_of, strain_of
+from ephs.show.motions.overlays import GROUND, Loads, Shades, loads_of, shades_of
+from ephs.show.motions.sheets import DrawnShell, sheets_of
 from ephs.show.motions.solids import Solid, solids_of
 from ephs.show.shared.errors import ShowError
 
@@ -15,7 +16,7 @@ from ephs.show.shared.errors import ShowError
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """A mechanism and its motion, prepared for drawing.
+    """A mechanism and its motion, prepared for drawing; nodes of shells are bodies without a surface.
 
     Attributes
     ----------
@@ -25,19 +26,22 @@ class Stage:
         Springs, and segments of tendons.
     solids : dict of str to Solid
         Surfaces of the bodies.
+    sheets : dict of str to DrawnShell
+        Faces of the shells.
     frames : Film
         Poses at even times.
-    loads, heat
-        Overlays, None where they are not drawn.
+    loads, shades
+        Arrows and colours; None, or empty, where they are not drawn.
     """
 
     joints: dict[str, Any]
     springs: dict[str, BodyLine]
     bodies: dict[str, Any]
     solids: dict[str, Solid]
+    sheets: dict[str, DrawnShell]
     frames: Film
     loads: Loads | None
-    heat: Heat | None
+    shades: tuple[Shades, ...]
 
     def pose_of(self, name: str) -> Array:
         """(n, 7) of a body or the ground."""
@@ -50,6 +54,7 @@ class Stage:
         ends = [(j.body1, np.asarray(j.frame1, dtype=float)[4:]) for j in self.joints.values()]
         ends += [(s.body1, np.asarray(s.at1, dtype=float)) for s in self.springs.values()]
         ends += [(s.body2, np.asarray(s.at2, dtype=float)) for s in self.springs.values()]
+        ends += [end for sheet in self.sheets.values() for end in sheet.ends]
         found += [(point_of(self.pose_of(body), at), 0.0) for body, at in ends]
         if not found:
             return np.zeros((len(self.frames.times), 1, 3)), np.zeros(1)
@@ -70,14 +75,14 @@ class Stage:
 
 
 def stage_of(
-    sol: Any, *, wrenches: bool, heat: bool, fps: float, duration: float | None, strain: bool = False
+    sol: Any, *, fps: float, duration: float | None, wrenches: bool = False, colour: str | None = None
 ) -> Stage:
-    """The stage of a solution.
+    """The stage of a solution; `colour` as of `shades_of`.
 
     Raises
     ------
     ShowError
-        If the solution has no bodies, or no instants, or `fps` or `duration` is not positive.
+        If the solution has no bodies, no instants or nothing of the colour, or `fps` or `duration` is not positive.
     """
     scene = sol.outline
     if scene is None:
@@ -94,9 +99,8 @@ def stage_of(
         lines_of(scene),
         bodies,
         solids_of(scene),
+        sheets_of(scene),
         frames,
         loads_of(sol, frames, joints) if wrenches else None,
-        heat_of(sol, frames, [name for name, _ in scene.all_thermal()])
-        if heat
-        else (strain_of(sol, frames) if strain else None),
+        shades_of(sol, frames, colour),
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.show.motions.motion import Array
+from ephs.show.motions.overlays import Shades, Tones, tint
 from ephs.show.motions.sketch import Sketch, SketchLabel, sketch
 from ephs.show.shared.palette import PAPER
 
@@ -20,18 +21,25 @@ POINT = 4.0 / 3.0
 """Pixels of a point."""
 THIN = 1e-12
 """Least ratio of a drawing's height and width: collinear marks have no extent across their line."""
+BAR = 0.6
+"""Width of all bars of colours, relative to the axes."""
 MARGIN = 24.0
 """Pixels about the marks of an SVG, for names."""
 
 
 def draw_still(
-    axes: "Axes", scene: Any, poses: dict[str, Array], way: Array | None = None, extent: float | None = None
+    axes: "Axes",
+    scene: Any,
+    poses: dict[str, Array],
+    way: Array | None = None,
+    extent: float | None = None,
+    tones: Tones | None = None,
 ) -> None:
     """Draw a mechanism into some axes; parameters as of `sketch`."""
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.patheffects import withStroke
 
-    made = sketch(scene, poses, way, extent)
+    made = sketch(scene, poses, way, extent, tones)
     for level, (filled, group) in enumerate(groupby(made.marks, key=lambda mark: mark.fill is not None)):
         marks = list(group)
         strokes: dict[str, Any] = {
@@ -62,6 +70,20 @@ def draw_still(
         style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": words.letter, "color": words.colour}
         at = (float(words.at[0]), float(words.at[1]))
         axes.annotate(words.text, at, shift, textcoords="offset points", zorder=9, **style).set_path_effects(halo)
+
+
+def draw_bars(axes: "Axes", shades: tuple[Shades, ...]) -> None:
+    """Draw a bar of colours with its range below some axes for each kind of values, in these axes."""
+    from matplotlib.colors import ListedColormap
+
+    colours = ListedColormap([[part / 255.0 for part in tint(k / 255)] for k in range(256)])
+    wide = BAR / max(1, len(shades))
+    for k, shade in enumerate(shades):
+        bar = axes.inset_axes((0.5 + (k - 0.5 * len(shades) + 0.15) * wide, 0.06, 0.7 * wide, 0.02))
+        bar.imshow(np.linspace(0.0, 1.0, 256)[None], aspect="auto", cmap=colours, extent=(0.0, 1.0, 0.0, 1.0))
+        bar.set(yticks=(), xticks=(0.0, 1.0), xticklabels=shade.ends)
+        bar.tick_params(length=0.0, labelsize=7.5)
+        bar.set_title(shade.said, fontsize=7.5, pad=3.0)
 
 
 def still_svg(scene: Any, poses: dict[str, Array]) -> str:

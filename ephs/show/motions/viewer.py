@@ -172,7 +172,7 @@ def _stage(scene: Scene) -> Stage:
     d = problem.descriptor
     x = d.pack(problem.initial)[None, :]
     record = RunRecord(np.zeros(1), x, np.zeros((1, len(d.components))), np.zeros((1, 5)))
-    return stage_of(solution_of(problem, record, {}), wrenches=False, heat=False, fps=1.0, duration=None)
+    return stage_of(solution_of(problem, record, {}), fps=1.0, duration=None)
 
 
 def _coordinates(joint: Joint) -> Array:

@@ -30,6 +30,7 @@ _TEXTS = {
         "body {path}: found shape {found}, expected one of box = [x, y, z], sphere = r, cylinder = [radius, length], "
         "mesh = FILE; correct its shape"
     ),
+    "colour": "colour: found {found!r}, expected one of {expected}; choose one of these",
     "plot": "plot: found kind {found!r}, expected one of {expected}; {path}",
     "nothing": "solution {path}: found no {found}, expected {expected}",
     "reference": (

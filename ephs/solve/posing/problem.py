@@ -163,6 +163,10 @@ class Outlined(Linked, Protocol):
         """Bodies and joints as a scene, to be drawn."""
         ...
 
+    def shell(self, name: str) -> Any:
+        """Motion of a shell."""
+        ...
+
 
 class MechanicalMotion(Outlined, Protocol):
     """A motion in terms of mechanics: the solver itself has only states, efforts and flows."""
@@ -181,10 +185,6 @@ class MechanicalMotion(Outlined, Protocol):
 
     def beam(self, name: str) -> Any:
         """Motion of a beam."""
-        ...
-
-    def shell(self, name: str) -> Any:
-        """Motion of a shell."""
         ...
 
     def contact_poses(self) -> Iterable[tuple[Path, Path | None, Array]]:

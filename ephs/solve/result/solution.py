@@ -275,8 +275,8 @@ class Solution:
         return self._moving("beams").beam(name)
 
     def shell(self, name: str) -> Any:
-        """The motion of a shell: nodes, membrane and transverse forces, moments and energy."""
-        return self._moving("shells").shell(name)
+        """The motion of a shell: nodes, energy, and of scenes membrane and transverse forces and moments."""
+        return (self.linked or self._moving("shells")).shell(name)
 
     def point(self, body: str, xyz: "ArrayLike") -> Array:
         """(n, 3) world position of a point of the body's frame."""
@@ -372,8 +372,8 @@ class Solution:
         path
             Where to write the page, if anywhere.
         options
-            Those of `ephs.show.animate`: ``wrenches=True`` draws joint forces and moments as arrows, ``heat=True``
-            colours what thermal nodes warm, ``fps`` and ``duration`` say how it plays.
+            Those of `ephs.show.animate`: ``wrenches=True`` draws joint forces and moments as arrows,
+            ``colour="temperature"`` or ``"energy"`` colours parts, ``fps`` and ``duration`` say how it plays.
         """
         from ephs.show import animate
 

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 RELATIVE = quantity.relative_pose("free")
 ROUNDING = 24 * 24 * float(np.finfo(float).eps)
 """Of the eigenvalues of K, relative to the largest: it is a product, summed over 24 numbers twice."""
+SPRING = "shell_spring"
+"""Name of the storage of an element."""
 OTHERS = (2, 3, 4)
 """Corners whose poses are relative to that of corner 1."""
 
@@ -56,9 +58,9 @@ def shell_spring(rest: Array, stiffness: Array) -> Storage:
         An array of a wrong shape, a number that is not finite, or K is not symmetric and non-negative.
     """
     rest, k = _checked(rest, stiffness)
-    form = logarithm_form(EDGES, rest, k, "shell_spring")
+    form = logarithm_form(EDGES, rest, k, SPRING)
     return Storage(
-        "shell_spring",
+        SPRING,
         power_ports(**{f"q_{corner}": RELATIVE for corner in OTHERS}),
         energy=form.energy,
         gradient=form.gradient,

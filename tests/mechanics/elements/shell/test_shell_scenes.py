@@ -9,7 +9,6 @@ from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.system import shell_system
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
-from ephs.show.motions.lines import lines_of
 from tests.written import scene_of_text
 
 UNTIL = 0.05
@@ -145,23 +144,8 @@ def test_a_start_in_which_it_would_be_strained_is_refused():
     assert scene.with_state(rates={"held": 0.1}).shells == scene.shells
 
 
-def test_pictures_have_the_edges_of_its_elements_where_they_are():
-    """Ends of lines are places of nodes, at the start and at the end; of a scene without a run, those at the start."""
-    scene = hub()
-    run = ran(scene)
-    places = run.shell("skin").position
-    lines = lines_of(run.outline)
-    assert len(lines) == 3 * 3 + 2 * 4  # along the sides of 3 x 2 elements
-
-    def ends(line, k):
-        for body, at in ((line.body1, line.at1), (line.body2, line.at2)):
-            yield np.array(at) if body == "ground" else run.point(body, at)[k]
-
-    for k in (0, -1):
-        drawn = np.unique(np.round([end for line in lines.values() for end in ends(line, k)], 9), axis=0)
-        assert drawn == pytest.approx(np.unique(np.round(places[k], 9), axis=0), abs=2e-9)
-    still = lines_of(scene)
-    assert {body for line in still.values() for body in (line.body1, line.body2)} == {"ground", "hub"}
+def test_nodes_are_read_as_bodies():
+    run = ran(hub())
     assert run.body("skin-node11").velocity[-1] == pytest.approx(
         run.linked.twists["skin-node11"][-1, 3:] @ run.body("skin-node11").rotation[-1].T, abs=1e-12
     )
