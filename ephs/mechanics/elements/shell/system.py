@@ -13,6 +13,7 @@ import numpy as np
 
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.bodies import rigid_body
+from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.stiffness import EDGES
@@ -186,6 +187,7 @@ def shell_system(
     damping: float = 0.0,
     held: Sequence[int] = (),
     carried: "Mapping[str, tuple[ArrayLike, Sequence[int]]] | None" = None,
+    pinned: Sequence[int] = (),
     shared: Sequence[int] = (),
     heat: bool = False,
 ) -> System:
@@ -202,6 +204,8 @@ def shell_system(
     carried
         Nodes that are welded to other bodies: port of a body's momentum -> its pose (7,) in the world when the shell is
         without stress, and their numbers.
+    pinned
+        Held or carried nodes that turn freely: a spherical joint ``pin0`` …, by their number, is in place of the weld.
     shared
         Numbers of nodes whose momenta are ports ``p0`` …, by their number: for what else acts on them.
     heat
@@ -220,6 +224,8 @@ def shell_system(
         raise StructureError("parameter", "shell", key="section", found="no mass", expected="a density above 0")
     welded = {node: (port, np.asarray(pose, dtype=float)) for port, (pose, nodes) in bodies.items() for node in nodes}
     welded |= dict.fromkeys(held, ("p_ground", SE3.identity()))
+    if wrong := [node for node in pinned if node not in welded]:
+        raise StructureError("parameter", "shell", key="pinned", found=wrong, expected="held or carried nodes")
     momentum, unit = quantity.body_momentum, np.array([1.0, 0.0, 0.0, 0.0])
     junctions = {f"p{i}": junction(momentum, exposed=i in shared) for i in range(count)}
     junctions |= {port: junction(momentum, exposed=True) for port in bodies}
@@ -227,7 +233,7 @@ def shell_system(
     parts: dict[str, System | Primitive] = {}
     for i, point in enumerate(shell.points):
         pose = np.concatenate([unit, point])
-        if i in welded:
+        if i in welded and i not in pinned:
             port, at = welded[i]
             boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
             parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
@@ -235,6 +241,10 @@ def shell_system(
             boxes[f"node{i}"] = {"p": f"p{i}"}
             body = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
             parts[f"node{i}"] = body.with_initial({"pe.q": pose})
+        if i in pinned:
+            port, at = welded[i]
+            boxes[f"pin{i}"] = {"p1": port, "p2": f"p{i}"}
+            parts[f"pin{i}"] = joint("spherical", SE3.compose(SE3.inverse(at), pose))
     if len(held):
         junctions["p_ground"] = junction(momentum)
         boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
