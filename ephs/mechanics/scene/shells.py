@@ -18,11 +18,14 @@ from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Flag, NonNegative, Number, Positive, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.scene.text import file_inside
+from ephs.operad import quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.spaces import SE3, translation
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
+PRESSURES = "pressures"
+"""First name of the outer ports at which the pressure acts on nodes."""
 CREASE = float(np.pi / 6.0)
 _MATERIAL = ("thickness", "E", "nu", "rho")
 _WAYS = ({"corners", "elements"}, {"points", "elements", "sides"}, {"file", "sides"})
@@ -75,6 +78,11 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         "direction in the world from which angles of layers count; default: the element's first axis", None
     )
     damping: NonNegative = key("Kelvin–Voigt time, {}", 0.0, unit="s")
+    pressure: Number | None = key(
+        'pressure below less that above, {}, along the normals as they turn; or the input "shells.NAME", in its place',
+        None,
+        unit="Pa",
+    )
     edges: list[Text] = key(
         'what each side is joined to, of a grid from the first corner to the second and so on: a body, "ground" or '
         '"free"; default: free',
@@ -233,6 +241,11 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         welded = {node for nodes in self.welds().values() for node in nodes}
         return [i for i in range(len(self.mesh().points)) if i not in welded]
 
+    def pushed(self) -> list[int]:
+        """Numbers of the nodes that move, where a pressure acts."""
+        still = self.welds().get(GROUND, [])
+        return [] if self.pressure is None else [i for i in range(len(self.mesh().points)) if i not in still]
+
     def node(self, number: int) -> str:
         """Name of a node in pictures."""
         return f"{self.name}-node{number}"
@@ -265,9 +278,12 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         }
         made = shell_system(
             self.shell(), gravity=site.gravity, damping=self.damping, held=[*ground[0], *ground[1]], carried=carried,
-            pinned=[node for nodes in pinned.values() for node in nodes], heat=bool(warm),
+            pinned=[node for nodes in pinned.values() for node in nodes], shared=self.pushed(), heat=bool(warm),
         )  # fmt: skip
-        site.add(made, {port: site.momentum(body) for port, body in zip(carried, bodies, strict=True)} | warm)
+        of, at = quantity.body_momentum, PRESSURES
+        pushes = {f"p{i}": site.input(of, 0.0, f"node{i}", at=at, effort=False, named=False) for i in self.pushed()}
+        ports = {port: site.momentum(body) for port, body in zip(carried, bodies, strict=True)}
+        site.add(made, ports | pushes | warm)
 
     def __str__(self) -> str:
         shell = self.shell()

@@ -16,7 +16,7 @@ from ephs.semantics.bundles.bundle import Array
 EDGES: Final = ((0, 1), (3, 2), (0, 3), (1, 2))
 """Corners that edges go from and to: along ξ at η = −1 and 1, along η at ξ = −1 and 1."""
 DRILL: Final = 0.2
-"""Stiffness of the turn about the normal, in parts of the mean one of membrane shear; below 0.03 soft, above 1 stiff."""
+"""Stiffness of the turn about the normal, in parts of the mean of membrane shear; below 0.03 soft, above 1 stiff."""
 RESIDUAL: Final = 0.1
 """Part of the residual flexibility of bending in that of transverse shear."""
 _SENSES = np.array([1.0, -1.0, -1.0, 1.0])
