@@ -78,6 +78,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         "direction in the world from which angles of layers count; default: the element's first axis", None
     )
     damping: NonNegative = key("Kelvin–Voigt time, {}", 0.0, unit="s")
+    spread: Flag = key("nodes turn about the normal with the inertia of elements' areas, for explicit methods", False)
     pressure: Number | None = key(
         'pressure below less that above, {}, along the normals as they turn; or the input "shells.NAME", in its place',
         None,
@@ -279,6 +280,7 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         made = shell_system(
             self.shell(), gravity=site.gravity, damping=self.damping, held=[*ground[0], *ground[1]], carried=carried,
             pinned=[node for nodes in pinned.values() for node in nodes], shared=self.pushed(), heat=bool(warm),
+            spread=self.spread,
         )  # fmt: skip
         of, at = quantity.body_momentum, PRESSURES
         pushes = {f"p{i}": site.input(of, 0.0, f"node{i}", at=at, effort=False, named=False) for i in self.pushed()}

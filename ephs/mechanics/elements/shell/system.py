@@ -190,6 +190,7 @@ def shell_system(
     pinned: Sequence[int] = (),
     shared: Sequence[int] = (),
     heat: bool = False,
+    spread: bool = False,
 ) -> System:
     """A shell that moves: bodies ``node0`` … at its points, and elements ``element0`` … between them.
 
@@ -210,6 +211,8 @@ def shell_system(
         Numbers of nodes whose momenta are ports ``p0`` …, by their number: for what else acts on them.
     heat
         The heat of damping leaves through a port s.
+    spread
+        Inertia of nodes about the normal of `Shell.tensors`: for explicit methods, which may take longer steps.
 
     Raises
     ------
@@ -217,6 +220,7 @@ def shell_system(
         The section has no mass, or a node is not one of the shell's.
     """
     count, inertia, bodies = len(shell.points), shell.inertia, dict(carried or {})
+    tensors = shell.tensors(spread=spread)
     for key, nodes in (("held", held), ("shared", shared), *((port, nodes) for port, (_, nodes) in bodies.items())):
         if wrong := [node for node in nodes if not 0 <= node < count]:
             raise StructureError("parameter", "shell", key=key, found=wrong, expected=f"nodes of 0 … {count - 1}")
@@ -239,7 +243,7 @@ def shell_system(
             parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
         else:
             boxes[f"node{i}"] = {"p": f"p{i}"}
-            body = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
+            body = rigid_body(float(inertia[i, 3]), tensors[i], gravity, strict=not spread)
             parts[f"node{i}"] = body.with_initial({"pe.q": pose})
         if i in pinned:
             port, at = welded[i]
