@@ -18,11 +18,11 @@ from ephs.solve.posing.problem import Signal, State
 
 def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> dict[Path, Signal]:
     """Wrenches on the nodes of a shell, in their axes, at their outer ports; of a pressure in Pa."""
-    shell, at = sheet.shell(), component_path("shells", name)
+    shell, start, at = sheet.shell(), sheet.start()[0], component_path("shells", name)
     welded = {node: body for body, nodes in sheet.welds().items() for node in nodes}
 
     def reading(node: int) -> Callable[[State], Array]:
-        rest = shell.poses[node]
+        rest = start[node]
         if node not in welded:
             free = at / f"node{node}" / "pe" / "q"
             return lambda state: state[free]

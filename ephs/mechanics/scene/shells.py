@@ -36,6 +36,10 @@ _Cells = list[Annotated[list[_Node], Field(min_length=3, max_length=4)]]
 _GRID, _CELLS, _NODES, _NAME = TypeAdapter(_Grid), TypeAdapter(_Cells), TypeAdapter(list[_Node]), TypeAdapter(Text)
 
 
+_Pose = Annotated[list[Number], Field(min_length=7, max_length=7)]
+_Twist = Annotated[list[Number], Field(min_length=6, max_length=6)]
+
+
 def _elements(value: Any, _handler: Any) -> Any:
     if value is None:
         return None
@@ -53,7 +57,7 @@ Side = Annotated[Any, WrapValidator(_side, json_schema_input_type=Text | list[_N
 
 @final
 class ShellSheet(Element, section="shells", said="sheets that bend and stretch"):
-    """A shell of one section on a grid or a mesh, without stress and at rest at the start."""
+    """A shell of one section on a grid or a mesh, without stress and at rest where its points say nothing else."""
 
     corners: Annotated[list[Vector], Field(min_length=4, max_length=4)] | None = key(
         "of a grid: in the world, one after the other around the normal, m", None, frame="grounds"
@@ -94,6 +98,10 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         "whether each side is pinned, so that its points are held and turn freely; default: welded", []
     )
     heat: Text = key("where the heat of damping goes: a thermal node", ENVIRONMENT, names="node")
+    nodes: list[_Pose] | None = key(
+        "poses of its points at the start, quaternion and m, in the world; default: without stress", None
+    )
+    twists: list[_Twist] | None = key("of its points at the start, in their axes, rad/s and m/s; default: 0", None)
     _read: SheetMesh | None = PrivateAttr(None)
 
     @rule(
@@ -123,10 +131,12 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         """Whether it is on one grid or mesh, of elements of a shell."""
         try:
             self._read = self._meshed()
-            counts = {"edges": len(self.edges), "pinned": len(self.pinned)}
-            for at, count in counts.items():
-                if count not in (0, wanted := len(self._read.sides)):
-                    raise MeshError(at, f"{count} entries", f"{wanted} entries, one for each side")
+            sides, points = (len(self._read.sides), "side"), (len(self._read.points), "point")
+            for at, (count, each) in {"edges": sides, "pinned": sides, "nodes": points, "twists": points}.items():
+                if (given := getattr(self, at)) and len(given) != count:
+                    raise MeshError(at, f"{len(given)} entries", f"{count} entries, one for each {each}")
+            if not all(any(pose[:4]) for pose in self.nodes or ()):
+                raise MeshError("nodes", "a quaternion 0", "quaternions of rotations")
             if self.made_of.holds(self) is True and self.layered.holds(self) is True:
                 self.shell()
         except MeshError as error:
@@ -196,12 +206,34 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
     def moved(self, pose: Array) -> Self:
         found = super().moved(pose)
         turned = None if self.along is None else (quaternion_to_matrix(pose[:4]) @ self.along).tolist()
-        return found.changed(along=turned)
+        nodes = None if self.nodes is None else [SE3.compose(pose, np.array(node)).tolist() for node in self.nodes]
+        return found.changed(along=turned, nodes=nodes)
 
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         found = super().rescaled(length, mass, time, coordinates)
         layers = None if self.layers is None else rescaled_layers(self.layers, length, mass, time)
-        return found.changed(layers=layers)
+        units = {"nodes": [1.0] * 4 + [length] * 3, "twists": [1.0 / time] * 3 + [length / time] * 3}
+        given = {name: getattr(self, name) for name in units}
+        state = {name: rows and (np.array(rows) * units[name]).tolist() for name, rows in given.items()}
+        return found.changed(layers=layers, **state)
+
+    def continued(self, states: Mapping[str, Array]) -> Self:
+        shell, (nodes, twists) = self.shell(), self.start()
+        tensors = shell.tensors(spread=self.spread)
+        for i in self.free():  # welded ones are where `carried` has them
+            nodes[i], momentum = states[f"node{i}.pe.q"], states[f"node{i}.ke.p"]
+            twists[i] = *np.linalg.solve(tensors[i], momentum[:3]), *(momentum[3:] / shell.inertia[i, 3:])
+        return self.changed(nodes=nodes.tolist(), twists=twists.tolist())
+
+    def carried(self, motions: Mapping[str, Array]) -> Self:
+        """With the points that are joined to bodies, by name, carried by motions (7,) of these in the world."""
+        nodes, _ = self.start()
+        for pinned in (False, True):
+            for body, own in self.joined(pinned=pinned).items():
+                for i in own if body in motions else ():
+                    moved = SE3.compose(motions[body], nodes[i])
+                    nodes[i] = np.concatenate([nodes[i, :4], moved[4:]]) if pinned else moved
+        return self.changed(nodes=nodes.tolist())
 
     # ---- what it is ----------------------------------------------------------------------------------------------
 
@@ -222,6 +254,12 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         """Its mesh without stress."""
         mesh = self.mesh()
         return Shell.of(mesh.points, mesh.cells, self.stack(), crease=self.crease, along=self.along)
+
+    def start(self) -> tuple[Array, Array]:
+        """(m, 7) poses and (m, 6) twists of its points at the start."""
+        poses = self.shell().poses if self.nodes is None else np.array(self.nodes)
+        poses[:, :4] /= np.linalg.norm(poses[:, :4], axis=1, keepdims=True)
+        return poses, np.zeros((len(poses), 6)) if self.twists is None else np.array(self.twists)
 
     def joined(self, *, pinned: bool) -> Mapping[str, list[int]]:
         """Body, or the ground -> numbers of the nodes that are pinned or welded to it; of several the first side's."""
@@ -253,12 +291,13 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
 
     def lines(self, site: Site) -> Iterator[tuple[str, Any, str, Any]]:
         """Edges of its elements; where its nodes are no bodies, as they are at the start."""
-        shell, welded = self.shell(), {node: body for body, nodes in self.welds().items() for node in nodes}
+        cells, places = self.mesh().cells, self.start()[0][:, 4:]
+        welded = {node: body for body, nodes in self.welds().items() for node in nodes}
         bodies = {name for name, _ in site.scene.all_bodies()}
-        ways = np.stack([shell.cells, np.roll(shell.cells, -1, axis=1)], axis=2).reshape(-1, 2)
+        ways = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2)
 
         def end(i: int) -> tuple[str, Array]:
-            body, at = welded.get(i, self.node(i)), shell.points[i]
+            body, at = welded.get(i, self.node(i)), places[i]
             own = SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:] if body in bodies else at
             return body if body in bodies else GROUND, own
 
@@ -266,21 +305,24 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
             yield *end(one), *end(two)
 
     def build(self, site: Site) -> None:
-        warm, held, pinned = (
-            site.heated(self.heat) if self.damping else {},
-            dict(self.welds()),
-            self.joined(pinned=True),
-        )
-        ground = held.pop(GROUND, []), pinned.get(GROUND, [])
+        held, pinned = dict(self.welds()), self.joined(pinned=True)
+        warm = site.heated(self.heat) if self.damping else {}
+        ground = [*held.pop(GROUND, []), *pinned.get(GROUND, [])]
         bodies = [body for body in dict.fromkeys([*held, *pinned]) if body != GROUND]
         carried = {
             f"p_body{k}": (site.pose(body), [*held.get(body, []), *pinned.get(body, [])])
             for k, body in enumerate(bodies)
         }
+        poses, twists = self.start()
+        for body, nodes in pinned.items():  # they move with what carries them
+            spin, speed = np.split(site.twist(body), 2)
+            for i in nodes:
+                off = SE3.compose(SE3.inverse(site.pose(body)), poses[i])
+                twists[i, 3:] = quaternion_to_matrix(off[:4]).T @ (speed + np.cross(spin, off[4:]))
         made = shell_system(
-            self.shell(), gravity=site.gravity, damping=self.damping, held=[*ground[0], *ground[1]], carried=carried,
+            self.shell(), gravity=site.gravity, damping=self.damping, held=ground, carried=carried,
             pinned=[node for nodes in pinned.values() for node in nodes], shared=self.pushed(), heat=bool(warm),
-            spread=self.spread,
+            spread=self.spread, start=(poses, twists),
         )  # fmt: skip
         of, at = quantity.body_momentum, PRESSURES
         pushes = {f"p{i}": site.input(of, 0.0, f"node{i}", at=at, effort=False, named=False) for i in self.pushed()}
