@@ -11,6 +11,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
+from ephs.solve.posing.errors import OptionError
 
 
 @final
@@ -28,6 +29,10 @@ class Loading:
         self._equations, self._links = equations, links
         numbers = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
         scene: Scene | None = equations.problem.scene
+        pressed = [] if scene is None else [name for name, of in scene.all_shells() if of.pressure is not None]
+        if pressed:
+            found = f"a scene with the pressure of shells.{pressed[0]}"
+            raise OptionError("model", found, "one without: no derivatives of forces that follow a surface are known")
         self._loads = [(numbers[load.body], load) for _, load in (() if scene is None else scene.all_loads())]
 
     def __bool__(self) -> bool:

@@ -139,7 +139,7 @@ def shell_motion(
     shell, welded = sheet.shell(), {i: name for name, nodes in sheet.welds().items() for i in nodes}
     ends = {name: SE3.inverse(SE3.identity() if name == GROUND else scene.body(name).pose) for name in welded.values()}
     moving = []
-    for i, rest in enumerate(shell.poses):
+    for i, rest in enumerate(sheet.start()[0]):
         if i in welded:
             poses = body(welded[i])
             moving.append(compose(poses, np.broadcast_to(SE3.compose(ends[welded[i]], rest), poses.shape)))
@@ -164,8 +164,8 @@ def with_nodes(scene: Scene) -> Scene:
     """The scene with the free nodes of its shells as bodies, for pictures."""
     parts, bodies = {name: with_nodes(part) for name, part in scene.parts.items()}, dict(scene.bodies)
     for sheet in scene.shells.values():
-        shell = sheet.shell()
+        shell, (poses, twists) = sheet.shell(), sheet.start()
         for i in sheet.free():
             tensor, mass = frozen(np.diag(shell.inertia[i, :3])), float(shell.inertia[i, 3])
-            bodies[sheet.node(i)] = Body(sheet.node(i), mass, tensor, frozen(shell.poses[i]), frozen(np.zeros(6)))
+            bodies[sheet.node(i)] = Body(sheet.node(i), mass, tensor, frozen(poses[i]), frozen(twists[i]))
     return replace(scene, bodies=bodies, parts=parts)

@@ -6,6 +6,7 @@ from typing import Any, final
 
 import numpy as np
 
+from ephs.mechanics.runs.pressing import pressed
 from ephs.mechanics.runs.signals import View, signal
 from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.build import component_path, element_inputs, tension_port
@@ -56,6 +57,9 @@ def scene_signals(
     sizes |= dict.fromkeys(actuators, 1)
     own = element_inputs(scene)
     sizes |= {key: sum(signal.at(0.0, {}).size for signal in ports.values()) for key, ports in own.items()}
+    blown = {name: sheet for name, sheet in scene.all_shells() if sheet.pressure is not None}
+    pressures = {name: Signal(np.array([sheet.pressure])) for name, sheet in blown.items()}
+    sizes |= {f"shells.{name}": 1 for name in blown}
     sizes |= {f"markers.{name}": 3 for name, marker in markers.items() if marker.body in bodies}
     for _, load in scene.all_loads():
         push = _of_load(load)
@@ -79,9 +83,14 @@ def scene_signals(
             for joint, share in shares.items():
                 forces[joint] = sum_of(forces[joint], share) if joint in forces else share
             continue
+        if kind == "shells":
+            pressures[name] = given
+            continue
         if kind == "markers":
             name, given = markers[name].body, _at_marker(markers[name], given)
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
+    for name, sheet in blown.items():
+        others |= pressed(scene, name, sheet, pressures[name])
     return forces, wrenches, others
 
 

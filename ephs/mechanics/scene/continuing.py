@@ -39,6 +39,6 @@ def lost_states(scene: Scene, states: Mapping[Path, Array]) -> Iterator[Fault]:
 
 
 def _apart(given: Array, value: Array) -> float:
-    """Largest difference; the quaternions q and −q of poses are one rotation."""
-    other = np.concatenate([-value[:4], value[4:]]) if value.size == 7 else value
+    """Largest difference; the quaternions q and −q are one rotation."""
+    other = np.concatenate([-value[:4], value[4:]]) if value.size in (4, 7) else value
     return min(float(np.abs(given - each).max()) for each in (value, other))

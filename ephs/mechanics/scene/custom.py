@@ -142,7 +142,7 @@ class Element(EntryTable):
         cls.rules = (*cls.rules, *own)
         extras = {name: _extra(field.json_schema_extra) for name, field in cls.model_fields.items()}
         cls.names = {name: of.names for name, of in extras.items() if of.names}
-        cls.numbers = {name: _dimension(f"{cls.__name__}.{name}", of.unit) for name, of in extras.items() if of.unit}
+        cls.numbers = dimensions(cls)
         cls.frames = {name: of.frame for name, of in extras.items() if of.frame}
         cls.__doc__ = f"``[{cls.section}.NAME]``\n\n{cls.__doc__ or ''}"
 
@@ -242,6 +242,8 @@ class Element(EntryTable):
         """The same where the ground of its scene is moved by a pose (7,)."""
         turn, changes = quaternion_to_matrix(pose[:4]), dict[str, Any]()
         for name in type(self).frames:
+            if getattr(self, name) is None:
+                continue
             points = np.reshape(getattr(self, name), (-1, 3))
             for i, body in enumerate(self._carriers(name)):
                 if body == GROUND:
@@ -276,6 +278,12 @@ def read_in(element: Element, name: str, folder: Path = Path()) -> Element:
 
 def _extra(given: Any) -> _Hidden:
     return given if isinstance(given, _Hidden) else _Hidden()
+
+
+def dimensions(table: type[EntryTable]) -> dict[str, NumberForm]:
+    """Keys of a table that are numbers, made by `key`, and their dimensions."""
+    units = {name: _extra(field.json_schema_extra).unit for name, field in table.model_fields.items()}
+    return {name: _dimension(f"{table.__name__}.{name}", unit) for name, unit in units.items() if unit}
 
 
 def _dimension(where: str, unit: str) -> NumberForm:

@@ -190,10 +190,6 @@ TEXTS: dict[str, tuple[str, str]] = {
         "a start that follows from poses and rates, or from its table",
         "let continued(self, states) return an element that starts there",
     ),
-    "not welded": (
-        "bodies where they are when the shell is without stress",
-        "give positions in the file, or let no coordinate change that moves them",
-    ),
     "not built": ("an element that can be built", "correct its values"),
     "unknown surface": ("a surface", "{hint}"),
     "many faces": (

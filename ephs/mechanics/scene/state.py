@@ -21,6 +21,7 @@ from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, larg
 from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen, mapped
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -126,20 +127,9 @@ def with_state(
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
     scale = replace(now, poses=poses, twists=twists).scale(scene.world.gravity)
     faults = measure(links, xs, poses, slips, now.names, scale)
-    faults += [
-        fault("not welded", f"shells.{name}.edges", body)
-        for name, sheet in scene.all_shells()
-        for body in dict.fromkeys(sheet.named("end"))
-        if body in now.names and _apart(poses[(i := now.names.index(body))], now.poses[i]) > ASSEMBLY * scale.length
-    ]
     if faults:
         raise SceneError(where, faults)
     return rebuilt(scene, now, poses, twists, xs)
-
-
-def _apart(one: Array, other: Array) -> float:
-    """Distance in m or angle in rad between two poses."""
-    return float(np.abs(SE3.log(SE3.compose(SE3.inverse(one), other))).max())
 
 
 def adjusted(scene: Scene, asked: Mapping[str, Asked]) -> tuple[Scene, list[Fault]]:
@@ -226,7 +216,15 @@ def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequen
     def gear(path: str, g: Gear) -> Gear:
         return stretched(g, path, before, after)
 
-    return mapped(scene, {"bodies": body, "joints": joint, "gears": gear})
+    index = {name: i for i, name in enumerate(now.names)}
+
+    def sheet(path: str, of: ShellSheet) -> ShellSheet:
+        ends = {name: index[path + name] for name in of.named("end") if path + name in index}
+        gone = {name: i for name, i in ends.items() if not np.allclose(poses[i], now.poses[i], MOVED, MOVED)}
+        motions = {name: SE3.compose(poses[i], SE3.inverse(now.poses[i])) for name, i in gone.items()}
+        return of.carried(motions) if motions else of
+
+    return mapped(scene, {"bodies": body, "joints": joint, "gears": gear, "shells": sheet})
 
 
 def at_solution(scene: Scene, solution: Any, time: float) -> Scene:

@@ -76,7 +76,7 @@ _ADVICE = {
     Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
     Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
     Outcome.ENTROPY: "correct the component's function; if it is right, take a smaller step",
-    Outcome.LAWLESS: "take a smaller step; if that is refused too, correct the component",
+    Outcome.LAWLESS: "take a smaller step, as its damping may be stiff; if that is refused too, correct the component",
     Outcome.EXTENT: "check initial values, or take a smaller step",
     Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
     Outcome.DEPTH: "give the contact more stiffness, use thicker shapes, or start with the surfaces apart",
@@ -99,7 +99,7 @@ Other = tuple[str, str]
 """Another method by its name, and what it does."""
 _OTHERS: Mapping[Outcome, Other] = {
     Outcome.SINGULAR: ("natural", "omits redundant equations"),
-    Outcome.LAWLESS: ("natural", "makes entropy only"),
+    Outcome.LAWLESS: ("radau", "takes long steps where damping is stiff"),
     Outcome.TINY: ("radau", "damps fast modes"),
 }
 LARGEST = 1e150

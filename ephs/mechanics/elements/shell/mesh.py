@@ -1,6 +1,6 @@
 """Meshes of quadrilaterals for shells: checks, normals, section frames, grids; arrays of all elements at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -39,6 +39,42 @@ def grid(surface: Callable[[Any, Any], Any], elements: tuple[int, int]) -> tuple
     number = np.arange(len(points)).reshape(across + 1, along + 1)
     corners = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
     return points, np.stack([u, v], axis=1), np.stack([corner.ravel() for corner in corners], axis=1)
+
+
+def quadrilaterals(points: Array, cells: Sequence[Sequence[int]]) -> tuple[Array, Indices, Indices]:
+    """Points, elements of four nodes, and the ends of new nodes, of a mesh with triangles, too.
+
+    If there is a triangle, each one becomes three quadrilaterals, and each quadrilateral four, with new nodes in the
+    middle of edges and elements. Points and elements are those given where there is none.
+
+    Parameters
+    ----------
+    points
+        (m, 3); they stay the first ones.
+    cells
+        Three or four nodes of each element.
+
+    Returns
+    -------
+    points, cells
+        (k, 3), (n, 4).
+    ends
+        (e, 2) points between which the nodes m … m + e − 1 are.
+    """
+    if all(len(cell) == 4 for cell in cells):
+        return points, np.array(cells, dtype=np.int64).reshape(-1, 4), np.zeros((0, 2), dtype=np.int64)
+    middles: dict[tuple[int, int], int] = {}
+
+    def middle(a: int, b: int) -> int:
+        return middles.setdefault((min(a, b), max(a, b)), len(points) + len(middles))
+
+    around = [[(cell[i - 1], a, cell[(i + 1) % len(cell)]) for i, a in enumerate(cell)] for cell in cells]
+    corners = [[(middle(before, a), a, middle(a, after)) for before, a, after in cell] for cell in around]
+    first = len(points) + len(middles)
+    found = [[a, after, first + k, before] for k, cell in enumerate(corners) for before, a, after in cell]
+    ends = np.array([*middles], dtype=np.int64)
+    centres = np.array([points[list(cell)].mean(axis=0) for cell in cells])
+    return np.concatenate([points, points[ends].mean(axis=1), centres]), np.array(found, dtype=np.int64), ends
 
 
 def checked(points: Array, cells: Indices) -> None:

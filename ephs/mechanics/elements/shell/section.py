@@ -108,10 +108,10 @@ class ShellSection:
         if not -1.0 < nu <= 0.5:
             _refuse("nu", nu, "a number in (−1, 0.5]")
         slip = 0.5 * E / (1.0 + nu)
-        return cls.laminate([Ply(thickness, E, E, slip, nu, 0.0, rho)], named=False)
+        return cls.laminate([Ply(thickness, E, E, slip, nu, 0.0, rho)], named="")
 
     @classmethod
-    def laminate(cls, plies: Sequence[Ply], *, named: bool = True) -> Self:
+    def laminate(cls, plies: Sequence[Ply], *, named: str = "plies") -> Self:
         """Layers from the lower side to the upper one; the reference surface is in the middle.
 
         The transverse shear takes 5/6 of the layers' sum.
@@ -119,7 +119,7 @@ class ShellSection:
         Parameters
         ----------
         named
-            Whether messages number the layers.
+            What messages call the layers, by their numbers; empty for one without.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class ShellSection:
         if not plies:
             _refuse("plies", "empty", "at least one layer")
         for i, ply in enumerate(plies):
-            ply.check(f"plies[{i}]." if named else "")
+            ply.check(f"{named}[{i}]." if named else "")
         plane, shear, low = np.zeros((6, 6)), np.zeros((2, 2)), -0.5 * sum(ply.thickness for ply in plies)
         for ply in plies:
             high = low + ply.thickness
@@ -140,6 +140,12 @@ class ShellSection:
             low = high
         plane[np.abs(plane) <= ROUNDED * np.sqrt(np.outer(np.diag(plane), np.diag(plane)))] = 0.0
         return cls(2.0 * low, plane, shear, sum(ply.thickness * ply.rho for ply in plies))
+
+    @property
+    def sheared(self) -> float:
+        """Stiffness of membrane shear, N/m: its mean over all directions of the axes."""
+        a = self.plane
+        return float(a[0, 0] + a[1, 1] - 2.0 * a[0, 1] + 4.0 * a[2, 2]) / 8.0
 
     def bending(self, along: Array) -> Array:
         """(…,) modulus of bending along vectors (…, 2): the moment of a unit of curvature, N m."""

@@ -146,6 +146,20 @@ class Shell:
         mass = self.shares(self.section.mass * self.areas)
         return np.outer(mass, np.repeat([self.section.thickness**2 / 12.0, 1.0], 3)).astype(float)
 
+    def tensors(self, *, spread: bool = False) -> Array:
+        """(m, 3, 3) rotary inertia of the nodes in their axes, kg m²: that of `inertia`.
+
+        ``spread``: about the normals that of the elements' area instead of the thickness, ρhA²/48 of each at each node.
+        So fast turns about the normal are as slow as other motions; slow motions change by the order of the elements.
+        """
+        mass, h = 0.25 * self.section.mass * self.areas, self.section.thickness
+        out = np.array([np.diag(row) for row in self.inertia[:, :3]])
+        if spread:
+            normal = _rotation(self.axes).as_matrix()[:, :, 2].reshape(-1, 4, 3)
+            more = (mass * np.maximum(self.areas - h * h, 0.0) / 12.0)[:, None, None, None]
+            np.add.at(out, self.cells, more * normal[..., :, None] * normal[..., None, :])
+        return out
+
     def _sections(self, poses: Array) -> tuple[Array, Rotation]:
         nodes = poses[self.cells]
         turned = _rotation(nodes[..., :4]) * _rotation(self.axes)

@@ -16,7 +16,7 @@ from ephs.semantics.bundles.bundle import Array
 EDGES: Final = ((0, 1), (3, 2), (0, 3), (1, 2))
 """Corners that edges go from and to: along ξ at η = −1 and 1, along η at ξ = −1 and 1."""
 DRILL: Final = 0.2
-"""Stiffness of the turn about the normal, in parts of that of membrane shear; below 0.03 soft, above 1 stiff."""
+"""Stiffness of the turn about the normal, in parts of the mean of membrane shear; below 0.03 soft, above 1 stiff."""
 RESIDUAL: Final = 0.1
 """Part of the residual flexibility of bending in that of transverse shear."""
 _SENSES = np.array([1.0, -1.0, -1.0, 1.0])
@@ -52,7 +52,7 @@ def stiffness(rest: Array, section: ShellSection) -> tuple[Array, Array]:
     fitted, slip = np.linalg.solve(flexible, work).astype(float), _transverse(centre, section)
     k = np.swapaxes(work, 1, 2) @ fitted
     k += np.einsum("np,npai,nab,npbj->nij", weights, v3, slip, v3, optimize=True)
-    drill = DRILL * section.plane[2, 2]
+    drill = DRILL * section.sheared
     spin = v2[:, :, 0] - v1[:, :, 1]
     k += drill * np.einsum("np,npi,npj->nij", weights, spin, spin, optimize=True)
     twist = 0.25 * (_SHARE[1, 2] - _SHARE[0, 2] + _SHARE[3, 2] - _SHARE[2, 2])

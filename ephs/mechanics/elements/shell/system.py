@@ -13,6 +13,7 @@ import numpy as np
 
 from ephs.mechanics.elements import components
 from ephs.mechanics.elements.bodies import rigid_body
+from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.stiffness import EDGES
@@ -24,7 +25,7 @@ from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.primitives import structures
 from ephs.semantics.primitives.logarithms import logarithm_form, logarithm_loss
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage, power_ports
-from ephs.semantics.spaces import SE3, pair
+from ephs.semantics.spaces import SE3, pair, translation
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import STATEMENTS
@@ -190,8 +191,11 @@ def shell_system(
     damping: float = 0.0,
     held: Sequence[int] = (),
     carried: "Mapping[str, tuple[ArrayLike, Sequence[int]]] | None" = None,
+    pinned: Sequence[int] = (),
     shared: Sequence[int] = (),
     heat: bool = False,
+    spread: bool = False,
+    start: "tuple[ArrayLike, ArrayLike] | None" = None,
 ) -> System:
     """A shell that moves: bodies ``node0`` … at its points, and elements ``element0`` … between them.
 
@@ -204,12 +208,18 @@ def shell_system(
     held
         Numbers of nodes that are welded to the ground.
     carried
-        Nodes that are welded to other bodies: port of a body's momentum -> its pose (7,) in the world when the shell is
-        without stress, and their numbers.
+        Nodes that are welded to other bodies: port of a body's momentum -> its pose (7,) in the world at the start, and
+        their numbers.
+    pinned
+        Held or carried nodes that turn freely: a spherical joint ``pin0`` …, by their number, is in place of the weld.
     shared
         Numbers of nodes whose momenta are ports ``p0`` …, by their number: for what else acts on them.
     heat
         The heat of damping leaves through a port s.
+    spread
+        Inertia of nodes about the normal of `Shell.tensors`: for explicit methods, which may take longer steps.
+    start
+        (m, 7) poses in the world and (m, 6) twists of the nodes at the start; without stress and at rest where None.
 
     Raises
     ------
@@ -217,6 +227,7 @@ def shell_system(
         The section has no mass, or a node is not one of the shell's.
     """
     count, inertia, bodies = len(shell.points), shell.inertia, dict(carried or {})
+    tensors = shell.tensors(spread=spread)
     for key, nodes in (("held", held), ("shared", shared), *((port, nodes) for port, (_, nodes) in bodies.items())):
         if wrong := [node for node in nodes if not 0 <= node < count]:
             raise StructureError("parameter", "shell", key=key, found=wrong, expected=f"nodes of 0 … {count - 1}")
@@ -224,24 +235,33 @@ def shell_system(
         raise StructureError("parameter", "shell", key="section", found="no mass", expected="a density above 0")
     welded = {node: (port, np.asarray(pose, dtype=float)) for port, (pose, nodes) in bodies.items() for node in nodes}
     welded |= dict.fromkeys(held, ("p_ground", SE3.identity()))
-    momentum, unit = quantity.body_momentum, np.array([1.0, 0.0, 0.0, 0.0])
+    if wrong := [node for node in pinned if node not in welded]:
+        raise StructureError("parameter", "shell", key="pinned", found=wrong, expected="held or carried nodes")
+    given = (shell.poses, np.zeros((count, 6))) if start is None else start
+    poses, twists = (np.asarray(each, dtype=float) for each in given)
+    momentum = quantity.body_momentum
     junctions = {f"p{i}": junction(momentum, exposed=i in shared) for i in range(count)}
     junctions |= {port: junction(momentum, exposed=True) for port in bodies}
     boxes: dict[str, dict[str, str]] = {}
     parts: dict[str, System | Primitive] = {}
     made: dict[bytes, System] = {}  # bodies, which nodes with one inertia share
-    for i, point in enumerate(shell.points):
-        pose = np.concatenate([unit, point])
-        if i in welded:
+    for i, pose in enumerate(poses):
+        if i in welded and i not in pinned:
             port, at = welded[i]
             boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
             parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
         else:
             boxes[f"node{i}"] = {"p": f"p{i}"}
-            key = inertia[i].tobytes()
+            key = inertia[i, 3].tobytes() + tensors[i].tobytes()
             if key not in made:
-                made[key] = rigid_body(float(inertia[i, 3]), inertia[i, :3], gravity)
-            parts[f"node{i}"] = made[key].with_initial({"pe.q": pose})
+                made[key] = rigid_body(float(inertia[i, 3]), tensors[i], gravity, strict=not spread)
+            moving = np.concatenate([tensors[i] @ twists[i, :3], inertia[i, 3:] * twists[i, 3:]])
+            parts[f"node{i}"] = made[key].with_initial({"pe.q": pose, "ke.p": moving})
+        if i in pinned:
+            port, at = welded[i]
+            boxes[f"pin{i}"] = {"p1": port, "p2": f"p{i}"}
+            apart = SE3.compose(SE3.inverse(at), pose)
+            parts[f"pin{i}"] = joint("spherical", translation(apart[4:])).with_initial({"pe.q_r": apart[:4]})
     if len(held):
         junctions["p_ground"] = junction(momentum)
         boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
@@ -249,10 +269,13 @@ def shell_system(
     junctions |= {"s": junction(quantity.entropy, exposed=True)} if warm else {}
     sections = np.concatenate([shell.axes, np.zeros((*shell.cells.shape, 3))], axis=2)
     at_rest = _from_first(shell)
+    strained = None if np.array_equal(poses, shell.poses) else _strained(shell, at_rest, poses)
     for e, nodes in enumerate(shell.cells.tolist()):
         boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)} | warm
         numbers = sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping
-        parts[f"element{e}"] = shell_element(*numbers, heat=bool(warm))
+        made = shell_element(*numbers, heat=bool(warm))
+        states = {} if strained is None else {f"pe.q_{k}": strained[e, k - 2] for k in OTHERS}
+        parts[f"element{e}"] = made.with_initial(states) if states else made
     return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
 
 
@@ -261,6 +284,18 @@ def _from_first(shell: Shell) -> Array:
     along = [[SE3.exp(log) for log in logs] for logs in shell.rest]
     # corner 2 by edge 12, corner 4 by edge 14, corner 3 by edges 14 and 43: see `EDGES`
     return np.array([[two, SE3.compose(four, three), four] for two, three, four, _ in along])
+
+
+def _strained(shell: Shell, at_rest: Array, poses: Array) -> Array:
+    """(n, 3, 7) states of the elements' storages with their nodes at poses (m, 7)."""
+    out = np.empty(at_rest.shape)
+    for e, (places, nodes) in enumerate(zip(at_rest, shell.cells, strict=True)):
+        turns = [np.concatenate([turn, np.zeros(3)]) for turn in shell.axes[e]]
+        first, *others = (SE3.compose(poses[i], turn) for i, turn in zip(nodes, turns, strict=True))
+        for k, (rest, frame) in enumerate(zip(places, others, strict=True)):
+            now = SE3.compose(SE3.inverse(first), frame)
+            out[e, k] = SE3.normalise(SE3.compose(SE3.inverse(rest), now))
+    return out
 
 
 def _checked(given: Array, stiffness: Array) -> tuple[Array, Array]:

@@ -214,18 +214,18 @@ def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vecto
         return moved
 
     def friction(i: Integer) -> None:
-        edge = tables.acting[i]
+        sink = tables.sink[i]
 
         def rubbed() -> None:
-            moved = clamped(tables.component[edge.friction].made)
-            change[edge.heat], change[nodes] = change[edge.heat] + moved, change[nodes] + moved
+            moved = clamped(sink.maker)
+            change[sink.entropy], change[nodes] = change[sink.entropy] + moved, change[nodes] + moved
 
-        on.when(edge.friction >= 0, rubbed)
+        on.when(sink.rubs > 0, rubbed)
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
         moved = clamped(tables.component[row.component].made)
         change[row.one], change[row.two] = change[row.one] - moved, change[row.two] + moved
 
-    on.loop(tables.acting.size, friction)
+    on.loop(tables.sink.size, friction)
     on.loop(tables.conduction.size, conduction)

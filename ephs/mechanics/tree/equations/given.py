@@ -84,7 +84,7 @@ class Given:
             self.wrench[link] = 0.0
         for port, link, seen in self._wrenches:
             given = value(port)
-            self.wrench[link] += given if seen is None else seen @ given
+            self.wrench[link] += given if seen is None else seen @ np.broadcast_to(given, 6)
         net = self._reduced.attaching.network
         for i, (port, k) in enumerate(net.inputs):
             self.supply[i] = np.atleast_1d(value(port))[k]

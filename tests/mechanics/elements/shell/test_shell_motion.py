@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import block_diag, eigh
 from scipy.spatial.transform import Rotation
 
 import ephs
@@ -317,6 +318,41 @@ def test_a_damped_flight_heats_by_what_it_loses_and_entropy_never_falls(method):
     assert lost > 1e-2 * energy[0]
     assert abs(lost - heat) <= 1e-11 * energy[0]
     assert np.diff(made).min() >= 0.0
+
+
+@pytest.mark.parametrize("method", ["rk54", "rk87"])
+def test_a_damped_sheet_falls_from_rest_by_explicit_steps_whatever_is_rounding(method):
+    """Far from what holds it rates are rounding at first: negative weights of methods make of it no loss of entropy."""
+    points, where, cells = grid(lambda u, v: (0.3 * u, 0.3 * v, 0.0), (4, 4))
+    shell = Shell.of(points, cells, ShellSection.isotropic(2e-3, E=2e9, nu=0.3, rho=1000.0))
+    held = np.flatnonzero(where[:, 0] == 0.0).tolist()
+    system, stiff = (shell_system(shell, gravity=(0.0, 0.0, -9.81), damping=tau, held=held) for tau in (1e-6, 1e-3))
+    solution = ephs.simulate(system, 2e-6, method=method, audit="fail")
+    assert solution.stats["least_production"] >= 0.0
+    assert solution["node24.pe.q"][-1, 6] == pytest.approx(-0.5 * 9.81 * 4e-12, rel=1e-4)
+    assert solution.heat[-1] > 0.0
+    with pytest.raises(ephs.SimulationError, match="damping may be stiff"):  # the control: ten times its time constants
+        ephs.simulate(stiff, 2e-6, method="rk54", step=1e-8, audit="off")
+
+
+def test_inertia_spread_over_elements_slows_turns_about_the_normal_and_changes_slow_modes_by_order_2():
+    """In the plane of a sheet; modes across it have no such turns."""
+    lowest, highest = [], []
+    for n in (8, 16):
+        points, where, cells = grid(lambda u, v: (u, v, 0.0), (n, n))
+        shell = Shell.of(points, cells, ShellSection.isotropic(0.01, E=1.0, nu=0.3, rho=1.0))
+        for spread in (False, True):
+            mass = np.zeros((len(points), 6, 6))
+            mass[:, :3, :3], mass[:, 3:, 3:] = shell.tensors(spread=spread), shell.inertia[:, 3:, None] * np.eye(3)
+            free = np.flatnonzero(np.repeat(where[:, 0] > 0.0, 6) & np.tile([0, 0, 1, 1, 1, 0], len(points)))
+            stiff = shell.tangent(shell.poses).toarray()[np.ix_(free, free)]
+            whole = block_diag(*mass)
+            values = eigh(0.5 * (stiff + stiff.T), whole[np.ix_(free, free)], eigvals_only=True)
+            lowest.append(np.sqrt(values[0]))
+            highest.append(np.sqrt(values[-1]))
+    changes = [1.0 - lowest[1] / lowest[0], 1.0 - lowest[3] / lowest[2]]
+    assert 3.5 <= changes[0] / changes[1] <= 4.5 and 0.0 < changes[1] < 1e-3
+    assert 0.8 * 6.25 <= highest[2] / highest[3] <= 6.25  # the size of elements in parts of the thickness
 
 
 def test_a_shell_without_mass_does_not_move():

@@ -9,6 +9,7 @@ from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.system import shell_system
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
+from ephs.semantics.spaces import SE3
 from tests.written import scene_of_text
 
 UNTIL = 0.05
@@ -134,13 +135,39 @@ def test_what_is_no_shell_is_refused_by_its_key(keys, at, words):
     assert fault.key == f"shells.skin.{at}" and words in str(fault)
 
 
-def test_a_start_in_which_it_would_be_strained_is_refused():
-    """A sheet starts without stress: where the body that carries it moves before, its rest would be another one."""
+@pytest.mark.parametrize("pinned", ["false", "true"])
+def test_a_run_goes_on_from_a_strained_sheet(pinned):
+    """From halfway it is the run to the end, in a document and in other units, too."""
+    scene, end, most = hub(pinned=f"[false, false, false, {pinned}]", elements="[1, 1]"), 0.02, {"rtol": 1e-7}
+    whole = ephs.simulate(scene, end, method="radau", **most, save_at=[0.0, 0.5 * end, end])
+    half = scene.at(whole, 0.5 * end)
+    assert half.shells["skin"].nodes != scene.shells["skin"].nodes
+    assert scene_to_text(scene_from_text(scene_to_text(half))) == scene_to_text(half)
+    for start, unit in ((half, 1.0), (rescaled(half, 2.0, 4.0, 1.0), 2.0)):
+        rest = ephs.simulate(start, 0.5 * end, method="radau", **most)
+        assert tip(rest) / unit == pytest.approx(tip(whole), abs=1e-6)
+        assert rest.energy_error.max() < 1e-13
+        assert rest.shell("skin").energy[0].sum() == pytest.approx(
+            unit * unit * 4.0 ** (unit - 1.0) * whole.shell("skin").energy[1].sum(), rel=1e-9
+        )
+    assert np.linalg.norm(tip(rest) - tip(ephs.simulate(scene, 0.5 * end, method="radau"))) > 1e-4
+
+
+def test_a_body_that_is_moved_strains_the_sheet_that_it_carries():
+    """Nodes that are welded go with it, the others stay: the strain is that of statics, and the run starts with it."""
     scene = hub()
-    with pytest.raises(ephs.SceneError, match="without stress"):
-        scene.with_state({"held": 0.3})
-    with pytest.raises(ephs.SceneError, match="skin"):
-        scene.at(ran(scene), UNTIL)
+    moved = scene.with_state({"held": 0.02})
+    before, after = (of.shells["skin"] for of in (scene, moved))
+    motion = SE3.compose(moved.body("hub").pose, SE3.inverse(scene.body("hub").pose))
+    (still, _), (there, _) = before.start(), after.start()
+    for i in range(len(still)):
+        expected = SE3.compose(motion, still[i]) if i in before.welds()["hub"] else still[i]
+        assert there[i] == pytest.approx(expected, abs=1e-15)
+    run = ran(moved)
+    assert run.shell("skin").energy[0] == pytest.approx(before.shell().energy(there), rel=1e-9, abs=1e-15)
+    stored = sum(v[0] for p, v in run.ledgers.storages.items() if str(p).endswith(".pe") and "element" in str(p))
+    assert stored == pytest.approx(before.shell().energy(there).sum(), rel=1e-9)
+    assert stored > 1e-6 and run.energy_error.max() < 1e-13
     assert scene.with_state(rates={"held": 0.1}).shells == scene.shells
 
 

@@ -1,0 +1,148 @@
+"""Pressure on shells: forces that follow the surface, with neither sum nor moment on closed ones, and their work."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import ephs
+from ephs.mechanics.elements.shell.pressure import area_of, node_area, volume
+from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.scene.rescaled import rescaled
+from ephs.solve.posing.errors import OptionError
+from tests.written import scene_of_text
+
+EPS = float(np.finfo(float).eps)
+BOX = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+"""Counter-clockwise, seen from outside."""
+PRESSURE, UNTIL = 50.0, 0.02
+STILL = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n"
+SKIN = "thickness = 0.02\nE = 1e5\nnu = 0.3\nrho = 100.0\n"
+seeds = st.integers(0, 2**32 - 1)
+
+
+def drawn(seed):
+    return BOX + 0.15 * np.random.default_rng(seed).standard_normal(BOX.shape)
+
+
+def areas(places, cells):
+    found = (node_area(node, cells) for node in range(len(places)))
+    return np.array([area_of(form, places[near]) for near, form in found])
+
+
+def box():
+    mesh = f"points = {BOX.tolist()}\nelements = {FACES.tolist()}\npressure = {PRESSURE}\n"
+    return scene_of_text(f"{STILL}[shells.box]\n{mesh}{SKIN}")
+
+
+# ---- forces ----------------------------------------------------------------------------------------------------------
+
+
+@given(seeds)
+def test_forces_on_a_closed_surface_have_neither_sum_nor_moment(seed):
+    places = drawn(seed)
+    force = areas(places, FACES)
+    size = 64 * EPS * np.abs(places).max() * np.abs(force).sum()
+    assert np.abs(force.sum(axis=0)).max() <= size and np.abs(np.cross(places, force).sum(axis=0)).max() <= size
+    corner = places[FACES]
+    quarter = 0.125 * np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    equal = np.zeros_like(places)
+    np.add.at(equal, FACES, quarter[:, None])
+    assert np.abs(np.cross(places, equal).sum(axis=0)).max() > 1e-6  # the control: equal shares have a moment
+
+
+@given(seeds)
+def test_their_power_is_that_of_the_volume(seed):
+    places, rates = drawn(seed), np.random.default_rng(seed + 1).standard_normal(BOX.shape)
+    step = 1e-4
+    ends = [volume(places + sign * step * rates, FACES) for sign in (1.0, -1.0)]
+    cubic = volume(rates, FACES) * step**2  # the third derivative's part in the difference
+    size = np.abs(places).sum() ** 2 * np.abs(rates).max()
+    assert (
+        abs((ends[0] - ends[1]) / (2.0 * step) - cubic - np.sum(areas(places, FACES) * rates)) <= 64 * EPS * size / step
+    )
+
+
+def test_a_cube_has_its_volume_and_a_quarter_of_a_face_at_each_corner():
+    assert volume(BOX, FACES) == pytest.approx(1.0, rel=8 * EPS)
+    assert areas(BOX, FACES) == pytest.approx(0.25 * np.sign(BOX), abs=8 * EPS)
+
+
+# ---- motion ----------------------------------------------------------------------------------------------------------
+
+
+def work_of(run, name="box"):
+    """Work, and pressure times the change of the volume."""
+    places = run.shell(name).position
+    return run.work[-1], PRESSURE * (volume(places[-1], FACES) - volume(places[0], FACES))
+
+
+@pytest.mark.parametrize("method", ["rk87", "radau", "semi", "auto"])
+def test_the_work_on_a_closed_surface_is_the_pressure_times_the_change_of_its_volume(method):
+    run = ephs.simulate(box(), UNTIL, method=method, rtol=1e-7)
+    work, expected = work_of(run)
+    assert work > 0.1
+    assert work == pytest.approx(expected, rel=1e-6)
+    assert run.energy_error.max() <= 1e-13
+    momenta = sum(np.asarray(run[f"shells.box.node{i}.ke.p"])[-1, 3:] for i in range(8))
+    assert np.abs(momenta).max() <= 1e-9  # symmetry keeps the turns of nodes 0, and so their axes the world's
+
+
+def test_by_midpoints_the_work_is_off_by_the_square_of_the_step():
+    off = [np.subtract(*work_of(ephs.simulate(box(), UNTIL, method="natural", step=step))) for step in (2e-3, 1e-3)]
+    assert 3.5 <= off[0] / off[1] <= 4.5
+    assert 0.0 < abs(off[1]) < 1e-6
+
+
+HUB = """
+[bodies.hub]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+position = [-0.1, 0.2, 0.0]
+rotation = [0.8, 0.6, 0.0, 0.0]
+[shells.skin]
+corners = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.5, 0.4, 0.0], [0.0, 0.4, 0.0]]
+elements = [2, 1]
+pressure = 50.0
+edges = ["free", "free", "free", "hub"]
+pinned = PINNED
+"""
+
+
+@pytest.mark.parametrize("pinned", ["[]", "[false, false, false, true]"])
+def test_the_whole_pressure_acts_on_a_sheet_and_what_carries_it(pinned):
+    """Momentum of a free flight after a short time t: p A t, whatever part is welded, to order t² of turns."""
+    short = 1e-3
+    scene = scene_of_text(STILL + HUB.replace("PINNED", pinned) + SKIN)
+    run = ephs.simulate(scene, short, method="rk87", rtol=1e-9)
+    momenta = {"bodies.hub"} | {f"shells.skin.node{i}" for i in range(2 if pinned == "[]" else 0, 6)}
+    total = np.zeros(3)
+    for name in momenta:
+        quaternion, momentum = run[f"{name}.pe.q"][-1, :4], run[f"{name}.ke.p"][-1, 3:]
+        w, u = quaternion[0], quaternion[1:]
+        total += momentum + 2.0 * np.cross(u, np.cross(u, momentum) + w * momentum)
+    assert total == pytest.approx([0.0, 0.0, 50.0 * 0.2 * short], abs=1e-3 * 50.0 * 0.2 * short)
+
+
+def test_an_input_is_in_place_of_the_pressure_and_is_read_again(tmp_path):
+    scene = box()
+    one = ephs.simulate(scene, UNTIL, method="rk54", inputs={"shells.box": lambda t: 2.0 * PRESSURE})
+    other = ephs.simulate(varied(scene, {"shells.box.pressure": 2.0 * PRESSURE}), UNTIL, method="rk54")
+    assert one.work[-1] == other.work[-1] != 0.0
+    one.save(tmp_path / "run.nc")
+    assert ephs.load_solution(tmp_path / "run.nc").work[-1] == one.work[-1]
+
+
+def test_other_units_are_the_same_motion():
+    scene = box()
+    other = rescaled(scene, 2.0, 4.0, 1.0)
+    assert other.shells["box"].pressure == 2.0 * PRESSURE
+    works = [ephs.simulate(each, UNTIL, method="rk54", step=1e-3).work[-1] for each in (scene, other)]
+    assert works[1] == 16.0 * works[0] > 0.0
+
+
+@pytest.mark.parametrize("asked", [ephs.linearize, ephs.equilibrium, ephs.dynamics])
+def test_what_needs_its_derivatives_refuses_it(asked):
+    with pytest.raises(OptionError, match=r"shells\.box"):
+        asked(box())
