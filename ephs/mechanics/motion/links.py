@@ -85,7 +85,7 @@ class LinkMotion:
 
     def summary(self) -> dict[str, Any]:
         """Bodies and joints at the end."""
-        return ends(LinkMotion(self._frames, self._solution[-1:]), self._links, self._joints)
+        return ends(LinkMotion(self._frames, self._assembled, self._solution[-1:]), self._links, self._joints)
 
     def outline(self) -> Scene:
         """Bodies, and joints between these and the ground, as a scene to be drawn; bodies have no shapes."""
