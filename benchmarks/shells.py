@@ -373,7 +373,7 @@ def swung(n: int) -> tuple[float, float]:
         points, at, cells = grid(lambda u, v: (0.4 * u, 0.2 * v, 0.0), (n, n))
         shell = Shell.of(points, cells, ShellSection.isotropic(0.002, 1e7, 0.3, 1000.0))
         held = np.flatnonzero(at[:, 0] == 0.0)
-        sheet = shell_system(shell, gravity=(0.0, 0.0, -9.81), damping=1e-3, held=held)
+        sheet = shell_system(shell, gravity=(0.0, 0.0, -9.81), damping=1e-3, held=held.tolist())
         solution = ephs.simulate(sheet, span, method="radau", audit="off")
         return time.process_time() - start, int(solution.stats["steps"])
 
