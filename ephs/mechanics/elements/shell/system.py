@@ -273,9 +273,9 @@ def shell_system(
     for e, nodes in enumerate(shell.cells.tolist()):
         boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)} | warm
         numbers = sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping
-        made = shell_element(*numbers, heat=bool(warm))
+        element = shell_element(*numbers, heat=bool(warm))
         states = {} if strained is None else {f"pe.q_{k}": strained[e, k - 2] for k in OTHERS}
-        parts[f"element{e}"] = made.with_initial(states) if states else made
+        parts[f"element{e}"] = element.with_initial(states) if states else element
     return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
 
 
