@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ephs.mechanics.elements.shell.pressure import area_of, node_area
+from ephs.mechanics.elements.shell.pressure import node_areas
+from ephs.mechanics.motion.batch import rotations
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.element import GROUND
 from ephs.mechanics.scene.model import Scene
@@ -12,14 +13,14 @@ from ephs.mechanics.scene.shells import PRESSURES, ShellSheet
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
-from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.solve.posing.problem import Signal, State
 
 
-def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> dict[Path, Signal]:
-    """Wrenches on the nodes of a shell, in their axes, at their outer ports; of a pressure in Pa."""
-    shell, start, at = sheet.shell(), sheet.start()[0], component_path("shells", name)
+def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tuple[list[Path], Signal]:
+    """Outer ports of the nodes of a shell, and the wrenches there (6 · ports,), in nodes' axes, of a pressure in Pa."""
+    cells, start, at = sheet.mesh().cells, sheet.start()[0], component_path("shells", name)
     welded = {node: body for body, nodes in sheet.welds().items() for node in nodes}
+    pushed = sheet.pushed()
 
     def reading(node: int) -> Callable[[State], Array]:
         rest = start[node]
@@ -32,18 +33,13 @@ def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> dic
         offset = SE3.compose(SE3.inverse(scene.body(welded[node]).pose), rest)
         return lambda state: SE3.compose(state[pose], offset)
 
-    poses = [reading(node) for node in range(len(shell.points))]
+    poses = [reading(node) for node in range(len(start))]
 
-    def wrench(node: int) -> Callable[[float, State], Array]:
-        near, form = node_area(node, shell.cells)
+    def wrenches(t: float, state: State) -> Array:
+        found = np.array([pose(state) for pose in poses])
+        forces = (pressure.at(t, state) * node_areas(found[:, 4:], cells))[pushed]
+        out = np.zeros((len(pushed), 6))
+        out[:, 3:] = np.einsum("nij,ni->nj", rotations(found[pushed, :4]), forces)
+        return out.ravel()
 
-        def at_node(t: float, state: State) -> Array:
-            found = np.array([poses[k](state) for k in near])
-            own = quaternion_to_matrix(found[near.index(node), :4])
-            force = pressure.at(t, state) * area_of(form, found[:, 4:])
-            return np.concatenate([np.zeros(3), own.T @ force])
-
-        return at_node
-
-    ports = {node: Path([PRESSURES, *name.split("."), f"node{node}"]) for node in sheet.pushed()}
-    return {port: Signal(wrench(node)) for node, port in ports.items()}
+    return [Path([PRESSURES, *name.split("."), f"node{node}"]) for node in pushed], Signal(wrenches)

@@ -18,25 +18,14 @@ _FORMS = np.einsum("pi,pa,pb->iab", _ALONG * _ACROSS, _XI * _ACROSS, _ETA * _ALO
 """(4, 4, 4) ∫ N_i ∂_ξN_a ∂_ηN_b dξ dη."""
 
 
-def node_area(node: int, cells: Indices) -> tuple[list[int], Array]:
-    """The nodes (k,) on which the area of a node depends, and the form (k, k) of it: see `area_of`."""
-    own = cells[(cells == node).any(axis=1)]
-    near = np.unique(own)
-    form = np.zeros((near.size, near.size))
-    for cell in own:
-        at = np.searchsorted(near, cell)
-        form[np.ix_(at, at)] += _FORMS[int(np.flatnonzero(cell == node)[0])]
-    return near.tolist(), form
-
-
-def area_of(form: Array, places: Array) -> Array:
-    """(3,) Σ form_ab x_a × x_b of places (k, 3): of a node ∫ N n dA, its force by a unit of pressure, m²."""
-    g = places.T @ form @ places
-    return np.array([g[1, 2] - g[2, 1], g[2, 0] - g[0, 2], g[0, 1] - g[1, 0]])
+def node_areas(places: Array, cells: Indices) -> Array:
+    """(m, 3) ∫ N n dA of nodes at places (m, 3), m²: their forces by a unit of pressure."""
+    corner, out = places[cells], np.zeros_like(places)
+    cross = np.cross(corner[:, :, None], corner[:, None])
+    np.add.at(out, cells, np.einsum("iab,nabk->nik", _FORMS, cross))
+    return out
 
 
 def volume(places: Array, cells: Indices) -> float:
     """Volume of the cones from the origin to a surface with nodes at places (m, 3), m³: of a closed one its own."""
-    corner = places[cells]
-    cross = np.cross(corner[:, :, None], corner[:, None])
-    return float(np.einsum("iab,nabk,nik->", _FORMS, cross, corner, optimize=True)) / 3.0
+    return float(np.sum(node_areas(places, cells) * places)) / 3.0
