@@ -9,17 +9,17 @@ from tests.rooms import ROOT, SOURCES, size_of
 
 CEILINGS = {
     "ephs": 1_500,
-    "ephs/cli": 12_800,
+    "ephs/cli": 12_700,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 405_300,
+    "ephs/mechanics": 414_200,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_400,
     "ephs/semantics": 193_400,
     "ephs/show": 65_200,
-    "ephs/solve": 123_800,
+    "ephs/solve": 124_100,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 557_000,
+    "tests": 565_400,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
