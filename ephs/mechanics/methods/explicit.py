@@ -131,8 +131,7 @@ class Explicit(ReducedMethod):
             k[0] = self.first(state, y0)
         before = self.solve(state, scheme, self.method.c, h, y0, k, y1)
         allowed = self._allowed[:] = self.atol + self.rtol * eq.sizes(y0, y1)
-        chosen, damped = self.control.step is None, self.lagged is not None
-        y1, account = eq.accounts.booked(state, scheme, k, h, y1, chosen=chosen, part=part, damped=damped)
+        y1, account = eq.accounts.booked(state, scheme, k, h, y1, part=part, damped=self.lagged is not None)
         sums = np.array(eq.engine.totals["low" if part else "whole"])
         end = replace(eq.ended(state, y1, state.t + h), account=account)
         closed = eq.closed(end)
@@ -143,8 +142,10 @@ class Explicit(ReducedMethod):
         if eq.engine.looped and not (rough or eq.careful):
             self._open[:], self._shut[:] = end.r, closed.r
             error = max(error, float(self._drift()))
-        if not (error > 1.0 and chosen):
-            closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=chosen, share=self._worth)
+        if not error > 1.0 or self.control.step is not None:
+            closed, missed = eq.accounts.corrected(
+                state, closed, h, allowed, chosen=self.control.step is None, share=self._worth
+            )
             error = max(error, missed)
         self.rough = (*((state.q,) if rough else ()), *((closed.q,) if eq.careful else ()))
         if self.lagged is None:

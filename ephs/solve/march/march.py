@@ -196,8 +196,7 @@ class _TrialStep:
         damped = None if self.stiff is None and self.lagged is None else q
 
         def keep_books() -> None:
-            chosen = on.negate(c.grid > 0.0)
-            self.status.value = book(on, motion, self.tableau, k, h, totals, self.account.anchor, part, chosen, damped)
+            self.status.value = book(on, motion, self.tableau, k, h, totals, self.account.anchor, part, damped)
 
         def settle_end() -> None:
             if motion.closes:

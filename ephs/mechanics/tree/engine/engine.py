@@ -158,12 +158,11 @@ class Engine:
 
     def sum(
         self, tableau: Mapping[str, Any], k: Array, h: float, base: Array, y0: Array, y1: Array, carry: Array, *,
-        anchor: float, part: bool, chosen: bool, damped: bool,
+        anchor: float, part: bool, damped: bool,
     ) -> tuple[int, Array, Array]:  # fmt: skip
         """Sum what a step with rates k adds to heats and totals; a part of one is held by ``totals``.
 
-        ``anchor`` is that of the account; ``chosen``: whether steps are; ``damped``: whether energy that is missing
-        becomes heat.
+        ``anchor`` is that of the account; ``damped``: whether energy that is missing becomes heat.
 
         Returns
         -------
@@ -174,11 +173,11 @@ class Engine:
         if known is None or known[0] is not tableau:
             rows = np.zeros(k.shape)
             given = tableau, rows, self.totals, self._base, self._q
-            known = tableau, rows, self.bind("summed", *given, h, anchor, int(part), int(chosen), int(damped))
+            known = tableau, rows, self.bind("summed", *given, h, anchor, int(part), int(damped))
             self._sums[id(tableau)] = known
         _, rows, summed = known
         self._base[:], self._start[:], self._y[:], self.totals["before"][:], rows[:] = base, y0, y1, carry, k
-        status = int(summed(h, anchor, int(part), int(chosen), int(damped)))
+        status = int(summed(h, anchor, int(part), int(damped)))
         return status, self._y.copy(), self.totals["after"].copy()
 
     def correct(

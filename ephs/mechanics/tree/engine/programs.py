@@ -85,13 +85,12 @@ def motion_program(*, looped: bool) -> Program:
 
     def summed(
         on: Evaluator, motion: Mechanism, tableau: TableauRecord, k: Matrix, totals: Totals, base: Vector, q: Vector,
-        h: Real, anchor: Real, part: Integer, chosen: Integer, damped: Integer,
+        h: Real, anchor: Real, part: Integer, damped: Integer,
     ) -> Integer:  # fmt: skip
         status = on.counter(0)
 
         def add(end: Vector | None) -> None:
-            hold, free = on.same(part, 1), on.same(chosen, 1)
-            status.value = book(on, motion, tableau, k, h, totals, anchor, hold, free, end)
+            status.value = book(on, motion, tableau, k, h, totals, anchor, on.same(part, 1), end)
 
         def absorb() -> None:
             motion.advance(on, base, totals.end, q)

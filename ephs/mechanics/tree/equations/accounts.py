@@ -73,15 +73,13 @@ class Accounts:
         return replace(state, account=account)
 
     def booked(
-        self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, chosen: bool,
-        part: bool = False, damped: bool = False,
+        self, start: "ReducedState", tableau: Mapping[str, Any], k: Array, h: float, y1: Array, *, part: bool = False,
+        damped: bool = False,
     ) -> tuple[Array, Array]:  # fmt: skip
         """The end y1 of a step with rates k with heats and totals, and the account with what rounding left of them.
 
         Parameters
         ----------
-        chosen
-            Whether steps are chosen.
         part
             Whether it is a part of a step: its sums lie between those in the engine's ``totals``.
         damped
@@ -95,7 +93,7 @@ class Accounts:
         eq, start = self._equations, self.opened(start)
         carry, anchor = start.account[self.own :], float(start.account[0])
         given = tableau, k, h, start.q, eq.vector(start), y1, carry
-        status, y, carry = eq.engine.sum(*given, anchor=anchor, part=part, chosen=chosen, damped=damped)
+        status, y, carry = eq.engine.sum(*given, anchor=anchor, part=part, damped=damped)
         eq.refuse(status, eq.engine.failed)
         return y, np.concatenate([start.account[: self.own], carry])
 
