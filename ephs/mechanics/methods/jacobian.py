@@ -114,7 +114,7 @@ class Jacobian:
 
     @property
     def _calls(self) -> list[Call]:
-        """What is asked of the tangents."""
+        """Seeds of the tangents, and the rows and columns of the matrix that each gives."""
         return once(self.equations.reduced, "calls for slopes", self._planned)
 
     @property

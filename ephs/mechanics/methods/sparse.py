@@ -1,7 +1,7 @@
 """Systems 1/(h μ) − J of implicit stages where J is sparse, for the eigenvalues μ of a method's coefficients.
 
-Where no rate depends on heats, the system of increments v, rates r and heats falls to one of the size of the freedoms:
-with γ = 1/(h μ) and v̇ = r at v = 0, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
+Where no rate depends on heats, rates r and heats are eliminated, and a system for the increments v alone is left: with
+γ = 1/(h μ) and v̇ = r at v = 0, (γ² − γ (J_rr + J_vv) + J_rr J_vv − J_rv) δv = f_r + (γ − J_rr) f_v.
 """
 
 from types import MappingProxyType

@@ -58,8 +58,8 @@ class SheetMesh:
     ) -> Self:
         """A mesh of quadrilaterals and triangles.
 
-        Where triangles are divided, a new point in the middle of an edge is one of a side if both ends are, and the
-        edge is one of the mesh's border, or leads through its inside.
+        Where triangles are divided, edges get points in the middle. Such a point belongs to a side if both ends of its
+        edge do, and the edge is on the border of the mesh or has an end inside.
         """
         whole, quads, ends = quadrilaterals(np.array(points, dtype=float).reshape(-1, 3), cells)
         if not len(ends):

@@ -19,7 +19,7 @@ COLOURS = {
     "temperature": "temperature", "energy": "strain energy", "membrane": "membrane force", "moment": "moment",
     "shear": "transverse force",
 }  # fmt: skip
-"""What can be shown by colour, in words."""
+"""Choices of ``colour``, and the name of each quantity in legends."""
 GROUND = "ground"
 NOISE = 1e-9
 """Forces and moments below this share of the other at the joints' arms, and of a millinewton, are rounding."""
@@ -85,7 +85,7 @@ class Shades:
     Attributes
     ----------
     said, unit : str
-        What they are, and of which unit.
+        Name and unit of the quantity.
     values : dict of str to (m,)
         By thermal node, joint or body.
     faces : dict of str to (m, n)
@@ -181,7 +181,7 @@ def _contacts(sol: Any, instants: NDArray[np.int64]) -> list[Arrows]:
 
 
 def shades_of(sol: Any, frames: Film, colour: str | None) -> tuple[Shades, ...]:
-    """What is shown by colour, one of `COLOURS`, or nothing.
+    """The values that a choice of colour shows, one of `COLOURS`; none without a choice.
 
     Raises
     ------

@@ -119,7 +119,7 @@ class ShellSection:
         Parameters
         ----------
         named
-            What messages call the layers, by their numbers; empty for one without.
+            Name of the list of layers in messages; empty for a section of one material.
 
         Raises
         ------
