@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 124_100,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 565_400,
+    "tests": 565_500,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

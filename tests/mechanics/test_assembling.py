@@ -142,6 +142,24 @@ def test_momenta_off_the_joints_are_refused_at_any_size(size, method, tmp_path):
 
 
 @pytest.mark.parametrize("method", ["rk54", "natural"])
+@pytest.mark.parametrize("size", [1e-6, 1e-2, 1.0, 1e3])
+def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method, tmp_path):
+    scene = rod_on_a_pin(tmp_path, size)
+    states = scene.system().initial
+    momentum, pose = (np.array(states[ephs.Path.of(f"bodies.rod.{name}")]) for name in ("ke.p", "pe.q"))
+    run = {"method": method, "step": 1e-3}
+    for given in ({"bodies.rod.ke.p": momentum}, {"bodies.rod.pe.q": pose}):
+        rate = ephs.simulate(scene, 0.01, initial=given, **run).joint("pin").rate
+        assert rate[-1, 0] == pytest.approx(2.0, rel=1e-9)
+    momentum[4] += 0.01 * np.abs(momentum[3:]).max()
+    with pytest.raises(AssemblyError, match=r"^bodies\.rod\.ke\.p: the initial value contradicts the joints"):
+        ephs.simulate(scene, 0.01, initial={"bodies.rod.ke.p": momentum}, **run)
+    pose[5] += 1e-5 * size
+    with pytest.raises(AssemblyError, match="leave a joint open"):
+        ephs.simulate(scene, 0.01, initial={"bodies.rod.pe.q": pose}, **run)
+
+
+@pytest.mark.parametrize("method", ["rk54", "natural"])
 def test_ports_of_a_system_are_those_of_its_scene(method):
     """By natural, momenta between steps are off the joints by its error; ports are asked at momenta on them."""
     scene = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")

@@ -33,9 +33,10 @@ from ephs.solve.result.record import RunRecord
 from ephs.solve.running.ending import solution_of
 
 OPEN = 1e-6
-"""Largest joint residual of given initial states, in m or rad."""
+"""Largest joint residual of given initial states, in rad or parts of the mechanism's length."""
 OFF = 1e-3
-"""Relative error allowed in momenta off the joints: nodal momenta of some methods satisfy joints to their order."""
+"""Error allowed in momenta off the joints, in parts of the mechanism's own or of the largest: nodal momenta of some
+methods satisfy joints to their order."""
 
 
 @final
@@ -189,8 +190,8 @@ def _gears(joints: FlatJoints) -> dict[str, dict[str, float]]:
     return out
 
 
-def check_closed(problem: Problem) -> None:
-    """Check given initial states against the joints.
+def check_closed(problem: Problem, momentum: Array) -> None:
+    """Check given initial states against the joints; ``momentum`` (6,) is of the mechanism's mass, length and rate.
 
     Raises
     ------
@@ -202,12 +203,11 @@ def check_closed(problem: Problem) -> None:
     once = RunRecord(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
     assert problem.motion is not None
     motion = problem.motion(solution_of(problem, once, {}))
-    gap = float(motion.constraint_error()[0])
-    if gap > OPEN:
-        raise AssemblyError("open-joint", problem.name, found=f"{gap:.1e} m or rad")
+    if max((float(gap[0]) for gap in motion.gaps(1).values()), default=0.0) > OPEN:
+        raise AssemblyError("open-joint", problem.name, found=f"{float(motion.constraint_error()[0]):.1e} m or rad")
     for path, value in motion.state(0).items():
         given = problem.initial[path]
-        if value.shape == given.shape and path[-1] == "p":
-            off = float(np.abs(value - given).max()) / max(1.0, float(np.abs(given).max()))
+        if value.shape == momentum.shape and path[-1] == "p":
+            off = float(np.abs((value - given) / momentum).max()) / max(1.0, float(np.abs(given / momentum).max()))
             if off > OFF:
                 raise AssemblyError("off-joint", path, found=off)

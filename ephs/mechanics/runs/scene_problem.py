@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.redundancy import explain
 from ephs.mechanics.motion.motion import SceneMotion
@@ -74,5 +76,7 @@ def problem_of_scene(
         names=once(scene, "names", lambda: scene_names(scene)),
     )
     if initial:
-        check_closed(problem)
+        scale, mass = Snapshot.of(scene).scale(world.gravity), sum(body.mass for _, body in scene.all_bodies())
+        turning = (mass or 1.0) * scale.rate * scale.length**2
+        check_closed(problem, turning / np.array([1.0] * 3 + [scale.length] * 3))
     return problem
