@@ -108,6 +108,24 @@ def test_a_part_moves_with_the_whole_and_heats_its_own_node(walker):
     assert check_model(walker).ok
 
 
+def test_loads_are_no_part_of_the_system_but_ports_where_they_act(walker, tmp_path):
+    """A run of the system without them would be another motion, and is refused."""
+    load = '[loads.{}]\nbody = "{}"\nforce = [1.0, 0.0, 2.0]\nmoment = [0.0, 0.3, 0.0]\nfollower = true\n'
+    (tmp_path / "leg.toml").write_text(LEG + load.format("pull", "shank"))
+    (tmp_path / "loaded.toml").write_text(WHOLE + load.format("push", "foot"))
+    loaded = ephs.load(tmp_path / "loaded.toml")
+    system, ports = loaded.system(), ["momenta.foot", "momenta.left.shank"]
+    assert set(map(str, system.interface)) == {*ports, "drives.left.knee"}
+    assert set(map(str, walker.system().interface)) == {"drives.left.knee"}
+    drive = {"drives.left.knee": {"flow": 0.2}}
+    with pytest.raises(ephs.AssemblyError, match="the outer port is open"):
+        ephs.simulate(system, 0.1, inputs=drive)
+    wrench = {"flow": np.array([0.0, 0.3, 0.0, 1.0, 0.0, 2.0])}
+    by_hand = ephs.simulate(system, 0.5, inputs=drive | dict.fromkeys(ports, wrench))
+    whole = ephs.simulate(loaded, 0.5)
+    np.testing.assert_allclose(by_hand["bodies.foot.pe.q"][-1], whole["bodies.foot.pe.q"][-1], rtol=0.0, atol=1e-14)
+
+
 @settings(calm, max_examples=30)
 @given(mechanisms())
 def test_states_of_any_mechanism_are_complete(scene):

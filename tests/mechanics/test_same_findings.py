@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import ephs
 from ephs.mechanics.scene.build import scene_inputs
+from ephs.mechanics.scene.rescaled import rescaled
 
 SCENES = Path(__file__).parents[2] / "scenes"
 NAMES = ("biped", "body", "cardan-shaft", "chain", "dzhanibekov", "four-bar", "heavy-top", "hot-brake", "slider-crank")
@@ -43,3 +45,47 @@ def test_a_system_has_the_findings_of_its_scene(name, setting):
 def test_some_of_these_runs_are_found_wrong_and_some_are_not():
     found = [bool(both(name, SETTINGS[0])[0]) for name in ("body", "chain")]
     assert found == [True, False]
+
+
+@pytest.mark.parametrize("size", [2.0**-20, 2.0**10])
+def test_a_system_moves_alike_at_any_size(size, tmp_path):
+    """By natural, which decides the rank of its constraints by numbers; masses grow as volumes do.
+
+    Its error at these steps is 1e-4, and parts of it depend on the unit of length.
+    """
+    file = tmp_path / "two-rods.toml"
+    file.write_text(
+        """
+        format = 1
+        [assembly]
+        adjust = true
+        [bodies.a]
+        mass = 1.0
+        inertia = [0.1, 0.1, 0.02]
+        position = [0.0, 0.0, -0.5]
+        [bodies.b]
+        mass = 1.0
+        inertia = [0.1, 0.1, 0.02]
+        position = [0.0, 0.0, -1.5]
+        [joints.pin]
+        type = "revolute"
+        bodies = ["ground", "a"]
+        at = [0.0, 0.0, 0.0]
+        axis = [0.0, 1.0, 0.0]
+        rate = 1.5
+        friction = 0.05
+        [joints.knee]
+        type = "revolute"
+        bodies = ["a", "b"]
+        at = [0.0, 0.0, -1.0]
+        axis = [1.0, 0.0, 0.0]
+        rate = 2.0
+        stiffness = 0.3
+        """
+    )
+    scene = ephs.load(file)
+    small = rescaled(scene, size, size**3, 1.0)
+    setting = {"method": "natural", "step": 0.01, "audit": "off"}
+    one, other = (ephs.simulate(each.system(), 0.2, **setting) for each in (scene, small))
+    for name in ("joints.pin", "joints.knee"):
+        np.testing.assert_allclose(other.joint(name).coordinate, one.joint(name).coordinate, atol=1e-5)

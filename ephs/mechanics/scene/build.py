@@ -73,8 +73,13 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
 
 
 def started_system(scene: Scene) -> System:
-    """The same with the scene's initial state; made once, too."""
-    return once(scene, "started", lambda: scene_system(scene).with_initial(initial_state(scene)))
+    """The same with the scene's initial state, and ports where its loads act; made once, too."""
+
+    def made() -> System:
+        loaded = {load.body for _, load in scene.all_loads()}
+        return scene_system(scene, wrenches=loaded).with_initial(initial_state(scene))
+
+    return once(scene, "started", made)
 
 
 def initial_state(scene: Scene) -> dict[Path, Array]:

@@ -29,6 +29,10 @@ OTHERWISE = 1e-3
 
 LARGE = 256
 """Rows above which those with an effort of their own are eliminated before the dense rank decision."""
+SPECK = 1e-12
+"""Part of the largest entry of a constraint up to which an entry is rounding."""
+APART = 1e3
+"""Largest factor between the entries of efforts that no storage gives, and of others in their rows."""
 OWN = 1e-3
 """Part of a row above which an effort that is in no other row makes it independent of the others."""
 ALIKE = 1e-6
@@ -100,7 +104,10 @@ def dependent_rows(
     constrained = of[t.row] >= 0
     inside = constrained & (t.column >= n_rate) & (t.column < n_rate + n_effort)
     entries = (values[inside], (of[t.row[inside]], t.column[inside] - n_rate))
-    matrix = csr_array(entries, shape=(rows.size, n_effort)) @ _compliance(model, values)
+    matrix = csr_array(entries, shape=(rows.size, n_effort))
+    matrix.data[np.abs(matrix.data) <= SPECK * _largest(matrix)] = 0.0  # else they would grow with their columns
+    compliance, plain = _compliance(model, values)
+    matrix = _balanced(csr_array(matrix @ compliance), plain)
     inside &= values != 0.0
     still = np.bincount(of[t.row[inside]], minlength=rows.size) == 0
     moving = constrained & (t.column < n_rate) & still[of[t.row]]
@@ -176,7 +183,9 @@ def _groups(part: Index, count: int) -> list[Index]:
 
 
 def _compliance(model: Model, values: Array) -> Any:
-    """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives; sparse."""
+    """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives; sparse; and
+    which efforts these are.
+    """
     from scipy.sparse import csr_array
 
     t = model.tables
@@ -204,7 +213,36 @@ def _compliance(model: Model, values: Array) -> Any:
         np.concatenate([*entries, np.ones(rest.size)]),
         (np.concatenate([*rows, rest]), np.concatenate([*columns, rest])),
     )
-    return csr_array(whole, shape=(plain.size, plain.size))
+    return csr_array(whole, shape=(plain.size, plain.size)), plain
+
+
+def _largest(matrix: Any) -> Array:
+    """(nnz,) largest size of an entry in each entry's row."""
+    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    most = np.zeros(matrix.shape[0])
+    np.maximum.at(most, row, np.abs(matrix.data))
+    return most[row]
+
+
+def _balanced(matrix: Any, plain: NDArray[np.bool_]) -> Any:
+    """The matrix with columns of plain efforts within a range of what is in their rows: they have no size of their own.
+
+    Sizes spread from those of storages, row by row.
+    """
+    row, column = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)), matrix.indices
+    used, left = matrix.data != 0.0, plain.copy()
+    while True:
+        size, theirs = np.abs(matrix.data), left[column]
+        most, wanted = np.zeros(matrix.shape[0]), np.full(plain.size, np.inf)
+        np.maximum.at(most, row[~theirs], size[~theirs])
+        beside = used & theirs & (most[row] > 0.0)
+        if not beside.any():
+            return matrix
+        np.minimum.at(wanted, column[beside], most[row[beside]] / size[beside])
+        now = wanted < np.inf
+        factor = np.where(now, np.clip(1.0, wanted / APART, wanted * APART), 1.0)
+        matrix.data = matrix.data * factor[column]
+        left &= ~now
 
 
 def null_unknown(size: int, row: Index, column: Index, values: Array) -> int:
