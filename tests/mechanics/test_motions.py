@@ -13,7 +13,7 @@ from benchmarks.cases import CASES
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.scene.build import initial_state, scene_system
+from ephs.mechanics.scene.build import initial_state, scene_inputs, scene_system
 from ephs.mechanics.scene.model import frozen
 from ephs.semantics import Reference
 from ephs.semantics.meaning.step import step
@@ -125,6 +125,24 @@ def test_every_pair_with_every_method(kind, method):
     assert errors[1] <= max(errors[0] / 2.0 ** (order - (0.1 if order <= 4 else 0.5)), rounding)
     # no method is better than it says where errors can be seen
     assert errors[1] >= errors[0] / 2.0 ** (order + 0.25) or errors[0] < 1e-6
+
+
+@pytest.mark.parametrize("kind", PAIRS)
+def test_joints_of_a_system_read_as_those_of_its_scene(kind):
+    scene, world = rubbing(kind)[0], rubbing(kind)[0].world
+    inputs = {
+        str(port): {"effort" if given.effort else "flow": given.value} for port, given in scene_inputs(scene).items()
+    }
+    environment = Reference(world.temperature, world.pressure)
+    steps = {"method": "rk54", "step": 0.02}
+    whole = ephs.simulate(scene, 0.1, **steps)
+    by_hand = ephs.simulate(scene.system(), 0.1, inputs=inputs, reference=environment, **steps)
+    for name, _ in scene.all_joints():
+        one, other = whole.joint(name), by_hand.joint(f"joints.{name}")
+        for read in ("coordinate", "rate", "wrench"):
+            expected = getattr(one, read)
+            largest = 1.0 + abs(expected).max(initial=0.0)
+            np.testing.assert_allclose(getattr(other, read), expected, rtol=0.0, atol=1e-12 * largest)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -61,7 +61,8 @@ class LinkMotion:
             There is none.
         """
         joint = self._joints[_known("joint", name, self._joints)]
-        return JointMotion(self, name, self._solution[joint.state.path].reshape(-1, joint.pair.dim))
+        coordinate = self._solution[joint.state.path].reshape(len(self._solution), joint.pair.dim)
+        return JointMotion(self, name, coordinate)
 
     def shell(self, name: str) -> ShellMotion:
         """Nodes and energies of the elements in a box, by its path; ``shell`` of those in no box.
