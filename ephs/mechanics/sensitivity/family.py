@@ -145,12 +145,14 @@ class ParameterFamily:
         for stencil in (CENTRAL, FORWARD):
             try:
                 tables = STRAIGHT if linear and stencil is CENTRAL else stencil
-                for k, _ in (tables[0], tables[-1]):
-                    self._beside(path, value, k * step)
+                beside = [self._beside(path, value, k * step) for k, _ in (tables[0], tables[-1])]
             except (SceneError, StructureError):
                 if stencil is FORWARD:
                     raise
                 continue
+            if not all(_alike(self.problem.descriptor, other.descriptor) for other in beside):
+                expected = "a number that leaves equations as they are: no pitch, no 1 that simplifies them"
+                raise OptionError("parameters", path, expected)
             return Parameter(path, value, step, stencil, tables)
         raise OptionError("parameters", path, "a number that may change")
 
@@ -180,8 +182,8 @@ class ParameterFamily:
         return problem_of_system(system, initial, self._inputs, self._reference)
 
 
-def relation_of(descriptor: Descriptor, number: int) -> tuple[Program, str]:
-    """The program of a component's relation, and its entry.
+def relation_of(descriptor: Descriptor, number: int, *, derivatives: bool = False) -> tuple[Program, str]:
+    """The program of a component's relation, with the derivatives that it writes or without, and its entry.
 
     Raises
     ------
@@ -191,7 +193,18 @@ def relation_of(descriptor: Descriptor, number: int) -> tuple[Program, str]:
     slot = descriptor.components[number]
     if slot.primitive.kernel is None:
         raise OptionError("model", str(slot.path), "relations that can be recorded: this one is called back in Python")
-    return entry_of(slot.primitive.kernel.relation, derivatives=False)
+    return entry_of(slot.primitive.kernel.relation, derivatives=derivatives)
+
+
+def _alike(one: Descriptor, other: Descriptor) -> bool:
+    """Whether all components have the same relations but for numbers in tables."""
+    pairs = zip(one.components, other.components, strict=False)  # where some appear or vanish, states differ
+    for kernel, beside in ((a.primitive.kernel, b.primitive.kernel) for a, b in pairs):
+        if kernel is not None and beside is not None and kernel.relation != beside.relation:
+            texts = (entry_of(each.relation, derivatives=False)[0].text(blocks=False) for each in (kernel, beside))
+            if next(texts) != next(texts):
+                return False
+    return True
 
 
 def _entry(path: str) -> tuple[str, int]:

@@ -7,6 +7,7 @@ import ephs
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from tests.oscillator import damped_oscillator
+from tests.written import scene_of_text
 
 GOOD = 1e-8
 """What extrapolated differences of runs are good for, relative to the largest; 1e-7 is asked for."""
@@ -133,6 +134,47 @@ def test_a_friction_of_zero_has_a_derivative_from_above():
     ]
     expected = np.dot([-25.0, 48.0, -36.0, 16.0, -3.0], values) / 12e-3
     assert found["joints.j0.rate"][-1, 0, 0] == pytest.approx(expected, rel=1e-8)
+
+
+WOUND = """
+format = 1
+[bodies.arm]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.3, 0.0, 0.0]
+[joints.pin]
+type = "screw"
+pitch = 0.1
+bodies = ["ground", "arm"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[motors.m]
+joint = "pin"
+constant = 0.2
+resistance = 1.25
+voltage = 1.3
+"""
+"""A motor without inductance: its current follows from a balance."""
+
+
+@pytest.mark.parametrize("options", [{"method": "rk87", "step": 0.02}, {"method": "natural", "step": 0.02}], ids=str)
+def test_efforts_that_balances_determine_have_derivatives(options):
+    paths, name = ["motors.m.resistance", "motors.m.constant", "motors.m.voltage", "bodies.arm.mass"], "joints.pin"
+    scene = scene_of_text(WOUND)
+    found = agrees(scene, paths, 0.1, [f"{name}.coordinate", "heat"], **options)
+    if options["method"] == "rk87":
+        back = ephs.gradient(scene, paths, [0.1], {f"{name}.coordinate": [1.0]}, **options)
+        np.testing.assert_allclose(list(back.derivatives.values()), found[f"{name}.coordinate"][-1, 0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["rk54", "natural"])
+@pytest.mark.parametrize(
+    ("text", "path"), [(WOUND, "joints.pin.pitch"), (WOUND.replace("1.25", "1.0"), "motors.m.resistance")]
+)
+def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method, text, path):
+    """The pitch is in the code of the joint, and equations with a resistance of 1 have no product by it."""
+    with pytest.raises(ephs.OptionError, match=f"{path}.*leaves equations as they are"):
+        ephs.sensitivity(scene_of_text(text), [path], 0.1, method=method, step=0.02)
 
 
 @pytest.mark.parametrize(

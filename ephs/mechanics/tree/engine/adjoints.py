@@ -23,7 +23,7 @@ class StepAdjoint:
         Steps forward, whose arrays are taken.
     """
 
-    def __init__(self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tangent: StepTangent) -> None:
+    def __init__(self, engine: Engine, relation: Callable[..., tuple[Program, str]], tangent: StepTangent) -> None:
         entries = step_program(looped=engine.looped).entries
         given = {name: _values(tangent.given[name]) for name in entries["step"].kinds}
         self._arrays = {name: given[name] for name in ("base", "start", "q", "y")}

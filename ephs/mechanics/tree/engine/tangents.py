@@ -131,7 +131,8 @@ class StepTangent:
     engine
         Its equations, whose tables are read where they are.
     relation
-        Called with the number of a component; returns the program and the entry that it is in machine code.
+        Called with the number of a component, and with ``derivatives=True`` where the program is to write these;
+        returns the program and the entry that it is in machine code.
     tableau
         Coefficients, by the names of `TableauRecord`.
     corrected
@@ -149,7 +150,7 @@ class StepTangent:
     """
 
     def __init__(
-        self, engine: Engine, relation: Callable[[int], tuple[Program, str]], tableau: Mapping[str, Any], *,
+        self, engine: Engine, relation: Callable[..., tuple[Program, str]], tableau: Mapping[str, Any], *,
         corrected: bool,
     ) -> None:  # fmt: skip
         coordinates, size = engine.sizes
@@ -243,7 +244,7 @@ def _paired(value: Any, kept: dict[str, Array], name: str) -> Any:
 
 
 def reaching(
-    engine: Engine, relation: Callable[[int], tuple[Program, str]], variant: Callable[[Program], Program]
+    engine: Engine, relation: Callable[..., tuple[Program, str]], variant: Callable[[Program], Program]
 ) -> dict[str, Any]:
     """Return the tables that hold addresses, with those of a variant of each program: of its tangents, or taped."""
 
@@ -256,8 +257,8 @@ def reaching(
     for number in evaluated(engine.tables):
         component[number].law = address(*relation(number))
     net = engine.tables["net"].copy()
-    for place, number in laws_in(net):
-        net[place] = address(*relation(number))
+    for place, number in laws_in(net):  # a network's balances are solved by derivatives
+        net[place] = address(*relation(number, derivatives=True))
     return {"own": own, "component": component, "net": net}
 
 
