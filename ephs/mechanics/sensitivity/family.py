@@ -44,9 +44,9 @@ LINEAR = (
     "velocity",
 )  # fmt: skip
 SIGNED = ("position", "at", "at1", "at2", "coordinate", "rate", "rest", "drive", "gravity", "velocity")
-RESISTING = ("friction", "stiffness", "damping", "conductance")
+OMITTED = ("friction", "stiffness", "damping", "conductance", "rest")
 NEXT_TO_NOTHING = 1e-200
-"""Replacement of zeros of these: models omit elements without resistance, neighbours would differ in structure."""
+"""Replacement of zeros of these: models omit what they scale or shift, and neighbours would be others."""
 LEAST = 0.1
 """Least magnitudes for numbers of a scene with either sign, in m, rad, s, N: near zero their own size is no scale."""
 
@@ -119,7 +119,7 @@ class ParameterFamily:
         if (path := self.problem.descriptor.strikes) is not None:
             raise OptionError("model", str(path), "a contact with a stiffness: impulses have no derivative")
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
-        idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in RESISTING}
+        idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in OMITTED}
         idle = {path: value for path, value in idle.items() if not self._read(path)}
         if idle:
             self.problem = self._made(idle)
@@ -151,7 +151,7 @@ class ParameterFamily:
                     raise
                 continue
             if not all(_alike(self.problem.descriptor, other.descriptor) for other in beside):
-                expected = "a number that leaves equations as they are: no pitch, no 1 that simplifies them"
+                expected = "a number that leaves equations as they are: no pitch, no 0 or 1 that simplifies them"
                 raise OptionError("parameters", path, expected)
             return Parameter(path, value, step, stencil, tables)
         raise OptionError("parameters", path, "a number that may change")

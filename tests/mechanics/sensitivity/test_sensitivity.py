@@ -136,6 +136,19 @@ def test_a_friction_of_zero_has_a_derivative_from_above():
     assert found["joints.j0.rate"][-1, 0, 0] == pytest.approx(expected, rel=1e-8)
 
 
+def test_a_rest_of_zero_has_a_derivative():
+    """Springs whose force is 0 at the coordinate 0 are other relations."""
+    scene = ephs.load("scenes/chain.toml")
+    agrees(
+        varied(scene, {"joints.j0.stiffness": 5.0}),
+        ["joints.j0.rest"],
+        0.2,
+        ["joints.j0.rate"],
+        step=0.02,
+        method="rk54",
+    )
+
+
 WOUND = """
 format = 1
 [bodies.arm]
