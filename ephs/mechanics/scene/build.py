@@ -148,7 +148,7 @@ def scene_names(scene: Scene) -> dict[Path, str]:
     out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
     out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
     for name, c in scene.all_contacts():
-        points = range(len(contact_points(scene, c)[1]))
+        points = range(len(contact_points(scene, c)))
         out |= {component_path("contacts", name) / f"point{i}": name for i in points}
     for name, j in scene.all_joints():
         at = component_path("joints", name)

@@ -27,6 +27,7 @@ FREE_END = "free"
 JOINTS: Final[tuple[str, ...]] = (AXIS, SINGLE, "joint")
 OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "body": frozenset({GROUND}),
+    "carrier": frozenset({GROUND}),
     "end": frozenset({GROUND, FREE_END}),
     "node": frozenset({ENVIRONMENT}),
     "joint": frozenset(),

@@ -51,7 +51,7 @@ def resolve_elements(
     known = {
         kind: {*document.sections[section], *_inside(parts, section)}
         for kind, section in (("joint", "joints"), ("tendon", "tendons"), ("surface", "surfaces"))
-    }
+    } | {"shell": set(document.sections["shells"])}
     found: dict[str, dict[str, Element]] = {}
     for section in (*KINDS, *REGISTERED):
         found[section] = {}
@@ -76,6 +76,10 @@ def _pulls(document: Document, found: Mapping[str, Mapping[str, Element]], fault
 def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
     """The scene with contacts of all surfaces of its level that can meet, where its file names none."""
     given = scene.contacts
+    for name, each in scene.surfaces.items():
+        faults += broken(Checked(each, f"surfaces.{name}"), Site(scene, each, SceneLevel()))
+    if faults:
+        return scene
     found = given or {each.name: each for each in meeting(scene)}
     for name, each in found.items():
         key = f"contacts.{name}" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
@@ -107,7 +111,10 @@ def check_table(table: Checked[Element], names: ReferableNames, known: Mapping[s
         of = "joint" if kind in JOINTS else kind
         if place.partition("[")[0] in spoiled or name in OUTSIDE[kind]:
             continue
-        if of in ("body", "end", "node"):
+        if of == "carrier" and name in known.get("shell", ()):
+            if name in names.bodies:
+                table.fault("collision", place, f'"{name}", a body and a shell', other="both")
+        elif of in ("body", "end", "carrier", "node"):
             names.check(table, name, place, "thermal" if of == "node" else "body")
         elif of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
             table.faults.append(unknown(of, f"{table.key}.{place}", name, known[of]))

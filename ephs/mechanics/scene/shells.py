@@ -19,14 +19,11 @@ from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Flag, NonNegative, Number, Positive, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.scene.text import file_inside
-from ephs.operad import quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
-from ephs.semantics.spaces import SE3, translation
+from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-PRESSURES = "pressures"
-"""First name of the outer ports at which the pressure acts on nodes."""
 CREASE = float(np.pi / 6.0)
 _MATERIAL = ("thickness", "E", "nu", "rho")
 _WAYS = ({"corners", "elements"}, {"points", "elements", "sides"}, {"file", "sides"})
@@ -292,17 +289,21 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
 
     def faces(self, site: Site) -> Faces:
         """Its elements; of a scene whose nodes are no bodies where these are at the start."""
-        places, welded = self.start()[0][:, 4:], {node: body for body, nodes in self.welds().items() for node in nodes}
-        bodies = {name for name, _ in site.scene.all_bodies()}
-
-        def end(i: int) -> tuple[str, Array]:
-            body, at = welded.get(i, self.node(i)), places[i]
-            if body not in bodies:
-                return GROUND, at
-            return body, SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:]
-
-        ends = tuple(end(i) for i in range(len(places)))
+        poses = {GROUND: SE3.identity()} | {name: body.pose for name, body in site.scene.all_bodies()}
+        at = self.start()[0]
+        drawn = [(body, own) if body in poses else (GROUND, at[i]) for i, (body, own) in enumerate(self.ends(poses))]
+        ends = tuple((body, pose[4:]) for body, pose in drawn)
         return Faces(ends, self.mesh().cells, frozenset(map(self.node, self.free())))
+
+    def ends(self, poses: Mapping[str, Array]) -> list[tuple[str, Array]]:
+        """The body of each node, its own where it is welded to none, and its pose (7,) there; of poses of bodies."""
+        welded = {node: body for body, nodes in self.welds().items() for node in nodes}
+        return [
+            (welded[i], SE3.compose(SE3.inverse(poses[welded[i]]), at))
+            if i in welded
+            else (self.node(i), SE3.identity())
+            for i, at in enumerate(self.start()[0])
+        ]
 
     def build(self, site: Site) -> None:
         held, pinned = dict(self.welds()), self.joined(pinned=True)
@@ -319,15 +320,15 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
             for i in nodes:
                 off = SE3.compose(SE3.inverse(site.pose(body)), poses[i])
                 twists[i, 3:] = quaternion_to_matrix(off[:4]).T @ (speed + np.cross(spin, off[4:]))
+        touching = any(surface.body == self.name for surface in site.scene.surfaces.values())
+        shared = sorted({*self.pushed(), *(self.free() if touching else ())})
         made = shell_system(
             self.shell(), gravity=site.gravity, damping=self.damping, held=ground, carried=carried,
-            pinned=[node for nodes in pinned.values() for node in nodes], shared=self.pushed(), heat=bool(warm),
+            pinned=[node for nodes in pinned.values() for node in nodes], shared=shared, heat=bool(warm),
             spread=self.spread, start=(poses, twists),
         )  # fmt: skip
-        of, at = quantity.body_momentum, PRESSURES
-        pushes = {f"p{i}": site.input(of, 0.0, f"node{i}", at=at, effort=False, named=False) for i in self.pushed()}
         ports = {port: site.momentum(body) for port, body in zip(carried, bodies, strict=True)}
-        site.add(made, ports | pushes | warm)
+        site.add(made, ports | {f"p{i}": site.momentum(self.node(i)) for i in shared} | warm)
 
     def __str__(self) -> str:
         shell = self.shell()

@@ -74,8 +74,10 @@ class Site:
         return self.scene.world.gravity
 
     def pose(self, body: str) -> Array:
-        """(7,) of a body in the world at the start; of the ground the identity."""
-        return IDENTITY_POSE if body == GROUND else self.scene.body(body).pose
+        """(7,) of a body, or a node of a shell, in the world at the start; of the ground the identity."""
+        if body == GROUND:
+            return IDENTITY_POSE
+        return found if (found := nodes_of_shells(self.scene).get(body)) is not None else self.scene.body(body).pose
 
     def twist(self, body: str) -> Array:
         """(6,) of a body at the start, in its frame; of the ground 0."""
@@ -110,8 +112,8 @@ class Site:
     # ---- junctions -----------------------------------------------------------------------------------------------
 
     def momentum(self, body: str) -> str:
-        """The junction of a body's momentum; the ground has one, too."""
-        if body != GROUND:
+        """The junction of the momentum of a body, or of a node of a shell; the ground has one, too."""
+        if body != GROUND and body not in nodes_of_shells(self.scene):
             self._known("body", "end", name=body)
         path = Path(["momenta", *body.split(".")])
         self._level.junctions[path] = junction(quantity.body_momentum)
@@ -208,7 +210,9 @@ class Site:
         """Only what keys name is connected: parts expose no other junctions."""
         named = [each for kind in kinds for each in self.element.named(kind)]
         if "body" in kinds:
-            named += [surfaces_of(self.scene)[each].body for each in self.element.named("surface")]
+            shells = dict(self.scene.all_shells())
+            for carrier in (surfaces_of(self.scene)[each].body for each in self.element.named("surface")):
+                named += shells[carrier].named("end") if carrier in shells else [carrier]
         if name not in named:
             expected = f"one that its keys name: {', '.join(named) or 'there is none'}"
             raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
@@ -217,6 +221,16 @@ class Site:
 def surfaces_of(scene: "Scene") -> "Mapping[str, Surface]":
     """Surfaces by dotted name; made once and kept with the scene."""
     return once(scene, "surfaces", lambda: dict(scene.all_surfaces()))
+
+
+def nodes_of_shells(scene: "Scene") -> "Mapping[str, Array]":
+    """Poses (7,) of all nodes of shells at the start, by their names in pictures; made once and kept with the scene."""
+
+    def made() -> dict[str, Array]:
+        sheets = [sheet for _, sheet in scene.all_shells()]
+        return {sheet.node(i): pose for sheet in sheets for i, pose in enumerate(sheet.start()[0])}
+
+    return once(scene, "nodes of shells", made)
 
 
 def built(scene: "Scene") -> SceneLevel:
