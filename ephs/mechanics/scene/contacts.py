@@ -15,7 +15,7 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.polytope import MOST_FACES, faces_and_edges
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Pair
-from ephs.mechanics.scene.site import SceneLevel, Site, surfaces_of
+from ephs.mechanics.scene.site import SceneLevel, Site, shells_of, surfaces_of
 from ephs.mechanics.scene.surfaces import SOFT, ContactLaw, Surface, TouchingElement
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import ConstitutiveLaw
@@ -77,7 +77,7 @@ class Contact(TouchingElement, section="contacts", said="pairs of surfaces that 
     def fine(self, site: Site) -> Told:
         """Whether nothing comes through between the nodes of a shell: a plane does not, nor what is wide enough."""
         pair = self._pair(site)
-        sheets = [site.scene.shell(each.body) for each in pair]
+        sheets = [shells_of(site.scene).get(each.body) for each in pair]
         if all(sheets):
             return {"found": "surfaces of two shells", "expected": "a surface of a body, or of the ground, at one end"}
         for sheet, own, other in ((sheets[0], *pair), (sheets[1], *pair[::-1])):
@@ -197,7 +197,7 @@ def contact_points(scene: "Scene", of: Contact) -> Points:
 
 def _points(scene: "Scene", one: Surface, other: Surface) -> Points:
     for own, far in ((one, other), (other, one)):
-        if (sheet := scene.shell(own.body)) is not None:
+        if (sheet := shells_of(scene).get(own.body)) is not None:
             return tuple(node_points(scene, sheet, own, far))
     points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
     bodies = (other.body, one.body) if swapped else (one.body, other.body)
@@ -247,8 +247,8 @@ def _contact(one: Surface, other: Surface) -> Contact:
 
 
 def overlaps(scene: "Scene", length: float, faults: list[Fault]) -> list[Fault]:
-    """Contacts of a level whose surfaces overlap at the start by more than a part of a length in m; hard ones, and
-    those of meshes with too many faces, are faults."""
+    """Contacts of a level whose surfaces overlap at the start by more than a part of a length in m, or of a shell's
+    size; hard ones, and those of meshes with too many faces, are faults."""
     found: list[Fault] = []
     surfaces = surfaces_of(scene)
     for name, of in scene.contacts.items():
@@ -261,10 +261,12 @@ def overlaps(scene: "Scene", length: float, faults: list[Fault]) -> list[Fault]:
             (one, two), (frame1, frame2) = point.bodies, point.frames
             depth = max(depth, -float(point.gap.distance(site.between(one, frame1, two, frame2))))
         told = f"{' and '.join(of.surfaces)} {depth:.3g} m deep in each other"
-        if hard and depth > OVERLAP * length:
+        sheets = [sheet for name in of.surfaces if (sheet := shells_of(scene).get(surfaces[name].body)) is not None]
+        size = min([length, *(float(np.ptp(sheet.mesh().points, axis=0).max()) for sheet in sheets)])
+        if hard and depth > OVERLAP * size:
             faults.append(fault("hard overlap", key, told))
-        elif depth > DEEP * length:
-            found.append(fault("overlap", key, told, most=DEEP * length))
+        elif depth > DEEP * size:
+            found.append(fault("overlap", key, told, most=DEEP * size))
     return found
 
 

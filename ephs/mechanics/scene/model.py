@@ -147,10 +147,6 @@ class Scene:
         own = self._own("joints", name)
         return own or _find(dict(self.all_joints()) | dict(self.implicit_joints()), name, "joint")
 
-    def shell(self, name: str) -> ShellSheet | None:
-        """The shell of this (dotted) name, its names seen from here; None where there is none."""
-        return self._own("shells", name)
-
     def section(self, name: str) -> Mapping[str, Any]:
         """The elements of a section of this level, registered ones included."""
         return getattr(self, name) if name in ELEMENTS else self.elements.get(name, {})

@@ -113,9 +113,11 @@ def check_table(table: Checked[Element], names: ReferableNames, known: Mapping[s
             continue
         if of == "carrier" and name in known.get("shell", ()):
             if name in names.bodies:
-                table.fault("collision", place, f'"{name}", a body and a shell', other="both")
+                table.fault("collision", place, f'"{name}", a body and a shell', other="a body")
         elif of in ("body", "end", "carrier", "node"):
-            names.check(table, name, place, "thermal" if of == "node" else "body")
+            sheets = known.get("shell", ()) if of == "carrier" else ()
+            there = replace(names, bodies=names.bodies | {*sheets}) if sheets else names
+            there.check(table, name, place, "thermal" if of == "node" else "body")
         elif of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
             table.faults.append(unknown(of, f"{table.key}.{place}", name, known[of]))
     table.faults.extend(broken(replace(table, spoiled=frozenset(spoiled))))

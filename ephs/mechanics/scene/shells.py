@@ -144,6 +144,15 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
             return {"at": at, "found": str(error), "expected": "convex elements, nearly in a plane, turned alike"}
         return True
 
+    @rule(
+        "edges", at="", placed=True, found="a body {taken}, as its node is called", expected="another name of the body",
+        advice="rename one of the two",
+    )  # fmt: skip
+    def apart(self, site: Site) -> Told:
+        """Whether its nodes have names of their own."""
+        taken = next((name for i in self.free() if (name := self.node(i)) in site.scene.bodies), None)
+        return taken is None or {"taken": taken}
+
     def _meshed(self) -> SheetMesh:
         """Its grid, or its mesh of quadrilaterals.
 

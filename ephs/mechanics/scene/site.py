@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.scene.custom import Element
     from ephs.mechanics.scene.model import Scene
+    from ephs.mechanics.scene.shells import ShellSheet
     from ephs.mechanics.scene.surfaces import Surface
 
 INPUTS = "inputs"
@@ -210,7 +211,7 @@ class Site:
         """Only what keys name is connected: parts expose no other junctions."""
         named = [each for kind in kinds for each in self.element.named(kind)]
         if "body" in kinds:
-            shells = dict(self.scene.all_shells())
+            shells = shells_of(self.scene)
             for carrier in (surfaces_of(self.scene)[each].body for each in self.element.named("surface")):
                 named += shells[carrier].named("end") if carrier in shells else [carrier]
         if name not in named:
@@ -223,12 +224,16 @@ def surfaces_of(scene: "Scene") -> "Mapping[str, Surface]":
     return once(scene, "surfaces", lambda: dict(scene.all_surfaces()))
 
 
+def shells_of(scene: "Scene") -> "Mapping[str, ShellSheet]":
+    """Shells by dotted name; made once and kept with the scene."""
+    return once(scene, "shells", lambda: dict(scene.all_shells()))
+
+
 def nodes_of_shells(scene: "Scene") -> "Mapping[str, Array]":
     """Poses (7,) of all nodes of shells at the start, by their names in pictures; made once and kept with the scene."""
 
     def made() -> dict[str, Array]:
-        sheets = [sheet for _, sheet in scene.all_shells()]
-        return {sheet.node(i): pose for sheet in sheets for i, pose in enumerate(sheet.start()[0])}
+        return {sheet.node(i): pose for sheet in shells_of(scene).values() for i, pose in enumerate(sheet.start()[0])}
 
     return once(scene, "nodes of shells", made)
 

@@ -86,9 +86,9 @@ class SurfaceShape(EntryTable):
     )
 
 
-def _shape(value: Any, _handler: Any) -> dict[str, Any]:
-    """Shapes that a table gives, with their sizes."""
-    return SurfaceShape.model_validate(value).model_dump(exclude_none=True)
+def _shape(value: Any, _handler: Any) -> dict[str, Any] | None:
+    """Shapes that a table gives, with their sizes; None of balls of a shell in a result."""
+    return None if value is None else SurfaceShape.model_validate(value).model_dump(exclude_none=True)
 
 
 Shape = Annotated[dict[str, Any], WrapValidator(_shape, json_schema_input_type=SurfaceShape)]
