@@ -230,7 +230,7 @@ def meeting(scene: "Scene") -> Iterator[Contact]:
             if upto[j] - upto[i + 1] > np.pi * sizes[i, 0]:
                 yield _contact(pieces[i], pieces[j])
     joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints() if j.kind != "free"}
-    joined |= {frozenset((name, end)) for name, sheet in scene.all_shells() for end in sheet.named("end")}
+    joined |= {frozenset((name, end)) for name, sheet in scene.all_shells() for end in sheet.named("side")}
     level = [[each] for each in scene.surfaces.values()]
     level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
     groups = {name: each.group for name, each in scene.surfaces.items() if each.group is not None}

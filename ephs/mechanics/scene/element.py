@@ -29,6 +29,7 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "body": frozenset({GROUND}),
     "carrier": frozenset({GROUND}),
     "end": frozenset({GROUND, FREE_END}),
+    "side": frozenset({GROUND, FREE_END}),
     "node": frozenset({ENVIRONMENT}),
     "joint": frozenset(),
     AXIS: frozenset(),

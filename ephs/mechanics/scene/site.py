@@ -115,7 +115,7 @@ class Site:
     def momentum(self, body: str) -> str:
         """The junction of the momentum of a body, or of a node of a shell; the ground has one, too."""
         if body != GROUND and body not in nodes_of_shells(self.scene):
-            self._known("body", "end", name=body)
+            self._known("body", "end", "side", name=body)
         path = Path(["momenta", *body.split(".")])
         self._level.junctions[path] = junction(quantity.body_momentum)
         return str(path)
@@ -213,7 +213,7 @@ class Site:
         if "body" in kinds:
             shells = shells_of(self.scene)
             for carrier in (surfaces_of(self.scene)[each].body for each in self.element.named("surface")):
-                named += shells[carrier].named("end") if carrier in shells else [carrier]
+                named += shells[carrier].named("side") if carrier in shells else [carrier]
         if name not in named:
             expected = f"one that its keys name: {', '.join(named) or 'there is none'}"
             raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
