@@ -81,25 +81,20 @@ def test_a_part_that_is_turned_has_its_sheet_on_its_beam(tmp_path):
     assert other == pytest.approx(np.column_stack([-one[:, 1], one[:, 0], one[:, 2]]), abs=1e-9)
 
 
-def tip(edge, young="1e9"):
-    """Of a sheet beyond the ground or the end of a short beam, after a fall of 0.02 s."""
-    sheet = HALF.format(
-        name="left", low=-0.5 * WIDE, high=0.5 * WIDE, n=2, more="", edges=f'["free", "free", "free", "{edge}"]'
-    )
-    beam = RIB.format(k=1).replace("[0.0, 0.0, 0.0]", "[-0.05, 0.0, 0.0]").replace("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]")
-    scene = scene_of_text(
-        "format = 1\n" + sheet + (beam.replace("E = 1e9", f"E = {young}") if edge != "ground" else "")
-    )
-    run = ephs.simulate(scene, 0.02, method="radau", rtol=1e-8, atol=1e-11)
-    assert run.energy_error.max() < 1e-10
-    return run.shell("left").position[-1, -1, 2]
+def test_a_sheet_at_the_end_of_a_stiff_beam_vibrates_as_one_that_is_clamped():
+    """To the order of 1/E of the beam; one of the sheet's material is much softer than the ground."""
 
+    def beyond(edge, beam=""):
+        edges = f'["free", "free", "free", "{edge}"]'
+        sheet = HALF.format(name="left", low=-0.5 * WIDE, high=0.5 * WIDE, n=2, more="", edges=edges)
+        return lowest("format = 1\n" + sheet + beam)
 
-def test_a_sheet_at_the_end_of_a_stiff_beam_is_as_one_that_is_clamped():
-    """To the order of 1/E of the beam."""
-    clamped = tip("ground")
-    off = [abs(tip("rib.1", young) - clamped) for young in ("1e10", "1e12")]
-    assert off[1] < 0.03 * off[0] and off[0] < abs(clamped)
+    short = (
+        RIB.format(k=1).replace("[0.0, 0.0, 0.0]", "[-0.05, 0.0, 0.0]").replace("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]")
+    )
+    clamped = beyond("ground")
+    off = [abs(beyond("rib.1", short.replace("E = 1e9", f"E = {young}")) / clamped - 1.0) for young in ("1e9", "1e11")]
+    assert off[1] < 0.02 * off[0] and off[0] > 1e-4
 
 
 @pytest.mark.parametrize(
