@@ -76,8 +76,10 @@ def _pulls(document: Document, found: Mapping[str, Mapping[str, Element]], fault
 def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
     """The scene with contacts of all surfaces of its level that can meet, where its file names none."""
     given = scene.contacts
-    for name, each in scene.surfaces.items():
-        faults += broken(Checked(each, f"surfaces.{name}"), Site(scene, each, SceneLevel()))
+    sheets = {name: each.settled(Site(scene, each, SceneLevel())) for name, each in scene.shells.items()}
+    scene = with_sections(scene, {"shells": sheets})
+    for each in (*sheets.values(), *scene.surfaces.values()):  # what carries contacts
+        faults += broken(Checked(each, f"{each.section}.{each.name}"), Site(scene, each, SceneLevel()))
     if faults:
         return scene
     found = given or {each.name: each for each in meeting(scene)}

@@ -58,6 +58,17 @@ def test_a_beam_may_have_more_nodes_than_the_side():
     assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
 
 
+def test_a_sheet_and_the_beam_along_its_side_do_not_touch():
+    touching = "surface = { stiffness = 1e3, radius = 0.02 }\n"
+    skin = '[surfaces.skin]\nbody = "left"\nstiffness = 1e3\n'
+    floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\nposition = [0.0, 0.0, -1.0]\n'
+    text = ribbed(2, edges='["rib", "free", "free", "free"]') + touching + skin + floor
+    pairs = [set(each.surfaces) for each in scene_of_text(text).contacts.values()]
+    assert [pair for pair in pairs if "skin" in pair] == [{"skin", "floor"}]
+    with pytest.raises(ephs.SceneError, match=r"shells.left.edges\[0\]: found 0.25 m from a point"):
+        scene_of_text(text.replace("elements = [2, 1]", "elements = [4, 1]", 1))
+
+
 def test_books_are_closed_and_a_run_goes_on():
     scene = scene_of_text(ribbed(2, more="damping = 1e-3"))
     pace = {"method": "radau", "rtol": 1e-7, "atol": 1e-9}
