@@ -67,6 +67,16 @@ def test_a_sheet_that_falls_comes_to_rest_on_its_weight(method):
     assert run.audit.passed
 
 
+def test_heat_of_touching_warms_a_node_and_is_read_from_a_file(tmp_path):
+    warm = 'heat = "store"\n[thermal.store]\ncapacity = 1.0\ntemperature = 300.0\n'
+    run = ephs.simulate(touch(more="heat = 'store'", floor=FLOOR + warm), 0.1)
+    assert run.thermal("store").temperature[-1] - 300.0 == pytest.approx(run.heat[-1], rel=1e-6)
+    assert run.heat[-1] > 0.01 and run.contact("skin_floor").heat.max() > 0.0
+    run.save(tmp_path / "run.nc")
+    again = ephs.load_solution(tmp_path / "run.nc").contact("skin_floor")
+    assert np.array_equal(again.force, run.contact("skin_floor").force)
+
+
 def test_a_pressed_sheet_rests_on_its_weight_and_the_pressure():
     """A node has one junction for both; the pressure acts from above."""
     run = ephs.simulate(touch(more="pressure = -50.0"), 0.4, method="radau", rtol=1e-5)
