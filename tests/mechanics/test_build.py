@@ -21,6 +21,7 @@ from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
+from tests.written import scene_of_text
 
 ROOT = File(__file__).parents[2]
 # Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
@@ -124,6 +125,21 @@ def test_loads_are_no_part_of_the_system_but_ports_where_they_act(walker, tmp_pa
     by_hand = ephs.simulate(system, 0.5, inputs=drive | dict.fromkeys(ports, wrench))
     whole = ephs.simulate(loaded, 0.5)
     np.testing.assert_allclose(by_hand["bodies.foot.pe.q"][-1], whole["bodies.foot.pe.q"][-1], rtol=0.0, atol=1e-14)
+
+
+def test_pressures_are_no_part_of_the_system_but_ports_where_they_act():
+    text = """format = 1
+    [shells.sheet]
+    corners = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.1, 0.0], [0.0, 0.1, 0.0]]
+    elements = [1, 1]
+    thickness = 0.01
+    E = 1e5
+    rho = 1000.0
+    edges = ["free", "free", "free", "ground"]
+    """
+    at_rest, blown = scene_of_text(text), scene_of_text(text + "pressure = 20.0\n")
+    assert not set(at_rest.system().interface)
+    assert set(map(str, blown.system().interface)) == {"momenta.sheet-node1", "momenta.sheet-node2"}
 
 
 @settings(calm, max_examples=30)

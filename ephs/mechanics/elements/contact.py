@@ -34,8 +34,15 @@ Q_R = Path.of("q_r")
 UNITS: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def contact(touches: Sequence[Touch], law: ConstitutiveLaw | Impact, *, heat: bool = False) -> System:
-    """Contact of two surfaces, at each of their points that can touch; ports p1, p2 carry the bodies' momenta.
+def contact(
+    touches: Sequence[Touch],
+    law: ConstitutiveLaw | Impact,
+    *,
+    heat: bool = False,
+    ends: Sequence[tuple[str, str]] | None = None,
+    shares: Sequence[float] | None = None,
+) -> System:
+    """Contact of two surfaces, at each of their points that can touch.
 
     Parameters
     ----------
@@ -43,20 +50,32 @@ def contact(touches: Sequence[Touch], law: ConstitutiveLaw | Impact, *, heat: bo
         Frames and gap of each point, as `surfaces.touches` gives them; boxes ``point0``, ``point1``, …
     heat
         The heat leaves through a port s; else an environment inside, ``env``, takes it.
+    ends
+        Ports of each point that carry the momenta of its two bodies; p1 and p2 of all where None.
+    shares
+        Parts of the stiffness that the points have; 1 where None.
     """
     momentum = quantity.body_momentum
-    junctions = {name: junction(momentum, exposed=True) for name in ("p1", "p2")}
+    pairs = [("p1", "p2")] * len(touches) if ends is None else ends
+    parted = [1.0] * len(touches) if shares is None else shares
+    junctions = {name: junction(momentum, exposed=True) for pair in pairs for name in pair}
     junctions["s"] = junction(quantity.entropy, exposed=heat)
-    known = {(gap.name, gap.numbers): gap for _, _, gap in touches}
-    parts = {key: _parts(gap, law) for key, gap in known.items()}
+    kinds = [(gap.name, gap.numbers, share) for (_, _, gap), share in zip(touches, parted, strict=True)]
+    known = {kind: gap for kind, (_, _, gap) in zip(kinds, touches, strict=True)}
+    parts = {kind: _parts(gap, shared(law, kind[2])) for kind, gap in known.items()}
     points: dict[str, System | Storage] = {
-        f"point{i}": between_frames(one, two, *parts[gap.name, gap.numbers], heat=True)
-        for i, (one, two, gap) in enumerate(touches)
+        f"point{i}": between_frames(one, two, *parts[kind], heat=True)
+        for i, (kind, (one, two, _)) in enumerate(zip(kinds, touches, strict=True))
     }
-    boxes: dict[str, dict[str, str]] = {name: {port: port for port in junctions} for name in points}
+    boxes = {name: {"p1": one, "p2": two, "s": "s"} for name, (one, two) in zip(points, pairs, strict=True)}
     if not heat:
         boxes["env"], points["env"] = {"s": "s"}, library.environment()
     return System.of(Pattern(junctions=junctions, boxes=boxes), points)
+
+
+def shared(law: ConstitutiveLaw | Impact, share: float) -> ConstitutiveLaw | Impact:
+    """Law of a point with a part of the stiffness; what is relative to the normal force is the same."""
+    return law if isinstance(law, Impact) else replace(law, stiffness=law.stiffness * share)
 
 
 def _parts(gap: Gap, law: ConstitutiveLaw | Impact) -> tuple[Storage, Irreversible]:

@@ -7,16 +7,16 @@ from typing import Any, Protocol, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ephs.mechanics.elements.contact import lever, losses
+from ephs.mechanics.elements.contact import lever, losses, shared
 from ephs.mechanics.motion.batch import adjoint_inverse, compose, inverse, turned
 from ephs.mechanics.motion.moving import Moving
+from ephs.mechanics.scene.balls import ContactPoint
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import GROUND, Scene
 from ephs.mechanics.shapes.gap import Gap, ramp
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import ConstitutiveLaw
-from ephs.mechanics.shapes.pairs import Touch
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import SPANNED
@@ -69,7 +69,7 @@ class Pressed(Moving, Protocol):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class _ContactPoint:
+class _PointMotion:
     """One point of a contact: the values of `ContactMotion`, and wrenches (n, 6) on bodies 1 and 2 in their frames."""
 
     gap: Array
@@ -82,7 +82,7 @@ class _ContactPoint:
 
 def contact_motion(scene: Scene, of: Contact, read: Pressed) -> ContactMotion:
     """Read a contact's motion."""
-    points = [point for _, point in _points(scene, of, read)]
+    points = [_read(point, of, read, i) for i, point in enumerate(contact_points(scene, of))]
     gaps, forces = np.array([point.gap for point in points]), np.array([point.force for point in points])
     weights = np.linalg.norm(forces, axis=2)
     touching = weights.any(axis=0)
@@ -103,13 +103,13 @@ def contact_poses(scene: Scene, read: Moving) -> Iterator[tuple[Path, Path | Non
     """Relative poses of points of contacts by the poses of the bodies: the path of the state, that of a point of this
     contact before with equal axes, if any, and the place (n, 3) in m."""
     for name, of in scene.all_contacts():
-        bodies, touches = contact_points(scene, of)
-        one, other = (read.poses(body) for body in bodies)
-        before: dict[bytes, Path] = {}
-        into: dict[bytes, Array] = {}
-        for i, (frame1, frame2, _) in enumerate(touches):
+        before: dict[object, Path] = {}
+        into: dict[object, Array] = {}
+        for i, point in enumerate(contact_points(scene, of)):
+            (first, second), (frame1, frame2) = point.bodies, point.frames
+            one, other = read.poses(first), read.poses(second)
             path = component_path("contacts", name) / f"point{i}" / "pe" / "q_r"
-            axes, key = frame1[:4].tobytes() + frame2[:4].tobytes(), frame1.tobytes()
+            axes, key = (point.bodies, frame1[:4].tobytes(), frame2[:4].tobytes()), (first, frame1.tobytes())
             if key not in into:  # points on a plane share it
                 into[key] = inverse(compose(one, np.broadcast_to(frame1, one.shape)))
             end = other[:, 4:] + turned(other, np.broadcast_to(frame2[4:], (len(other), 3)))
@@ -129,14 +129,8 @@ def _masks(of: Contact, read: Pressed, points: int, instants: int) -> tuple[NDAr
     return whole, each
 
 
-def _points(scene: Scene, of: Contact, read: Pressed) -> Iterator[tuple[tuple[str, str], _ContactPoint]]:
-    bodies, touches = contact_points(scene, of)
-    for i, touch in enumerate(touches):
-        yield bodies, _point(bodies, touch, of, read, i)
-
-
-def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, number: int) -> _ContactPoint:
-    frame1, frame2, gap = touch
+def _read(point_of: ContactPoint, of: Contact, read: Pressed, number: int) -> _PointMotion:
+    bodies, (frame1, frame2), gap = point_of.bodies, point_of.frames, point_of.gap
     poses = [read.poses(name) for name in bodies]
     ends = [compose(pose, np.broadcast_to(o, pose.shape)) for pose, o in zip(poses, (frame1, frame2), strict=True)]
     relative = compose(inverse(ends[0]), ends[1])
@@ -147,20 +141,19 @@ def _point(bodies: tuple[str, str], touch: Touch, of: Contact, read: Pressed, nu
     normal, point = gap.contact(relative.T)
     distance = np.asarray(gap.distance(relative.T))
     velocity = twist[:, 3:] + np.cross(twist[:, :3], _rows(point, len(relative)))
-    if isinstance(of.law, Impact):
+    law = shared(of.law, point_of.share)
+    if isinstance(law, Impact):
         pressed = _turned_back(ends[1], read.pressed(of.name, number)[0])
         wrench = np.column_stack([np.cross(_rows(point, len(relative)), pressed), pressed])
         heat = np.maximum(-np.einsum("ni,ni->n", wrench, twist), 0.0)
         touching = np.any(pressed, axis=1)
     else:
-        wrench, heat = _elastic(gap, of.law, relative, twist, lever(normal, point), distance)
+        wrench, heat = _elastic(gap, law, relative, twist, lever(normal, point), distance)
         touching = distance < 0.0
     slip = np.linalg.norm(np.cross(_rows(normal, len(relative)), velocity), axis=1)
     place = ends[1][:, 4:] + turned(ends[1], _rows(point, len(relative)))
     one, two = (_carried(o, wrench) for o in (offset1, np.broadcast_to(frame2, relative.shape)))
-    return _ContactPoint(
-        distance, turned(poses[1], two[:, 3:]), place, np.where(touching, slip, 0.0), heat, (-one, two)
-    )
+    return _PointMotion(distance, turned(poses[1], two[:, 3:]), place, np.where(touching, slip, 0.0), heat, (-one, two))
 
 
 def _elastic(

@@ -9,15 +9,14 @@ from ephs.mechanics.motion.batch import rotations
 from ephs.mechanics.scene.build import component_path
 from ephs.mechanics.scene.element import GROUND
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.scene.shells import PRESSURES, ShellSheet
-from ephs.operad import Path
+from ephs.mechanics.scene.shells import ShellSheet
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.solve.posing.problem import Signal, State
 
 
-def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tuple[list[Path], Signal]:
-    """Outer ports of the nodes of a shell, and the wrenches there (6 · ports,), in nodes' axes, of a pressure in Pa."""
+def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tuple[list[str], Signal]:
+    """Nodes of a shell, and the wrenches there (6 · nodes,), in nodes' axes, of a pressure in Pa."""
     cells, start, at = sheet.mesh().cells, sheet.start()[0], component_path("shells", name)
     welded = {node: body for body, nodes in sheet.welds().items() for node in nodes}
     pushed = sheet.pushed()
@@ -42,4 +41,4 @@ def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tup
         out[:, 3:] = np.einsum("nij,ni->nj", rotations(found[pushed, :4]), forces)
         return out.ravel()
 
-    return [Path([PRESSURES, *name.split("."), f"node{node}"]) for node in pushed], Signal(wrenches)
+    return [sheet.node(node) for node in pushed], Signal(wrenches)

@@ -90,9 +90,9 @@ def scene_signals(
             name, given = markers[name].body, _at_marker(markers[name], given)
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
     for name, sheet in blown.items():
-        ports, whole = pressed(scene, name, sheet, pressures[name])
+        nodes, whole = pressed(scene, name, sheet, pressures[name])
         shared = Signal(_Latest(whole).at)
-        others |= {port: part_of(shared, slice(6 * i, 6 * i + 6)) for i, port in enumerate(ports)}
+        wrenches |= {node: part_of(shared, slice(6 * i, 6 * i + 6)) for i, node in enumerate(nodes)}
     return forces, wrenches, others
 
 

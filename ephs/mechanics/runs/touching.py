@@ -12,6 +12,7 @@ from ephs.mechanics.motion.moving import Moving
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.contacts import Contact, contact_points
 from ephs.mechanics.scene.model import Scene
+from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.solution import Solution
@@ -55,11 +56,13 @@ def stays_open(scene: Scene, contact: Contact, read: Moving) -> bool:
     -----
     A gap changes by no more than the second surface moves, and that is within its support about its frame.
     """
-    bodies, touches = contact_points(scene, contact)
-    one, other = (read.poses(body) for body in bodies)
-    relative = compose(inverse(one), other)
-    for frame1, frame2, gap in touches:
-        pose = compose(compose(inverse(frame1[None]), relative), frame2[None])
+    relative: dict[tuple[str, str], Array] = {}
+    for point in contact_points(scene, contact):
+        (frame1, frame2), gap = point.frames, point.gap
+        if point.bodies not in relative:
+            one, other = (read.poses(body) for body in point.bodies)
+            relative[point.bodies] = compose(inverse(one), other)
+        pose = compose(compose(inverse(frame1[None]), relative[point.bodies]), frame2[None])
         turned, moved = change(pose[:-1].T, pose[1:].T)
         way = moved + gap.support.limit * turned
         outside = np.asarray(gap.distance(pose.T))

@@ -73,10 +73,11 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
 
 
 def started_system(scene: Scene) -> System:
-    """The same with the scene's initial state, and ports where its loads act; made once, too."""
+    """The same with the scene's initial state, and ports where its loads and pressures act; made once, too."""
 
     def made() -> System:
         loaded = {load.body for _, load in scene.all_loads()}
+        loaded |= {sheet.node(node) for _, sheet in scene.all_shells() for node in sheet.pushed()}
         return scene_system(scene, wrenches=loaded).with_initial(initial_state(scene))
 
     return once(scene, "started", made)
@@ -153,7 +154,7 @@ def scene_names(scene: Scene) -> dict[Path, str]:
     out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
     out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
     for name, c in scene.all_contacts():
-        points = range(len(contact_points(scene, c)[1]))
+        points = range(len(contact_points(scene, c)))
         out |= {component_path("contacts", name) / f"point{i}": name for i in points}
     for name, j in scene.all_joints():
         at = component_path("joints", name)

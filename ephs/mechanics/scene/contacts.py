@@ -8,25 +8,26 @@ from typing import TYPE_CHECKING, Any, Self, final
 import numpy as np
 
 from ephs.mechanics.elements.contact import contact
+from ephs.mechanics.scene.balls import ContactPoint, node_points, too_narrow
 from ephs.mechanics.scene.custom import key
 from ephs.mechanics.scene.element import ENVIRONMENT
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.polytope import MOST_FACES, faces_and_edges
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Pair
-from ephs.mechanics.scene.site import SceneLevel, Site, surfaces_of
+from ephs.mechanics.scene.site import SceneLevel, Site, shells_of, surfaces_of
 from ephs.mechanics.scene.surfaces import SOFT, ContactLaw, Surface, TouchingElement
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import ConstitutiveLaw
-from ephs.mechanics.shapes.pairs import PAIRS, Touch, touches
+from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.systems.kept import once
 
 if TYPE_CHECKING:
     from ephs.mechanics.scene.model import Scene
 
-Points = tuple[tuple[str, str], tuple[Touch, ...]]
-"""Bodies 1 and 2 of a contact, and its gaps with their frames on these."""
+Points = tuple[ContactPoint, ...]
+"""The points at which a contact's surfaces can touch."""
 DEEP = 1e-2
 """Least reported overlap at the start, as a fraction of the mechanism's length."""
 OVERLAP = 1e-9
@@ -70,12 +71,30 @@ class Contact(TouchingElement, section="contacts", said="pairs of surfaces that 
         return first in (None, self.name) or {"first": first}
 
     @rule(
+        "surfaces", placed=True, found="{found}", expected="{expected}",
+        advice="refine the shell, enlarge the balls at its nodes, or list the contacts in [contacts]",
+    )  # fmt: skip
+    def fine(self, site: Site) -> Told:
+        """Whether nothing comes through between the nodes of a shell: a plane does not, nor what is wide enough."""
+        pair = self._pair(site)
+        sheets = [shells_of(site.scene).get(each.body) for each in pair]
+        if all(sheets):
+            return {"found": "surfaces of two shells", "expected": "a surface of a body, or of the ground, at one end"}
+        for sheet, own, other in ((sheets[0], *pair), (sheets[1], *pair[::-1])):
+            if sheet is not None and not isinstance(told := too_narrow(sheet, own, other), bool):
+                found = f"a {other.kind} of half width {told['width']:.4g} m"
+                return {"found": found, "expected": f"one of {told['least']:.4g} m, or a plane, for the shell's nodes"}
+            if sheet is not None and not any(node_points(site.scene, sheet, own, other)):
+                return {"found": f'nodes that are all joined to "{other.body}"', "expected": "nodes that move"}
+        return True
+
+    @rule(
         "surfaces", at="", placed=True, found="a {one} and a {other}", expected="one plane at most",
         advice="list the pairs in contacts, or use other shapes",
     )  # fmt: skip
     def known(self, site: Site) -> Told:
         """Whether its shapes can meet."""
-        one, other = (next(iter(each.shape)) for each in self._pair(site))
+        one, other = (each.kind for each in self._pair(site))
         return (one, other) in PAIRS or (other, one) in PAIRS or {"one": one, "other": other}
 
     @rule(
@@ -146,35 +165,43 @@ class Contact(TouchingElement, section="contacts", said="pairs of surfaces that 
         return given | given.pop("law", {})
 
     def build(self, site: Site) -> None:
-        bodies, points = contact_points(site.scene, self)
+        points = contact_points(site.scene, self)
         warm = site.heated(self.heat or ENVIRONMENT)
-        ports = {f"p{i}": site.momentum(body) for i, body in enumerate(bodies, 1)}
         start = {
-            f"point{i}.pe.q_r": site.between(bodies[0], one, bodies[1], other)
-            for i, (one, other, _) in enumerate(points)
+            f"point{i}.pe.q_r": site.between(point.bodies[0], point.frames[0], point.bodies[1], point.frames[1])
+            for i, point in enumerate(points)
         }
-        site.add(contact(points, self.law, heat=bool(warm)), ports | warm, initial=start)
+        own = dict.fromkeys(body for point in points for body in point.bodies)
+        port = {body: f"p{i}" for i, body in enumerate(own, 1)}
+        touches = [(*point.frames, point.gap) for point in points]
+        ends, shares = [(port[one], port[two]) for one, two in (x.bodies for x in points)], [x.share for x in points]
+        made = contact(touches, self.law, heat=bool(warm), ends=ends, shares=shares)
+        site.add(made, {port[body]: site.momentum(body) for body in own} | warm, initial=start)
 
     def __str__(self) -> str:
         return " – ".join(self.surfaces)
 
 
 def contact_points(scene: "Scene", of: Contact) -> Points:
-    """Bodies and points of a contact, as seen from a scene; made once for all its contacts and kept with it."""
+    """Points of a contact, as seen from a scene; made once for all its contacts and kept with it."""
 
     def made() -> dict[tuple[str, ...], Points]:
         surfaces = surfaces_of(scene)
         out: dict[tuple[str, ...], Points] = {}
         for _, each in scene.all_contacts():
-            out[tuple(each.surfaces)] = _points(*(surfaces[name] for name in each.surfaces))
+            out[tuple(each.surfaces)] = _points(scene, *(surfaces[name] for name in each.surfaces))
         return out
 
     return once(scene, "contact points", made)[tuple(of.surfaces)]
 
 
-def _points(one: Surface, other: Surface) -> Points:
+def _points(scene: "Scene", one: Surface, other: Surface) -> Points:
+    for own, far in ((one, other), (other, one)):
+        if (sheet := shells_of(scene).get(own.body)) is not None:
+            return tuple(node_points(scene, sheet, own, far))
     points, swapped = touches(one.shape, one.frame, other.shape, other.frame)
-    return ((other.body, one.body) if swapped else (one.body, other.body)), points
+    bodies = (other.body, one.body) if swapped else (one.body, other.body)
+    return tuple(ContactPoint(bodies, (first, second), gap) for first, second, gap in points)
 
 
 def _rigid(scene: "Scene") -> DisjointSets[str]:
@@ -203,6 +230,7 @@ def meeting(scene: "Scene") -> Iterator[Contact]:
             if upto[j] - upto[i + 1] > np.pi * sizes[i, 0]:
                 yield _contact(pieces[i], pieces[j])
     joined = {frozenset((j.body1, j.body2)) for _, j in scene.all_joints() if j.kind != "free"}
+    joined |= {frozenset((name, end)) for name, sheet in scene.all_shells() for end in sheet.named("side")}
     level = [[each] for each in scene.surfaces.values()]
     level += [[each for name, each in surfaces.items() if name.startswith(f"{part}.")] for part in scene.parts]
     groups = {name: each.group for name, each in scene.surfaces.items() if each.group is not None}
@@ -219,8 +247,8 @@ def _contact(one: Surface, other: Surface) -> Contact:
 
 
 def overlaps(scene: "Scene", length: float, faults: list[Fault]) -> list[Fault]:
-    """Contacts of a level whose surfaces overlap at the start by more than a part of a length in m; hard ones, and
-    those of meshes with too many faces, are faults."""
+    """Contacts of a level whose surfaces overlap at the start by more than a part of a length in m, or of a shell's
+    size; hard ones, and those of meshes with too many faces, are faults."""
     found: list[Fault] = []
     surfaces = surfaces_of(scene)
     for name, of in scene.contacts.items():
@@ -228,22 +256,24 @@ def overlaps(scene: "Scene", length: float, faults: list[Fault]) -> list[Fault]:
         if faceted := _faceted([surfaces[each] for each in of.surfaces]):
             faults.append(fault("many faces", key, faceted, most=MOST_FACES))
             continue
-        (one, other), points = _points(*(surfaces[each] for each in of.surfaces))
         site, depth, hard = Site(scene, of, SceneLevel()), 0.0, of.stiffness is None
-        for frame1, frame2, gap in points:
-            depth = max(depth, -float(gap.distance(site.between(one, frame1, other, frame2))))
+        for point in _points(scene, *(surfaces[each] for each in of.surfaces)):
+            (one, two), (frame1, frame2) = point.bodies, point.frames
+            depth = max(depth, -float(point.gap.distance(site.between(one, frame1, two, frame2))))
         told = f"{' and '.join(of.surfaces)} {depth:.3g} m deep in each other"
-        if hard and depth > OVERLAP * length:
+        sheets = [sheet for name in of.surfaces if (sheet := shells_of(scene).get(surfaces[name].body)) is not None]
+        size = min([length, *(float(np.ptp(sheet.mesh().points, axis=0).max()) for sheet in sheets)])
+        if hard and depth > OVERLAP * size:
             faults.append(fault("hard overlap", key, told))
-        elif depth > DEEP * length:
-            found.append(fault("overlap", key, told, most=DEEP * length))
+        elif depth > DEEP * size:
+            found.append(fault("overlap", key, told, most=DEEP * size))
     return found
 
 
 def _faceted(pair: list[Surface]) -> str:
     """The mesh of a pair that has too many faces and edges to meet the other surface."""
-    if not any("plane" in each.shape for each in pair):
+    if not any(each.kind == "plane" for each in pair):
         for each in pair:
-            if "mesh" in each.shape and (count := faces_and_edges(each.shape["mesh"])) > MOST_FACES:
+            if each.kind == "mesh" and (count := faces_and_edges(each.shape["mesh"])) > MOST_FACES:
                 return f"{each.name} with {count} faces and edges or more"
     return ""

@@ -34,11 +34,11 @@ def lost_states(scene: Scene, states: Mapping[Path, Array]) -> Iterator[Fault]:
             path = Path([*at, *inner.split(".")])
             given = start[path]
             apart = _apart(given, value)
-            if Path(path[:-1]) not in counted and apart > NEAR * (1.0 + float(np.abs(value).max())):
+            if Path(path[:-1]) not in counted and apart > NEAR * (1.0 + float(np.abs(value).max(initial=0.0))):
                 yield fault("not continued", f"{section}.{name}", f"the state {inner} = {value.tolist()}")
 
 
 def _apart(given: Array, value: Array) -> float:
     """Largest difference; the quaternions q and −q are one rotation."""
     other = np.concatenate([-value[:4], value[4:]]) if value.size in (4, 7) else value
-    return min(float(np.abs(given - each).max()) for each in (value, other))
+    return min(float(np.abs(given - each).max(initial=0.0)) for each in (value, other))

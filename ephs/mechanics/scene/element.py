@@ -27,7 +27,9 @@ FREE_END = "free"
 JOINTS: Final[tuple[str, ...]] = (AXIS, SINGLE, "joint")
 OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "body": frozenset({GROUND}),
+    "carrier": frozenset({GROUND}),
     "end": frozenset({GROUND, FREE_END}),
+    "side": frozenset({GROUND, FREE_END}),
     "node": frozenset({ENVIRONMENT}),
     "joint": frozenset(),
     AXIS: frozenset(),

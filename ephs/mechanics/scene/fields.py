@@ -9,6 +9,7 @@ import numpy as np
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.layers import LAYER_NUMBERS, layer_number
 from ephs.mechanics.scene.model import (
     ATTACHED,
     ELEMENTS,
@@ -52,6 +53,8 @@ class NumberField:
         ``"frame"`` where bodies have to follow, ``"state"`` where it is a joint's coordinate or rate.
     faults
         What is wrong with the new value: from (scene, name, the scene before).
+    table
+        Whether it has an entry for each table of a list: ``LIST.KEY`` is ``LIST[0].KEY`` of the first.
     """
 
     get: Callable[[Scene, str], Array]
@@ -60,6 +63,7 @@ class NumberField:
     spread: bool = False
     moves: str = ""
     faults: Callable[[Scene, str, Scene], list[Fault]] = _sound
+    table: bool = False
 
 
 def placed(scene: Scene, before: Scene, coordinates: Mapping[str, Array], rates: Mapping[str, Array]) -> Scene:
@@ -277,15 +281,38 @@ def _friction_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
     return []
 
 
-def _registered(kind: type[Element]) -> dict[str, NumberField]:
-    """The numbers of elements that build themselves, with the checks of their tables."""
+def _table_faults(section: str) -> Callable[[Scene, str, Scene], list[Fault]]:
+    """The checks of an element's table."""
 
     def faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
         from ephs.mechanics.scene.resolve_elements import number_faults
 
-        return number_faults(_element(scene, kind.section, name), f"{kind.section}.{name}")
+        return number_faults(_element(scene, section, name), f"{section}.{name}")
 
-    return {key: _attribute(kind.section, key, faults=faults) for key in kind.numbers}
+    return faults
+
+
+def _registered(kind: type[Element]) -> dict[str, NumberField]:
+    """The numbers of elements that build themselves, with the checks of their tables."""
+    return {key: _attribute(kind.section, key, faults=_table_faults(kind.section)) for key in kind.numbers}
+
+
+def _of_layers(key: str) -> NumberField:
+    """A number of each layer of a shell."""
+
+    def get(scene: Scene, name: str) -> Array:
+        return np.array([layer_number(layer, key) for layer in _element(scene, "shells", name).layers or ()])
+
+    def replaced(scene: Scene, name: str, values: Array) -> Scene:
+        def edited(sheet: Any) -> Any:
+            pairs = zip(sheet.layers, values.tolist(), strict=True)
+            # what is not given keeps its default, which may be another number of the layer
+            layers = [layer if layer_number(layer, key) == value else {**layer, key: value} for layer, value in pairs]
+            return sheet.changed(layers=layers)
+
+        return _edited(scene, "shells", name, edited)
+
+    return NumberField(get, replaced, faults=_table_faults("shells"), table=True)
 
 
 def fields_of(kind: str) -> Mapping[str, NumberField]:
@@ -318,7 +345,8 @@ FIELDS: Mapping[str, Mapping[str, NumberField]] = {
         "frame1.position": _frame("frame1"),
         "frame2.position": _frame("frame2"),
     },
-    **{section: _registered(KINDS[section]) for section in ("springs", "shells", "tendons", *ATTACHED)},
+    **{section: _registered(KINDS[section]) for section in ("springs", "tendons", *ATTACHED)},
+    "shells": _registered(KINDS["shells"]) | {f"layers.{key}": _of_layers(key) for key in LAYER_NUMBERS},
     "thermal": {key: _attribute("thermal", key) for key in ("capacity", "temperature")},
     **{section: _registered(KINDS[section]) for section in ("conduction", "markers", "contacts")},
 }

@@ -30,7 +30,8 @@ def _layer(value: Any, _handler: Any) -> dict[str, Any]:
 
 Layer = Annotated[dict[str, Any], WrapValidator(_layer, json_schema_input_type=LayerEntry)]
 Layers = Annotated[list[Layer], Field(min_length=1)]
-_DIMENSIONS = dimensions(LayerEntry)
+LAYER_NUMBERS = dimensions(LayerEntry)
+"""Keys of a layer, and their dimensions."""
 
 
 def laminate(layers: Sequence[Mapping[str, float]]) -> ShellSection:
@@ -44,11 +45,16 @@ def laminate(layers: Sequence[Mapping[str, float]]) -> ShellSection:
     return ShellSection.laminate([Ply(**layer) for layer in layers], named="layers")
 
 
+def layer_number(layer: Mapping[str, float], key: str) -> float:
+    """Its number at a key, or what stands for it where it is not given."""
+    return layer.get(key, layer["G12"])  # G13 and G23 alone are left out: all others have values
+
+
 def rescaled_layers(
     layers: Sequence[Mapping[str, float]], length: float, mass: float, time: float
 ) -> list[dict[str, float]]:
     """The same in other units."""
     return [
-        {name: value * float(_DIMENSIONS[name].unit(length, mass, time, ())) for name, value in layer.items()}
+        {name: value * float(LAYER_NUMBERS[name].unit(length, mass, time, ())) for name, value in layer.items()}
         for layer in layers
     ]

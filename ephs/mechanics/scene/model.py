@@ -100,8 +100,8 @@ class Scene:
         """The scene as a hierarchical exergetic port-Hamiltonian system, in the scene's initial state.
 
         What acts from outside does so at its outer ports, and is not in it: ``drives.JOINT``, ``momenta.BODY`` of
-        bodies with loads, ``voltages.MOTOR`` and so on. Its reference environment is that of `ephs.Reference` unless
-        a run is given another one.
+        bodies with loads and of nodes of shells with a pressure, ``voltages.MOTOR`` and so on. Its reference
+        environment is that of `ephs.Reference` unless a run is given another one.
         """
         from ephs.mechanics.scene.build import started_system
 

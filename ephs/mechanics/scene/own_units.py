@@ -16,6 +16,7 @@ from ephs.mechanics.scene.element import NumberForm
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
+from ephs.mechanics.scene.site import nodes_of_shells
 from ephs.mechanics.scene.state import Snapshot
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array
@@ -76,7 +77,8 @@ def in_own_units(problem: Problem) -> Problem:
         return problem
     small = once(scene, "own", lambda: rescaled(scene, 1.0 / units.length, 1.0 / units.mass, 1.0 / units.time))
     ports = {port: where for _, j in scene.all_joints() for port, where in _ports(j, units)}
-    bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name, _ in scene.all_bodies()}
+    pushable = [*dict(scene.all_bodies()), *nodes_of_shells(scene)]
+    bodies = {wrench_port(name): np.array([units.length] * 3 + [1.0] * 3) for name in pushable}
     force = units.mass * units.length / units.time**2
     flows = {
         port: _unit(scene_system(scene).interface[port].quantity, units) / units.time / force
@@ -85,7 +87,7 @@ def in_own_units(problem: Problem) -> Problem:
     }
     forces = bodies | ports | flows
     driven = frozenset(n for n, j in scene.all_joints() if any(port in problem.signals for port, _ in drive_ports(j)))
-    pushed = frozenset(name for name, _ in scene.all_bodies() if wrench_port(name) in problem.signals)
+    pushed = frozenset(name for name in pushable if wrench_port(name) in problem.signals)
     system = scene_system(small, driven=driven, wrenches=pushed)
     descriptor = system.descriptor()
     factors = units_of_states(descriptor, units)

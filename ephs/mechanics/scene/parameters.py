@@ -2,7 +2,7 @@
 
 Paths of a scene are keys of its file, names in parts dotted: ``bodies.crank.mass``, ``bodies.left.crank.inertia[0]``,
 ``joints.pin.friction``, ``joints.pin.frame1.position[2]``, ``springs.s.length``, ``contacts.foot_floor.friction``,
-``world.gravity[2]``. Those of a system are its components' parameters: ``osc.pe.k``.
+``world.gravity[2]``, ``shells.skin.layers[0].E1``. Those of a system are its components' parameters: ``osc.pe.k``.
 
 Positions mean what they mean in a file whose joints are given by ``at`` and ``axis``: a body's ``position`` moves its
 centre of mass (with its axes, springs and markers) while its joints stay where they are in the world, a joint's ``at``
@@ -28,6 +28,8 @@ from ephs.semantics.systems.system import Filling, System
 
 Model = TypeVar("Model", Scene, System)
 _INDEX = re.compile(r"((?:\[\d+\])*)$")
+_TABLE = re.compile(r"(\[\d+\])\.(\w+)$")
+"""Number of a table in a list, and its key."""
 
 
 def read(model: Scene | System, path: str) -> float:
@@ -90,10 +92,13 @@ class _ParameterTarget:
 
     @staticmethod
     def of(scene: Scene, path: str) -> "_ParameterTarget":
-        stem, index = _INDEX.split(path)[:2]
+        table = bool(_TABLE.search(path))
+        stem, index = _INDEX.split(_TABLE.sub(r".\2\1", path))[:2]
         entries = tuple(int(number) for number in re.findall(r"\d+", index))
         kind, _, rest = stem.partition(".")
         for key, field in fields_of(kind).items():
+            if field.table != table:
+                continue
             name = rest.removesuffix(key).removesuffix(".") if rest.endswith(key) else None
             if name is not None and (not name or rest == f"{name}.{key}") and _has(scene, kind, name):
                 found = _ParameterTarget(path, key, name, field, entries)
@@ -178,6 +183,10 @@ def _paths(scene: Scene) -> Iterator[str]:
             for key, field in fields.items():
                 stem = f"{kind}.{name}.{key}" if name else f"{kind}.{key}"
                 values = field.get(scene, name)
+                if field.table:
+                    first, _, last = stem.rpartition(".")
+                    yield from (f"{first}[{i}].{last}" for i in range(len(values)))
+                    continue
                 if values.size == 1 or (field.spread and values.size and _uniform(values)):
                     yield stem
                 if values.ndim and values.size > 1:

@@ -51,7 +51,7 @@ def resolve_elements(
     known = {
         kind: {*document.sections[section], *_inside(parts, section)}
         for kind, section in (("joint", "joints"), ("tendon", "tendons"), ("surface", "surfaces"))
-    }
+    } | {"carrier": set(document.sections["shells"]), "side": set(document.sections["beams"])}
     found: dict[str, dict[str, Element]] = {}
     for section in (*KINDS, *REGISTERED):
         found[section] = {}
@@ -76,6 +76,12 @@ def _pulls(document: Document, found: Mapping[str, Mapping[str, Element]], fault
 def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
     """The scene with contacts of all surfaces of its level that can meet, where its file names none."""
     given = scene.contacts
+    sheets = {name: each.settled(Site(scene, each, SceneLevel())) for name, each in scene.shells.items()}
+    scene = with_sections(scene, {"shells": sheets})
+    for each in (*sheets.values(), *scene.surfaces.values()):  # what carries contacts
+        faults += broken(Checked(each, f"{each.section}.{each.name}"), Site(scene, each, SceneLevel()))
+    if faults:
+        return scene
     found = given or {each.name: each for each in meeting(scene)}
     for name, each in found.items():
         key = f"contacts.{name}" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
@@ -97,7 +103,8 @@ def _inside(parts: Mapping[str, Scene], section: str) -> Iterator[str]:
 
 
 def check_table(table: Checked[Element], names: ReferableNames, known: Mapping[str, Collection[str]]) -> None:
-    """Append the faults of an element's table: sizes of numbers, what it names, and its rules."""
+    """Append the faults of an element's table: sizes of numbers, what it names, and its rules; ``known`` has names by
+    kind, those of carriers and sides beside bodies."""
     entry, spoiled = table.entry, set(table.spoiled)
     for name in type(entry).numbers:
         if name not in spoiled and np.any(np.abs(number_of(entry, name)) > LARGEST):
@@ -107,8 +114,12 @@ def check_table(table: Checked[Element], names: ReferableNames, known: Mapping[s
         of = "joint" if kind in JOINTS else kind
         if place.partition("[")[0] in spoiled or name in OUTSIDE[kind]:
             continue
-        if of in ("body", "end", "node"):
-            names.check(table, name, place, "thermal" if of == "node" else "body")
+        if of == "carrier" and name in known.get(of, ()) and name in names.bodies:
+            table.fault("collision", place, f'"{name}", a body and a shell', other="a body")
+        elif of in ("body", "end", "side", "carrier", "node"):
+            more = known.get(of, ()) if of in ("side", "carrier") else ()
+            there = replace(names, bodies=names.bodies | {*more}) if more else names
+            there.check(table, name, place, "thermal" if of == "node" else "body")
         elif of in known and name not in known[of] and name.split(".")[0] not in names.unknown_parts:
             table.faults.append(unknown(of, f"{table.key}.{place}", name, known[of]))
     table.faults.extend(broken(replace(table, spoiled=frozenset(spoiled))))

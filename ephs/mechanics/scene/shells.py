@@ -19,14 +19,13 @@ from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Flag, NonNegative, Number, Positive, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.scene.text import file_inside
-from ephs.operad import quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
-from ephs.semantics.spaces import SE3, translation
+from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
-PRESSURES = "pressures"
-"""First name of the outer ports at which the pressure acts on nodes."""
+NEAR = 1e-6
+"""Distance of a point from a node of a beam that is there, by the size of the sheet."""
 CREASE = float(np.pi / 6.0)
 _MATERIAL = ("thickness", "E", "nu", "rho")
 _WAYS = ({"corners", "elements"}, {"points", "elements", "sides"}, {"file", "sides"})
@@ -90,10 +89,10 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
         unit="Pa",
     )
     edges: list[Text] = key(
-        'what each side is joined to, of a grid from the first corner to the second and so on: a body, "ground" or '
-        '"free"; default: free',
+        "what each side is joined to, of a grid from the first corner to the second and so on: a body, a beam of this "
+        'file whose nodes are at its points, "ground" or "free"; default: free',
         [],
-        names="end",
+        names="side",
     )
     pinned: list[Flag] = key(
         "whether each side is pinned, so that its points are held and turn freely; default: welded", []
@@ -146,6 +145,62 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
             at = next(name for name in ("corners", "points", "file") if getattr(self, name) is not None)
             return {"at": at, "found": str(error), "expected": "convex elements, nearly in a plane, turned alike"}
         return True
+
+    @rule(
+        "edges", at="", placed=True, found="a body {taken}, as its node is called", expected="another name of the body",
+        advice="rename one of the two",
+    )  # fmt: skip
+    def apart(self, site: Site) -> Told:
+        """Whether its nodes have names of their own."""
+        taken = next((name for i in self.free() if (name := self.node(i)) in site.scene.bodies), None)
+        return taken is None or {"taken": taken}
+
+    @rule(
+        "edges", at="{at}", placed=True, found="{found}", expected="a node of the beam at each point of the side",
+        advice="give both the same number of elements between the same points",
+    )  # fmt: skip
+    def alongside(self, site: Site) -> Told:
+        """Whether the beams along its sides have nodes at their points; those that have are not named any more."""
+        for i, name in enumerate(self.edges):
+            if name in site.scene.beams:
+                far, _ = self._beside(site, i)
+                node = int(far.argmax())
+                return {"at": f"edges[{i}]", "found": f"{far[node]:.4g} m from a point to the next node of {name}"}
+        return True
+
+    def settled(self, site: Site) -> Self:
+        """With each point of a side along a beam joined to the node of this there: on a mesh, whose sides they are."""
+        sides, edges, ways = [], [], []
+        given = zip(self.mesh().sides, self.edges, self.pinned or [False] * len(self.edges), strict=False)
+        for i, (side, name, pinned) in enumerate(given):
+            whole = [(list(side), name)]
+            if name in site.scene.beams:
+                far, at = self._beside(site, i)
+                if far.max() <= NEAR * float(np.ptp(self.mesh().points, axis=0).max()):
+                    whole = [([node], f"{name}.{k}") for node, k in zip(side, at.tolist(), strict=True)]
+            sides += [nodes for nodes, _ in whole]
+            edges += [body for _, body in whole]
+            ways += [pinned] * len(whole)
+        if edges == self.edges:
+            return self
+        mesh = self.mesh()
+        found = self.changed(
+            corners=None,
+            points=mesh.points.tolist(),
+            elements=mesh.cells.tolist(),
+            sides=sides,
+            edges=edges,
+            pinned=ways,
+        )
+        found._read = None
+        return found
+
+    def _beside(self, site: Site, side: int) -> tuple[Array, Array]:
+        """Distance of each point of a side from the nearest node of the beam that it names, and the number of this."""
+        nodes = np.array([site.pose(name)[4:] for name in site.scene.beams[self.edges[side]].nodes])
+        points = self.mesh().points[self.mesh().sides[side]]
+        apart = np.linalg.norm(points[:, None] - nodes, axis=2)
+        return apart.min(axis=1), apart.argmin(axis=1)
 
     def _meshed(self) -> SheetMesh:
         """Its grid, or its mesh of quadrilaterals.
@@ -292,17 +347,21 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
 
     def faces(self, site: Site) -> Faces:
         """Its elements; of a scene whose nodes are no bodies where these are at the start."""
-        places, welded = self.start()[0][:, 4:], {node: body for body, nodes in self.welds().items() for node in nodes}
-        bodies = {name for name, _ in site.scene.all_bodies()}
-
-        def end(i: int) -> tuple[str, Array]:
-            body, at = welded.get(i, self.node(i)), places[i]
-            if body not in bodies:
-                return GROUND, at
-            return body, SE3.compose(SE3.inverse(site.pose(body)), translation(at))[4:]
-
-        ends = tuple(end(i) for i in range(len(places)))
+        poses = {GROUND: SE3.identity()} | {name: body.pose for name, body in site.scene.all_bodies()}
+        at = self.start()[0]
+        drawn = [(body, own) if body in poses else (GROUND, at[i]) for i, (body, own) in enumerate(self.ends(poses))]
+        ends = tuple((body, pose[4:]) for body, pose in drawn)
         return Faces(ends, self.mesh().cells, frozenset(map(self.node, self.free())))
+
+    def ends(self, poses: Mapping[str, Array]) -> list[tuple[str, Array]]:
+        """The body of each node, its own where it is welded to none, and its pose (7,) there; of poses of bodies."""
+        welded = {node: body for body, nodes in self.welds().items() for node in nodes}
+        return [
+            (welded[i], SE3.compose(SE3.inverse(poses[welded[i]]), at))
+            if i in welded
+            else (self.node(i), SE3.identity())
+            for i, at in enumerate(self.start()[0])
+        ]
 
     def build(self, site: Site) -> None:
         held, pinned = dict(self.welds()), self.joined(pinned=True)
@@ -314,20 +373,24 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
             for k, body in enumerate(bodies)
         }
         poses, twists = self.start()
-        for body, nodes in pinned.items():  # they move with what carries them
+        rods = {name for beam in site.scene.beams.values() for name in beam.nodes}
+        fixed = [node for body in rods & held.keys() for node in held[body]]
+        for body, nodes in [*pinned.items(), *held.items()]:  # they move with what carries them
             spin, speed = np.split(site.twist(body), 2)
             for i in nodes:
                 off = SE3.compose(SE3.inverse(site.pose(body)), poses[i])
-                twists[i, 3:] = quaternion_to_matrix(off[:4]).T @ (speed + np.cross(spin, off[4:]))
+                back = quaternion_to_matrix(off[:4]).T
+                twists[i, 3:] = back @ (speed + np.cross(spin, off[4:]))
+                twists[i, :3] = back @ spin if body in held and i in held[body] else twists[i, :3]
+        touching = any(surface.body == self.name for surface in site.scene.surfaces.values())
+        shared = sorted({*self.pushed(), *(self.free() if touching else ())})
         made = shell_system(
             self.shell(), gravity=site.gravity, damping=self.damping, held=ground, carried=carried,
-            pinned=[node for nodes in pinned.values() for node in nodes], shared=self.pushed(), heat=bool(warm),
+            pinned=[node for nodes in pinned.values() for node in nodes], fixed=fixed, shared=shared, heat=bool(warm),
             spread=self.spread, start=(poses, twists),
         )  # fmt: skip
-        of, at = quantity.body_momentum, PRESSURES
-        pushes = {f"p{i}": site.input(of, 0.0, f"node{i}", at=at, effort=False, named=False) for i in self.pushed()}
         ports = {port: site.momentum(body) for port, body in zip(carried, bodies, strict=True)}
-        site.add(made, ports | pushes | warm)
+        site.add(made, ports | {f"p{i}": site.momentum(self.node(i)) for i in shared} | warm)
 
     def __str__(self) -> str:
         shell = self.shell()

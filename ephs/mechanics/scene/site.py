@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ephs.mechanics.scene.custom import Element
     from ephs.mechanics.scene.model import Scene
+    from ephs.mechanics.scene.shells import ShellSheet
     from ephs.mechanics.scene.surfaces import Surface
 
 INPUTS = "inputs"
@@ -74,8 +75,10 @@ class Site:
         return self.scene.world.gravity
 
     def pose(self, body: str) -> Array:
-        """(7,) of a body in the world at the start; of the ground the identity."""
-        return IDENTITY_POSE if body == GROUND else self.scene.body(body).pose
+        """(7,) of a body, or a node of a shell, in the world at the start; of the ground the identity."""
+        if body == GROUND:
+            return IDENTITY_POSE
+        return found if (found := nodes_of_shells(self.scene).get(body)) is not None else self.scene.body(body).pose
 
     def twist(self, body: str) -> Array:
         """(6,) of a body at the start, in its frame; of the ground 0."""
@@ -110,9 +113,9 @@ class Site:
     # ---- junctions -----------------------------------------------------------------------------------------------
 
     def momentum(self, body: str) -> str:
-        """The junction of a body's momentum; the ground has one, too."""
-        if body != GROUND:
-            self._known("body", "end", name=body)
+        """The junction of the momentum of a body, or of a node of a shell; the ground has one, too."""
+        if body != GROUND and body not in nodes_of_shells(self.scene):
+            self._known("body", "end", "side", name=body)
         path = Path(["momenta", *body.split(".")])
         self._level.junctions[path] = junction(quantity.body_momentum)
         return str(path)
@@ -208,7 +211,9 @@ class Site:
         """Only what keys name is connected: parts expose no other junctions."""
         named = [each for kind in kinds for each in self.element.named(kind)]
         if "body" in kinds:
-            named += [surfaces_of(self.scene)[each].body for each in self.element.named("surface")]
+            shells = shells_of(self.scene)
+            for carrier in (surfaces_of(self.scene)[each].body for each in self.element.named("surface")):
+                named += shells[carrier].named("side") if carrier in shells else [carrier]
         if name not in named:
             expected = f"one that its keys name: {', '.join(named) or 'there is none'}"
             raise AssemblyError("unnamed", self._own(""), found=f"the {kinds[0]} {name}", expected=expected)
@@ -217,6 +222,20 @@ class Site:
 def surfaces_of(scene: "Scene") -> "Mapping[str, Surface]":
     """Surfaces by dotted name; made once and kept with the scene."""
     return once(scene, "surfaces", lambda: dict(scene.all_surfaces()))
+
+
+def shells_of(scene: "Scene") -> "Mapping[str, ShellSheet]":
+    """Shells by dotted name; made once and kept with the scene."""
+    return once(scene, "shells", lambda: dict(scene.all_shells()))
+
+
+def nodes_of_shells(scene: "Scene") -> "Mapping[str, Array]":
+    """Poses (7,) of all nodes of shells at the start, by their names in pictures; made once and kept with the scene."""
+
+    def made() -> dict[str, Array]:
+        return {sheet.node(i): pose for sheet in shells_of(scene).values() for i, pose in enumerate(sheet.start()[0])}
+
+    return once(scene, "nodes of shells", made)
 
 
 def built(scene: "Scene") -> SceneLevel:

@@ -47,14 +47,22 @@ def check_scene(scene: Scene) -> None:
         "node": {name for name, _ in scene.all_thermal()},
         "tendon": {name for name, _ in scene.all_tendons()},
     }
-    there |= {"end": there["body"]} | dict.fromkeys(JOINTS, there["joint"])
+    there |= {
+        "end": there["body"],
+        "side": there["body"],
+        "carrier": there["body"] | {name for name, _ in scene.all_shells()},
+    }
+    there |= dict.fromkeys(JOINTS, there["joint"])
     named = [(kind, name) for _, each in _all(scene) for kind in set(each.names.values()) for name in each.named(kind)]
     beams = [beam for _, beam in scene.all_beams()]
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
     for kind, name in named:
         if name not in OUTSIDE[kind] and name not in there[kind]:
-            what = ({"end": "body", "node": "thermal node"} | dict.fromkeys(JOINTS, "joint")).get(kind, kind)
+            what = (
+                {"end": "body", "side": "body", "carrier": "body", "node": "thermal node"}
+                | dict.fromkeys(JOINTS, "joint")
+            ).get(kind, kind)
             raise ValueError(f"there is no {what} {legible(str(name))}")
 
 

@@ -219,7 +219,7 @@ def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequen
     index = {name: i for i, name in enumerate(now.names)}
 
     def sheet(path: str, of: ShellSheet) -> ShellSheet:
-        ends = {name: index[path + name] for name in of.named("end") if path + name in index}
+        ends = {name: index[path + name] for name in of.named("side") if path + name in index}
         gone = {name: i for name, i in ends.items() if not np.allclose(poses[i], now.poses[i], MOVED, MOVED)}
         motions = {name: SE3.compose(poses[i], SE3.inverse(now.poses[i])) for name, i in gone.items()}
         return of.carried(motions) if motions else of

@@ -86,9 +86,9 @@ class SurfaceShape(EntryTable):
     )
 
 
-def _shape(value: Any, _handler: Any) -> dict[str, Any]:
-    """Shapes that a table gives, with their sizes."""
-    return SurfaceShape.model_validate(value).model_dump(exclude_none=True)
+def _shape(value: Any, _handler: Any) -> dict[str, Any] | None:
+    """Shapes that a table gives, with their sizes; None of balls of a shell in a result."""
+    return None if value is None else SurfaceShape.model_validate(value).model_dump(exclude_none=True)
 
 
 Shape = Annotated[dict[str, Any], WrapValidator(_shape, json_schema_input_type=SurfaceShape)]
@@ -96,14 +96,18 @@ Shape = Annotated[dict[str, Any], WrapValidator(_shape, json_schema_input_type=S
 
 @final
 class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for contact"):
-    """A surface on a body, or on the ground.
+    """A surface on a body, on the ground, or on a shell of its file, where it is a ball at each node.
 
     A resolved one has one of ``{"sphere": r}``, ``{"capsule": [r, length]}``, ``{"cylinder": [r, length]}``, ``{"box":
     [x, y, z]}``, ``{"plane": {}}``, ``{"mesh": vertices}`` for its shape; m, axes along z, a plane solid below z = 0.
+    One on a shell has a sphere or None.
     """
 
-    body: Text = key('the body that has it, or "ground"', names="body")
-    shape: Shape = key("sphere, capsule, cylinder, box, plane, mesh or points")
+    body: Text = key('the body that has it, a shell of this file, or "ground"', names="carrier")
+    shape: Shape = key(
+        "sphere, capsule, cylinder, box, plane, mesh or points; of a shell a sphere, default: of half its thickness",
+        None,
+    )
     position: Vector | None = key("origin in the centre-of-mass frame (ground: world)", None, unit="m")
     rotation: Rotation | None = key("orientation there, [w, x, y, z] or a table", None)
     group: Text | None = key("surfaces of one group of a file are a contact only where [contacts] names them", None)
@@ -111,11 +115,27 @@ class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for 
     turned = turned
 
     @rule(
+        "body", "shape", "position", "rotation", at="{at}", placed=True, found="{found}", expected="{expected}",
+        advice="balls at the nodes of a shell have a radius alone, other surfaces a shape",
+    )  # fmt: skip
+    def carried(self, site: Site) -> Told:
+        """Whether it is a shape on a body or the ground, or balls on a shell."""
+        if self.body not in site.scene.shells:
+            what = type(self).model_fields["shape"].description
+            return bool(self.shape) or {"at": "shape", "found": "nothing", "expected": what}
+        if self.kind != "sphere":
+            return {"at": "shape", "found": f"a {self.kind} on a shell", "expected": "a sphere, or nothing"}
+        placed = next((at for at in ("position", "rotation") if getattr(self, at) is not None), None)
+        return placed is None or {"at": placed, "found": shown(getattr(self, placed)), "expected": "nothing on a shell"}
+
+    @rule(
         "shape", found="{found}", expected="one of sphere, capsule, cylinder, box, plane = {{}}, mesh, points",
         advice="a surface has exactly one shape",
     )  # fmt: skip
     def single(self) -> Told:
         """Whether it has one shape."""
+        if self.shape is None:
+            return True
         return len(self.shape) == 1 or {"found": " and ".join(self.shape) or "an empty table"}
 
     @rule("shape", at="shape.mesh", found="{found}", expected=TEXTS["mesh"][0], advice=TEXTS["mesh"][1])
@@ -144,7 +164,7 @@ class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for 
     )  # fmt: skip
     def thick(self) -> Told:
         """Whether its points are those of a body."""
-        if [*self.shape] != ["points"]:
+        if "points" not in (self.shape or {}) or len(self.shape) != 1:
             return True
         try:
             self._corners = corners_of(np.array(self.shape["points"])).tolist()
@@ -154,12 +174,12 @@ class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for 
 
     def _file(self) -> Path | None:
         """Its file if it is in the folder of the scene; an empty path where it has none, or is read already."""
-        if len(self.shape) != 1 or not isinstance(name := self.shape.get("mesh"), str):
+        if not isinstance(name := (self.shape or {}).get("mesh"), str) or len(self.shape) != 1:
             return Path()
         return file_inside(self._folder / name, self._folder)
 
     def normalised(self) -> Self:
-        q, corners = self.rotation, self._corners or self.shape.get("points")
+        q, corners = self.rotation, self._corners or (self.shape or {}).get("points")
         found = self.changed(
             rotation=None if q is None else (np.array(q) / np.linalg.norm(q)).tolist(),
             shape=self.shape if corners is None else {"mesh": corners},
@@ -173,9 +193,14 @@ class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for 
         if "frame" in given:
             frame = given.pop("frame")
             given |= {"rotation": frame[:4], "position": frame[4:]}
-        if "mesh" in given["shape"]:
+        if "mesh" in (given.get("shape") or {}):
             given["shape"] = {"points": given["shape"]["mesh"]}
         return given
+
+    @property
+    def kind(self) -> str:
+        """Of its shape."""
+        return next(iter(self.shape or ("sphere",)))
 
     @property
     def frame(self) -> Array:
@@ -189,11 +214,11 @@ class Surface(TouchingElement, section="surfaces", said="surfaces of bodies for 
         return self.changed(rotation=frame[:4].tolist(), position=frame[4:].tolist())
 
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
-        shape = {kind: sizes and (np.asarray(sizes) * length).tolist() for kind, sizes in self.shape.items()}
-        return super().rescaled(length, mass, time, coordinates).changed(shape=shape)
+        shape = {kind: sizes and (np.asarray(sizes) * length).tolist() for kind, sizes in (self.shape or {}).items()}
+        return super().rescaled(length, mass, time, coordinates).changed(shape=shape or None)
 
     def build(self, site: Site) -> None:
         """Nothing: contacts have its points."""
 
     def __str__(self) -> str:
-        return f"{next(iter(self.shape))} on {self.body}"
+        return f"{self.kind} on {self.body}"

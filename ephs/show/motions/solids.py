@@ -130,7 +130,8 @@ def solids_of(scene: Any) -> dict[str, Solid]:
     nodes = {node for sheet in sheets_of(scene).values() for node in sheet.nodes}
     surfaces: dict[str, list[Any]] = {}
     for _, surface in scene.all_surfaces():
-        surfaces.setdefault(surface.body, []).extend(_shapes_of(surface))
+        if surface.shape:  # shells are drawn as such
+            surfaces.setdefault(surface.body, []).extend(_shapes_of(surface))
     found: dict[str, Solid] = {}
     for name, body in scene.all_bodies():
         if name in nodes:

@@ -192,6 +192,7 @@ def shell_system(
     held: Sequence[int] = (),
     carried: "Mapping[str, tuple[ArrayLike, Sequence[int]]] | None" = None,
     pinned: Sequence[int] = (),
+    fixed: Sequence[int] = (),
     shared: Sequence[int] = (),
     heat: bool = False,
     spread: bool = False,
@@ -212,6 +213,9 @@ def shell_system(
         their numbers.
     pinned
         Held or carried nodes that turn freely: a spherical joint ``pin0`` …, by their number, is in place of the weld.
+    fixed
+        Held or carried nodes that keep their mass: a fixed joint ``weld0`` …, by their number, is in place of the weld,
+        which leaves it out.
     shared
         Numbers of nodes whose momenta are ports ``p0`` …, by their number: for what else acts on them.
     heat
@@ -235,8 +239,9 @@ def shell_system(
         raise StructureError("parameter", "shell", key="section", found="no mass", expected="a density above 0")
     welded = {node: (port, np.asarray(pose, dtype=float)) for port, (pose, nodes) in bodies.items() for node in nodes}
     welded |= dict.fromkeys(held, ("p_ground", SE3.identity()))
-    if wrong := [node for node in pinned if node not in welded]:
-        raise StructureError("parameter", "shell", key="pinned", found=wrong, expected="held or carried nodes")
+    for key, nodes in (("pinned", pinned), ("fixed", fixed)):
+        if wrong := [node for node in nodes if node not in welded]:
+            raise StructureError("parameter", "shell", key=key, found=wrong, expected="held or carried nodes")
     given = (shell.poses, np.zeros((count, 6))) if start is None else start
     poses, twists = (np.asarray(each, dtype=float) for each in given)
     momentum = quantity.body_momentum
@@ -246,7 +251,7 @@ def shell_system(
     parts: dict[str, System | Primitive] = {}
     made: dict[bytes, System] = {}  # bodies, which nodes with one inertia share
     for i, pose in enumerate(poses):
-        if i in welded and i not in pinned:
+        if i in welded and i not in pinned and i not in fixed:
             port, at = welded[i]
             boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
             parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
@@ -262,6 +267,10 @@ def shell_system(
             boxes[f"pin{i}"] = {"p1": port, "p2": f"p{i}"}
             apart = SE3.compose(SE3.inverse(at), pose)
             parts[f"pin{i}"] = joint("spherical", translation(apart[4:])).with_initial({"pe.q_r": apart[:4]})
+        elif i in fixed:
+            port, at = welded[i]
+            boxes[f"weld{i}"] = {"p1": port, "p2": f"p{i}"}
+            parts[f"weld{i}"] = joint("fixed", SE3.compose(SE3.inverse(at), pose))
     if len(held):
         junctions["p_ground"] = junction(momentum)
         boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
