@@ -1,6 +1,6 @@
 """A mechanism in joint coordinates as functions of its state."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final, overload
@@ -328,6 +328,26 @@ class Dynamics:
             under = differentiating.forward_slopes(self._linear, q, r, s)
         with failing_at(0.0):
             return self.loading.stiffened(differentiating.derivatives_of(self._linear, under, q, r, s, given), q, r)
+
+    def stiffness(self, state: State, following: Sequence[int] = ()) -> Array:
+        """(n, n) derivatives by the tree's elements of the forces that hold the mechanism at rest, exact at unbalanced
+        states, too; loops keep the forces that close them.
+
+        Parameters
+        ----------
+        following
+            Places of the entropies that are tendons' lengths, which follow the joints.
+
+        Raises
+        ------
+        SimulationError
+            A component cannot be evaluated there.
+        """
+        q, _, s = self.layout.split(state.array)
+        self.loading.place(q, still := np.zeros(self.layout.n))
+        with failing_at(0.0):
+            found = self._linear.resting(q, s, np.asarray(following, dtype=np.int64))
+        return found - self.loading.slopes(q, still)
 
     def velocity_derivatives(self, state: State) -> VelocityDerivatives:
         """Exact derivatives by the configuration of velocities: constraints' rows, cut joints, bodies."""

@@ -10,6 +10,7 @@ from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.state import resumed
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
@@ -141,7 +142,8 @@ def _of_scene(scene: Scene) -> Equilibrium:
     at, left, steps, path = balanced(model)
     known = joints.keys() - set(model.cut)
     coordinates = {name: value for name, value in at.coordinates.items() if name in known and value.size}
-    rest, states = still.with_state(coordinates, adjust=True), model.states(at)
+    states = model.states(at)
+    rest = resumed(still.with_state(coordinates, adjust=True), states)
     if path is None:
         return Equilibrium(rest, states, left, steps)
     return Equilibrium(rest, states, left, steps, path.shares, path.critical)

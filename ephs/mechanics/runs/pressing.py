@@ -42,4 +42,9 @@ def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tup
         out[:, 3:] = np.einsum("nij,ni->nj", rotations(found[pushed, :4]), forces)
         return out.ravel()
 
-    return [Path([PRESSURES, *name.split("."), f"node{node}"]) for node in pushed], Signal(wrenches)
+    return pressure_ports(name, pushed), Signal(wrenches)
+
+
+def pressure_ports(name: str, nodes: list[int]) -> list[Path]:
+    """Outer ports of nodes of a shell."""
+    return [Path([PRESSURES, *name.split("."), f"node{node}"]) for node in nodes]

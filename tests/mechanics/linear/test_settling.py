@@ -86,7 +86,7 @@ def test_a_stiff_sheets_system_settles_where_the_sheet_does(tmp_path):
     sheet = ephs.load(file)
     rest, settled = ephs.equilibrium(sheet), ephs.equilibrium(sheet.system())
     for path, value in rest.states.items():
-        np.testing.assert_array_equal(settled.states[path], value)
+        assert np.abs(settled.states[path] - value).max() <= 1e-14  # rounding: lengths of models differ, as metrics
     made = next(each for _, each in sheet.all_shells()).shell()
     free = np.ones((len(made.points), 6), dtype=bool)
     free[made.points[:, 0] == 0.0] = False
