@@ -35,7 +35,10 @@ class Loading:
             for name, sheet in (() if scene is None else scene.all_shells())
             if sheet.pressure is not None
         ]
-        self._constant = equations.wrench.copy()
+        self._constant = equations.wrench.copy()  # of inputs; loads that turn with their bodies are constant, too
+        steady = self._constant.any(axis=1)
+        for link, load in self._loads:
+            self._constant[link] -= steady[link] * load.wrench(np.eye(3))
 
     def __bool__(self) -> bool:
         return bool(self._loads or self._surfaces)

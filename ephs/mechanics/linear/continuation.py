@@ -15,6 +15,7 @@ from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.freedoms import freedoms_of, lengths_of, resting
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import eigenvalues, svd
+from ephs.solve.posing.errors import SimulationError
 
 SAME = 1e-12
 """Fraction of a load below which its remainder is rounding."""
@@ -229,40 +230,58 @@ def _along(
         )
         return matrix, np.append(at.force, 0.0)  # changes are normal to the tangent: the distance stays
 
-    return _solved(loaded, loaded.moved(here.state, made[:-1]), share + float(made[-1]), metric, bordered)
+    return _solved(loaded, here.state, made[:-1], share + float(made[-1]), metric, distance, bordered)
 
 
 def _equilibrium_at(loaded: Loaded, state: State, share: float) -> _ForceBalance | None:
     """The equilibrium near by at a part of the loads."""
     metric = np.ones(loaded.model.layout.n + 1)
-    found = _solved(loaded, state, share, metric, lambda at: (at.stiffness, at.force))
+    found = _solved(
+        loaded, state, np.zeros(metric.size - 1), share, metric, LONGEST, lambda at: (at.stiffness, at.force)
+    )
     return None if found is None else found[0]
 
 
 def _solved(
     loaded: Loaded,
     state: State,
+    first: Array,
     share: float,
     metric: Array,
+    reach: float,
     system: Callable[[_ForceBalance], tuple[Array, Array]],
 ) -> tuple[_ForceBalance, float, int] | None:
-    """Newton's iteration to rounding; None where it does not converge."""
+    """Newton's iteration to rounding, after a first change (n,); None where it does not converge within steps of a
+    reach, in the metric: longer ones may end on another path.
+    """
+    try:
+        return _iterated(loaded, loaded.moved(state, first), share, metric, reach, system)
+    except (np.linalg.LinAlgError, SimulationError):  # singular, or too far for a loop or a component
+        return None
+
+
+def _iterated(
+    loaded: Loaded,
+    state: State,
+    share: float,
+    metric: Array,
+    reach: float,
+    system: Callable[[_ForceBalance], tuple[Array, Array]],
+) -> tuple[_ForceBalance, float, int] | None:
     last, at = np.inf, loaded.balance(state, share)
     for count in range(1, ITERATIONS + 1):
         matrix, residual = system(at)
-        try:
-            change = np.asarray(np.linalg.solve(matrix, residual), dtype=float)
-        except np.linalg.LinAlgError:
-            return None
+        change = np.asarray(np.linalg.solve(matrix, residual), dtype=float)
         if not np.isfinite(change).all():
             return None
         k = at.stiffness.shape[0]
         step = at.Z @ change[:k]
+        more = float(change[k]) if change.size > k else 0.0
         size = float(np.sqrt(step @ (metric[:-1] * step)))
-        if size > 4.0 * LONGEST or (size <= ROUNDED and size >= 0.5 * last):
+        if max(size, abs(more)) > reach or (size <= ROUNDED and size >= 0.5 * last):
             return (_classed(at), share, count) if size <= ROUNDED else None
         last = size
-        share += float(change[k]) if change.size > k else 0.0
+        share += more
         at = loaded.balance(loaded.moved(at.state, step), share)
     return (_classed(at), share, ITERATIONS) if last <= ROUNDED else None
 
