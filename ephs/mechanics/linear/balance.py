@@ -1,4 +1,4 @@
-"""The balance of a mechanism's forces, by steps along the eigenvectors of its stiffness in the mass metric."""
+"""The balance of a mechanism's forces, by steps along the eigenvectors of its stiffness."""
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def _settled(model: Dynamics) -> tuple[State, float, int]:
         return _descended(model, start, lengths)
     except SimulationError:
         path = follow(model, start, model.problem.length, held=model.applied(start) - model.gravity(start))
-        if path is None:
+        if path is None or path.unstable[-1]:  # what it leads to is no minimum
             raise
     state, left, steps = _descended(model, path.states[-1], lengths)
     return state, left, STEPS + len(path.shares) - 1 + steps

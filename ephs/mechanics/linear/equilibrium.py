@@ -71,8 +71,9 @@ def equilibrium(
     """An equilibrium near the initial state.
 
     For a mechanism, the search starts at its initial state with zero rates, and ends at a balance of gravity, springs
-    and drives. It takes steps along the eigenvectors of the stiffness in the mass metric, downhill in unstable
-    directions, too; unless the initial state is balanced, the result is a minimum of the energy. A system without
+    and drives. It takes steps along the eigenvectors of the stiffness, downhill in unstable directions, too; unless the
+    initial state is balanced, the result is a minimum of the energy. Where soft parts move too far for that, the forces
+    at the start are held and let go little by little, and the steps follow from there. A system without
     joints, with attachments that have states, or where heat flows on, settles by implicit Euler steps of growing
     length, which preserve its linear invariants (charges, volumes, entropies of isolated parts). In a scene's own
     system, a joint with a prescribed motion is free unless its port has the effort 0.
