@@ -36,7 +36,7 @@ class Loading:
             if sheet.pressure is not None
         ]
         self._constant = equations.wrench.copy()  # of inputs; loads that turn with their bodies are constant, too
-        steady = self._constant.any(axis=1)
+        steady = (self._constant != 0.0).any(axis=1).astype(float)
         for link, load in self._loads:
             self._constant[link] -= steady[link] * load.wrench(np.eye(3))
 
