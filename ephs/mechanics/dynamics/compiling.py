@@ -9,6 +9,7 @@ from ephs.mechanics.dynamics.model import Dynamics
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.parameters import varied
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.systems.system import System
 from ephs.solve.posing.errors import OptionError
@@ -50,4 +51,7 @@ def dynamics(
     for name, value in (inputs or {}).items():
         if callable(value) or isinstance(value, Sampled):
             raise OptionError(f"inputs[{name!r}]", value, "a number or numbers: dynamics have no time")
-    return Dynamics(problem_of_scene(scene, None, inputs))
+    blown = {f"shells.{name}" for name, sheet in scene.all_shells() if sheet.pressure is not None}
+    pressures = {f"{name}.pressure": value for name, value in (inputs or {}).items() if name in blown}
+    others = {name: value for name, value in (inputs or {}).items() if name not in blown}
+    return Dynamics(problem_of_scene(varied(scene, pressures) if pressures else scene, None, others))

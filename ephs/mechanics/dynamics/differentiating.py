@@ -1,14 +1,18 @@
 """Exact derivatives of a mechanism's dynamics, and its constraints, from the linearised equations."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ephs.mechanics.dynamics.links import PlacedLinks
+from ephs.mechanics.dynamics.loading import Loading
 from ephs.mechanics.dynamics.results import Constraints, Derivatives, VelocityDerivatives
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.tables import CUT, TREE
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
+from ephs.solve.posing.errors import failing_at
 
 Slopes = tuple[Array, Array, Array]
 """(n,) accelerations, their derivatives as `Linearised.columns` has them, and those by forces (n, n)."""
@@ -32,6 +36,27 @@ def derivatives_of(linear: Linearised, under: Slopes, q: Array, r: Array, s: Arr
         inverse[:, at_q], inverse[:, at_r], linear.equations.mass(q, r),
         forward[nv:, at_q], forward[nv:, at_r], forward[nv:, at_s],
     )  # fmt: skip
+
+
+def stiffness_of(linear: Linearised, loading: Loading, q: Array, r: Array, s: Array, following: Sequence[int]) -> Array:
+    """(n, n) derivatives by the tree's elements of the forces that hold a mechanism at rest, exact at unbalanced
+    states, too; loops keep the forces that close them.
+
+    Parameters
+    ----------
+    following
+        Places of the entropies that are tendons' lengths, which follow the joints.
+
+    Raises
+    ------
+    SimulationError
+        A component cannot be evaluated there.
+    """
+    still = np.zeros_like(r)
+    loading.place(q, still)
+    with failing_at(0.0):
+        found = linear.resting(q, s, np.asarray(following, dtype=np.int64))
+    return found - loading.slopes(q, still)
 
 
 def constraints_of(linear: Linearised, q: Array, r: Array, s: Array) -> Constraints:

@@ -1,6 +1,6 @@
 """A mechanism in joint coordinates as functions of its state."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final, overload
@@ -67,8 +67,7 @@ class Dynamics:
         self.loading = Loading(self._equations, self._links)
         self.placing, self._steps = Placing(self._equations), Steps(self.problem, self._equations)
         with failing_at(0.0):
-            start = self._equations.start(0.0)
-        self.state0 = self._state(start)
+            self.state0 = self._state(self._equations.start(0.0))
 
     def __repr__(self) -> str:
         cut = f", {', '.join(self.cut)} cut" if self.cut else ""
@@ -97,8 +96,7 @@ class Dynamics:
     @property
     def freedoms(self) -> dict[str, Index]:
         """Joint of the tree -> places of its degrees of freedom in vectors (n,) and matrices."""
-        n = self.layout.n
-        kept = {name: where[where < n] for name, where in self.layout.freedoms.items()}
+        kept = {name: where[where < self.layout.n] for name, where in self.layout.freedoms.items()}
         return {name: where for name, where in kept.items() if where.size or name not in self.cut}
 
     def state(self, coordinates: ByJoint | None = None, rates: ByJoint | None = None, *, adjust: bool = False) -> State:
@@ -113,8 +111,7 @@ class Dynamics:
             A name is unknown, a value has the wrong length, or a loop does not close.
         """
         stretched = self.scene is not None and has_stretches(self.scene)  # belts and tendons follow coordinates
-        made = None if adjust or stretched else self.placing.state(self.state0, coordinates, rates)
-        if made is not None:
+        if not (adjust or stretched) and (made := self.placing.state(self.state0, coordinates, rates)) is not None:
             return made
         by_name = [self.layout.named("state", given) for given in (coordinates, rates)]
         if self.scene is None:
@@ -329,6 +326,10 @@ class Dynamics:
         with failing_at(0.0):
             return self.loading.stiffened(differentiating.derivatives_of(self._linear, under, q, r, s, given), q, r)
 
+    def stiffness(self, state: State, following: Sequence[int] = ()) -> Array:
+        """(n, n) derivatives of forces at rest; see `ephs.mechanics.dynamics.differentiating.stiffness_of`."""
+        return differentiating.stiffness_of(self._linear, self.loading, *self.layout.split(state.array), following)
+
     def velocity_derivatives(self, state: State) -> VelocityDerivatives:
         """Exact derivatives by the configuration of velocities: constraints' rows, cut joints, bodies."""
         return differentiating.velocity_derivatives_of(self._linear, self._links, state.q, state.r)
@@ -389,8 +390,7 @@ class Dynamics:
     @contextmanager
     def _pushed(self, forces: ByJoint | None) -> Generator[None, None, None]:
         """Additional forces on the joints within the context."""
-        drive = self._equations.drive
-        before = drive.copy()
+        drive, before = self._equations.drive, self._equations.drive.copy()
         if forces is not None:
             drive += self.layout.vector("forces", forces)
         try:

@@ -1,13 +1,11 @@
-"""The balance of a mechanism's forces, by steps along the eigenvectors of its stiffness in the mass metric."""
+"""The balance of a mechanism's forces, by steps along the eigenvectors of its stiffness."""
 
 import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
 from ephs.mechanics.linear.continuation import StaticPath, follow, metric_of
-from ephs.mechanics.linear.freedoms import freedoms_of, unbalanced
-from ephs.mechanics.tree.finding.frames import frames_of
+from ephs.mechanics.linear.freedoms import freedoms_of, lengths_of, resting, unbalanced
 from ephs.mechanics.tree.finding.spanning import Edge
-from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import metric_eigen
 from ephs.semantics.spaces.rank import ELIMINATION, TINY
@@ -24,7 +22,8 @@ that no longer gets smaller, as rounding of stiff parts moves soft ones. Forces 
 large however little these are strained."""
 STRIDE = 0.3
 """Largest change of a mechanism in one step, in rad or m."""
-STEPS = 200
+STEPS = 40
+"""Largest number of steps downhill: mechanisms, and rods of any softness, need at most 15; sheets lose their way."""
 HALVINGS = 8
 """Reduction of a step after which loops do not close."""
 
@@ -39,32 +38,41 @@ def balanced(model: Dynamics) -> tuple[State, float, int, StaticPath | None]:
     finally:
         model.loading.share = 1.0
     path = follow(model, start, model.problem.length)
-    if path is None:
-        raise restless(*_culprit(model, start))
+    if path is None:  # as of what floats, whose stiffness is singular all the way
+        return *_settled(model), None
     state = path.states[-1]
     left = unbalanced(model, state, freedoms_of(model, state), model.derivatives(state).force_q)
     return state, left, len(path.shares) - 1, path
 
 
 def _settled(model: Dynamics) -> tuple[State, float, int]:
-    """The equilibrium, its unbalanced fraction of the forces, and the number of steps."""
-    lengths, metric = lengths_of(model), np.sqrt(metric_of(model, model.problem.length)[:-1])
-    state, shift, before = _followed(model, _without_rates(model, model.state0), lengths), 0.0, np.inf
-    best, stalled = np.inf, 0
+    """The equilibrium, its unbalanced fraction of the forces, and the number of steps.
+
+    Steps along eigenvectors lose their way where soft parts move far, as each step strains the stiff ones. Then what is
+    not balanced at the start is held there, and let go little by little.
+    """
+    lengths = lengths_of(model)
+    start = resting(model, model.state0, lengths)
+    try:
+        return _descended(model, start, lengths)
+    except SimulationError:
+        path = follow(model, start, model.problem.length, held=model.applied(start) - model.gravity(start))
+        if path is None or path.unstable[-1]:  # what it leads to is no minimum
+            raise
+    state, left, steps = _descended(model, path.states[-1], lengths)
+    return state, left, STEPS + len(path.shares) - 1 + steps
+
+
+def _descended(model: Dynamics, state: State, lengths: list[int]) -> tuple[State, float, int]:
+    """The equilibrium near a state, as of `_settled`."""
+    weights, best, stalled = metric_of(model, model.problem.length)[:-1], np.inf, 0
+    metric = np.sqrt(weights)
     for step in range(STEPS):
-        free = freedoms_of(model, state)
-        by, Z = model.derivatives(state), free.Z
-        left = unbalanced(model, state, free, by.force_q)
-        if left > before:
-            shift = max(4.0 * shift, 1e-3)
-        else:
-            shift *= 0.1
-        before = left
-        M = Z.T @ by.force_a @ Z
-        force = M @ _still(model, state)[free.which]
-        pulled = by.acceleration_s[:, lengths] @ by.entropy_r[lengths]
-        K = -M @ ((by.acceleration_q + pulled) @ Z)[free.which]
-        values, ways = metric_eigen(0.5 * (K + K.T), 0.5 * (M + M.T))
+        free, stiffness = freedoms_of(model, state), model.stiffness(state, lengths)
+        Z, left = free.Z, unbalanced(model, state, free, stiffness)
+        K = Z.T @ stiffness @ Z
+        force = Z.T @ (model.mass_matrix(state) @ _still(model, state))
+        values, ways = metric_eigen(0.5 * (K + K.T), Z.T @ (weights[:, None] * Z))
         size = np.abs(values)
         flat = size <= ELIMINATION * size.max(initial=0.0)
         push = ways.T @ force
@@ -74,38 +82,20 @@ def _settled(model: Dynamics) -> tuple[State, float, int]:
         best, stalled = (reach, 0) if reach < 0.5 * best else (best, stalled + 1)
         if left <= STALLED and (reach <= ENOUGH or (reach <= ROUNDED and stalled >= 3)):
             return state, left, step
-        stretch = push / np.where(flat, most, size + shift * most)
-        change = Z @ (ways @ stretch)
+        change = Z @ (ways @ (push / np.where(flat, most, size)))
         change /= max(1.0, float(np.abs(change).max(initial=0.0)) / STRIDE)
-        state = _followed(model, _nearest(model, state, change), lengths)
+        state = _nearest(model, state, change, lengths)
     raise restless(*_culprit(model, state))
 
 
-def lengths_of(model: Dynamics) -> list[int]:
-    """Places of tendons' lengths among the entropies."""
-    found = tendon_lengths(frames_of(model.problem.descriptor), model.problem.initial)
-    return [model.layout.entropies.index(path) for path, _ in found]
-
-
-def _followed(model: Dynamics, state: State, lengths: list[int]) -> State:
-    """The state with tendons as long as they are where the joints put their points."""
-    if not lengths:
-        return state
-    q, r, s = model.layout.split(state.array)
-    found = tendon_lengths(frames_of(model.problem.descriptor), model.states(state))
-    for place, (_, length) in zip(lengths, found, strict=True):
-        s[place] = length
-    return model.unpack(np.concatenate([q, r, s]))
-
-
-def _nearest(model: Dynamics, state: State, change: Array) -> State:
+def _nearest(model: Dynamics, state: State, change: Array, lengths: list[int]) -> State:
     """The state without rates after a change, or the largest half, quarter, … of it after which loops close."""
     for halvings in range(HALVINGS):
         try:
-            return _without_rates(model, model.closed(model.moved(state, 0.5**halvings * change)))
+            return resting(model, model.closed(model.moved(state, 0.5**halvings * change)), lengths)
         except SimulationError:
             continue
-    return _without_rates(model, model.closed(model.moved(state, 0.5**HALVINGS * change)))
+    return resting(model, model.closed(model.moved(state, 0.5**HALVINGS * change)), lengths)
 
 
 def _still(model: Dynamics, state: State) -> Array:
@@ -115,11 +105,6 @@ def _still(model: Dynamics, state: State) -> Array:
     for name, where in model.freedoms.items():
         out[where] = found[name][: where.size]
     return out
-
-
-def _without_rates(model: Dynamics, state: State) -> State:
-    q, r, s = model.layout.split(state.array)
-    return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
 
 
 def _culprit(model: Dynamics, state: State) -> tuple[str, str]:

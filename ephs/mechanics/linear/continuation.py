@@ -6,15 +6,16 @@ loads fall again, and past bifurcations. Stiffness matrices are exact; loops are
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import final
 
 import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
-from ephs.mechanics.linear.freedoms import freedoms_of
+from ephs.mechanics.linear.freedoms import freedoms_of, lengths_of, resting
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import eigenvalues, svd
+from ephs.solve.posing.errors import SimulationError
 
 SAME = 1e-12
 """Fraction of a load below which its remainder is rounding."""
@@ -26,8 +27,13 @@ TRIALS = 80
 """Trial points on a step, at most, to locate a critical point: bisection alone needs half of them."""
 LONGEST, SHORTEST = 1.0, 1e-6
 """Bounds of the distance from one equilibrium to the next, in rad, parts of the scene's length, and of the loads."""
-ITERATIONS = 12
+ITERATIONS, WANTED = 12, 8.0
+"""Newton steps to an equilibrium on the path, at most, and those that a step along it should take."""
+BEND = 0.8
+"""Cosine of the angle between the path's tangents, from one equilibrium to the next, at least."""
 POINTS = 2000
+LET_GO = 100
+"""Points on the way from a start that is held; the softest rods and sheets need some 20."""
 ROUNDED = 1e-7
 """Change, in the same measure, at which an iteration that no longer improves has met rounding."""
 
@@ -59,7 +65,7 @@ class StaticPath:
 @dataclass(frozen=True, slots=True, eq=False)
 class _ForceBalance:
     """Forces at a configuration on its independent degrees of freedom, (k,), what they change by, and what the loads
-    add; ``values`` are the eigenvalues of the scaled stiffness.
+    add; ``values`` are the eigenvalues of the scaled stiffness, of an equilibrium.
     """
 
     state: State
@@ -67,46 +73,94 @@ class _ForceBalance:
     stiffness: Array
     load: Array
     Z: Array
-    values: Array
+    values: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def unstable(self) -> int:
         return int((self.values < 0.0).sum())
 
 
-def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> StaticPath | None:
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Loaded:
+    """A mechanism under a part of what acts on it.
+
+    Parameters
+    ----------
+    lengths
+        Places of tendons' lengths among the entropies.
+    held
+        (n,) forces on the tree's freedoms that grow; the loads of the scene where None.
+    """
+
+    model: Dynamics
+    lengths: list[int]
+    held: Array | None
+
+    def balance(self, state: State, share: float) -> _ForceBalance:
+        """Forces at rest: of accelerations, so that loops and prescribed joints are reckoned with."""
+        model, zero = self.model, np.zeros(self.model.layout.n)
+        Z = freedoms_of(model, state).Z
+        mass = Z.T @ model.mass_matrix(state)
+        if self.held is not None:
+            load = Z.T @ self.held
+            force = mass @ model.acceleration(state, zero) - (1.0 - share) * load
+            return _ForceBalance(state, force, Z.T @ model.stiffness(state, self.lengths) @ Z, load, Z)
+        model.loading.share = 0.0
+        bare = mass @ model.acceleration(state, zero)
+        model.loading.share = 1.0
+        load = mass @ model.acceleration(state, zero) - bare
+        model.loading.share = share
+        stiffness = Z.T @ model.stiffness(state, self.lengths) @ Z
+        model.loading.share = 1.0
+        return _ForceBalance(state, bare + share * load, stiffness, load, Z)
+
+    def moved(self, state: State, change: Array) -> State:
+        """The configuration elsewhere, loops closed, at rest."""
+        return resting(self.model, self.model.closed(self.model.moved(state, change)), self.lengths)
+
+
+def follow(
+    model: Dynamics, start: State, length: float, until: float = 1.0, *, held: Array | None = None
+) -> StaticPath | None:
     """The path from no loads to a part of them, from an equilibrium without; None where it is lost.
 
     Parameters
     ----------
     length
         Of the mechanism, m: what a displacement is measured by.
+    held
+        (n,) forces on the tree's freedoms at the start, in place of loads: there they are balanced, and then let go.
     """
-    metric = metric_of(model, length)
-    here = _balance(model, start, 0.0)
+    metric, loaded = metric_of(model, length), Loaded(model, lengths_of(model), held)
+    here = _classed(loaded.balance(start, 0.0))
     shares, points, unstable, critical = [0.0], [start], [here.unstable], list[float]()
     share, step = 0.0, 0.25
-    before = np.append(np.zeros(model.layout.n), 1.0)
-    while len(shares) < POINTS:
+    before = np.append(np.zeros(metric.size - 1), 1.0)
+    while len(shares) < (POINTS if held is None else LET_GO):
         ahead = _tangent(here, metric)
         if ahead @ (metric * before) < 0.0:
             ahead = -ahead
         trial = min(step, (until - share) / ahead[-1]) if ahead[-1] * (until - share) > 0.0 else step
-        found = _along(model, here, share, ahead, trial, metric)
+        found = _along(loaded, here, share, ahead, trial, metric)
         if found is None:
             step = 0.5 * trial
             if step < SHORTEST:
                 return None
             continue
         there, reached, count = found
-        turned = (_tangent(there, metric) @ (metric * ahead)) * _tangent(there, metric)[-1] * ahead[-1] < 0.0
-        if turned and there.unstable == here.unstable and trial > SHORTEST:  # two critical points, or another path
+        onwards = _tangent(there, metric)
+        along = float(onwards @ (metric * ahead))
+        turned = along * onwards[-1] * ahead[-1] < 0.0
+        hidden = turned and there.unstable == here.unstable  # two critical points, or another path
+        if (hidden or abs(along) < BEND) and trial > SHORTEST:
             step = 0.5 * trial
             continue
-        met = [_critical(model, here, share, ahead, trial, metric, there, k) for k in _between(here, there)]
+        between = _between(here, there) if held is None else ()
+        met = [_critical(loaded, here, share, ahead, trial, metric, there, k) for k in between]
         critical += _distinct(critical, [x for x in met if x <= until * (1.0 + SAME)])
         if reached > until:
-            last = _equilibrium_at(model, there.state, until)
+            last = _equilibrium_at(loaded, there.state, until)
             if last is None:
                 step = 0.5 * trial
                 if step < SHORTEST:
@@ -118,11 +172,11 @@ def follow(model: Dynamics, start: State, length: float, until: float = 1.0) -> 
         points.append(here.state)
         unstable.append(here.unstable)
         if abs(share - until) <= SAME * until:
-            last = _equilibrium_at(model, here.state, until)
+            last = _equilibrium_at(loaded, here.state, until)
             points[-1] = here.state if last is None else last.state
             shares[-1] = until
             return StaticPath(np.array(shares), tuple(points), np.array(unstable), tuple(critical))
-        step = float(np.clip(trial * np.sqrt(8.0 / count), SHORTEST, LONGEST))
+        step = float(np.clip(trial * np.sqrt(WANTED / count), SHORTEST, LONGEST))
     return None
 
 
@@ -139,22 +193,8 @@ def metric_of(model: Dynamics, length: float) -> Array:
     return weights
 
 
-def _balance(model: Dynamics, state: State, share: float) -> _ForceBalance:
-    """Forces at rest: of accelerations, so that loops and prescribed joints are reckoned with."""
-    zero = np.zeros(model.layout.n)
-    model.loading.share = 0.0
-    bare = model.acceleration(state, zero)
-    model.loading.share = 1.0
-    full = model.acceleration(state, zero)
-    model.loading.share = share
-    free, by = freedoms_of(model, state), model.derivatives(state)
-    model.loading.share = 1.0
-    Z = free.Z
-    mass = Z.T @ by.force_a @ Z
-    load = mass @ (full - bare)[free.which]
-    force = mass @ bare[free.which] + share * load
-    stiffness = -mass @ (by.acceleration_q @ Z)[free.which]
-    return _ForceBalance(state, force, stiffness, load, Z, _eigenvalues(stiffness))
+def _classed(at: _ForceBalance) -> _ForceBalance:
+    return replace(at, values=_eigenvalues(at.stiffness))
 
 
 def _eigenvalues(stiffness: Array) -> Array:
@@ -179,7 +219,7 @@ def _tangent(here: _ForceBalance, metric: Array) -> Array:
 
 
 def _along(
-    model: Dynamics, here: _ForceBalance, share: float, ahead: Array, distance: float, metric: Array
+    loaded: Loaded, here: _ForceBalance, share: float, ahead: Array, distance: float, metric: Array
 ) -> tuple[_ForceBalance, float, int] | None:
     """The equilibrium at a distance along the tangent, its part of the loads, and the iterations."""
     made, normal = distance * ahead, metric * ahead
@@ -190,48 +230,60 @@ def _along(
         )
         return matrix, np.append(at.force, 0.0)  # changes are normal to the tangent: the distance stays
 
-    return _solved(model, _moved(model, here.state, made[:-1]), share + float(made[-1]), metric, bordered)
+    return _solved(loaded, here.state, made[:-1], share + float(made[-1]), metric, distance, bordered)
 
 
-def _equilibrium_at(model: Dynamics, state: State, share: float) -> _ForceBalance | None:
+def _equilibrium_at(loaded: Loaded, state: State, share: float) -> _ForceBalance | None:
     """The equilibrium near by at a part of the loads."""
-    metric = np.ones(model.layout.n + 1)
-    found = _solved(model, state, share, metric, lambda at: (at.stiffness, at.force))
+    metric = np.ones(loaded.model.layout.n + 1)
+    found = _solved(
+        loaded, state, np.zeros(metric.size - 1), share, metric, LONGEST, lambda at: (at.stiffness, at.force)
+    )
     return None if found is None else found[0]
 
 
 def _solved(
-    model: Dynamics,
+    loaded: Loaded,
+    state: State,
+    first: Array,
+    share: float,
+    metric: Array,
+    reach: float,
+    system: Callable[[_ForceBalance], tuple[Array, Array]],
+) -> tuple[_ForceBalance, float, int] | None:
+    """Newton's iteration to rounding, after a first change (n,); None where it does not converge within steps of a
+    reach, in the metric: longer ones may end on another path.
+    """
+    try:
+        return _iterated(loaded, loaded.moved(state, first), share, metric, reach, system)
+    except (np.linalg.LinAlgError, SimulationError):  # singular, or too far for a loop or a component
+        return None
+
+
+def _iterated(
+    loaded: Loaded,
     state: State,
     share: float,
     metric: Array,
+    reach: float,
     system: Callable[[_ForceBalance], tuple[Array, Array]],
 ) -> tuple[_ForceBalance, float, int] | None:
-    """Newton's iteration to rounding; None where it does not converge."""
-    last, at = np.inf, _balance(model, state, share)
+    last, at = np.inf, loaded.balance(state, share)
     for count in range(1, ITERATIONS + 1):
         matrix, residual = system(at)
-        try:
-            change = np.asarray(np.linalg.solve(matrix, residual), dtype=float)
-        except np.linalg.LinAlgError:
-            return None
+        change = np.asarray(np.linalg.solve(matrix, residual), dtype=float)
         if not np.isfinite(change).all():
             return None
         k = at.stiffness.shape[0]
         step = at.Z @ change[:k]
+        more = float(change[k]) if change.size > k else 0.0
         size = float(np.sqrt(step @ (metric[:-1] * step)))
-        if size > 4.0 * LONGEST or (size <= ROUNDED and size >= 0.5 * last):
-            return (at, share, count) if size <= ROUNDED else None
+        if max(size, abs(more)) > reach or (size <= ROUNDED and size >= 0.5 * last):
+            return (_classed(at), share, count) if size <= ROUNDED else None
         last = size
-        share += float(change[k]) if change.size > k else 0.0
-        at = _balance(model, _moved(model, at.state, step), share)
-    return (at, share, ITERATIONS) if last <= ROUNDED else None
-
-
-def _moved(model: Dynamics, state: State, change: Array) -> State:
-    """The configuration elsewhere, loops closed, at rest."""
-    q, r, s = model.layout.split(model.closed(model.moved(state, change)).array)
-    return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
+        share += more
+        at = loaded.balance(loaded.moved(at.state, step), share)
+    return (_classed(at), share, ITERATIONS) if last <= ROUNDED else None
 
 
 def _between(one: _ForceBalance, two: _ForceBalance) -> range:
@@ -240,7 +292,7 @@ def _between(one: _ForceBalance, two: _ForceBalance) -> range:
 
 
 def _critical(
-    model: Dynamics,
+    loaded: Loaded,
     here: _ForceBalance,
     share: float,
     ahead: Array,
@@ -259,12 +311,12 @@ def _critical(
         if trial % 3 == 2 and high - low > 0.5 * before:
             middle = 0.5 * (low + high)
         before = high - low if trial % 3 == 2 else before
-        found = _along(model, here, share, ahead, middle, metric)
+        found = _along(loaded, here, share, ahead, middle, metric)
         if found is None:  # the path forks there: the equations are singular
             middle = (
                 0.5 * (low + high) if abs(middle - 0.5 * (low + high)) > 0.1 * (high - low) else 0.7 * low + 0.3 * high
             )
-            found = _along(model, here, share, ahead, middle, metric)
+            found = _along(loaded, here, share, ahead, middle, metric)
             if found is None:
                 return part
         at, part, _ = found

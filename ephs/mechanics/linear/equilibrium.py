@@ -10,6 +10,7 @@ from ephs.mechanics.scene.actuators import Actuator
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.gears import Gear
 from ephs.mechanics.scene.model import Scene
+from ephs.mechanics.scene.state import resumed
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.systems.system import System
@@ -70,8 +71,9 @@ def equilibrium(
     """An equilibrium near the initial state.
 
     For a mechanism, the search starts at its initial state with zero rates, and ends at a balance of gravity, springs
-    and drives. It takes steps along the eigenvectors of the stiffness in the mass metric, downhill in unstable
-    directions, too; unless the initial state is balanced, the result is a minimum of the energy. A system without
+    and drives. It takes steps along the eigenvectors of the stiffness, downhill in unstable directions, too; unless the
+    initial state is balanced, the result is a minimum of the energy. Where soft parts move too far for that, the forces
+    at the start are held and let go little by little, and the steps follow from there. A system without
     joints, with attachments that have states, or where heat flows on, settles by implicit Euler steps of growing
     length, which preserve its linear invariants (charges, volumes, entropies of isolated parts). In a scene's own
     system, a joint with a prescribed motion is free unless its port has the effort 0.
@@ -141,7 +143,8 @@ def _of_scene(scene: Scene) -> Equilibrium:
     at, left, steps, path = balanced(model)
     known = joints.keys() - set(model.cut)
     coordinates = {name: value for name, value in at.coordinates.items() if name in known and value.size}
-    rest, states = still.with_state(coordinates, adjust=True), model.states(at)
+    states = model.states(at)
+    rest = resumed(still.with_state(coordinates, adjust=True), states)
     if path is None:
         return Equilibrium(rest, states, left, steps)
     return Equilibrium(rest, states, left, steps, path.shares, path.critical)

@@ -6,6 +6,8 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.dynamics import Dynamics, State
+from ephs.mechanics.tree.finding.frames import frames_of
+from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.equations.sparse import Index
 
@@ -53,6 +55,22 @@ def freedoms_of(model: Dynamics, state: State) -> Freedoms:
     Z[which, np.arange(which.size)] = 1.0
     Z[dependent] = light[dependent][:, None] * rest / light[which]
     return Freedoms(which, Z)
+
+
+def lengths_of(model: Dynamics) -> list[int]:
+    """Places of tendons' lengths among the entropies."""
+    found = tendon_lengths(frames_of(model.problem.descriptor), model.problem.initial)
+    return [model.layout.entropies.index(path) for path, _ in found]
+
+
+def resting(model: Dynamics, state: State, lengths: list[int]) -> State:
+    """The state without rates, with tendons as long as they are where the joints put their points."""
+    q, r, s = model.layout.split(state.array)
+    if lengths:
+        found = tendon_lengths(frames_of(model.problem.descriptor), model.states(state))
+        s = s.copy()
+        s[lengths] = [length for _, length in found]
+    return model.unpack(np.concatenate([q, np.zeros_like(r), s]))
 
 
 def unbalanced(model: Dynamics, state: State, free: Freedoms, stiffness: Array) -> float:

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.linear.balance import STALLED, balanced, lengths_of, restless
+from ephs.mechanics.linear.balance import STALLED, balanced, restless
+from ephs.mechanics.linear.freedoms import lengths_of
 from ephs.mechanics.linear.pencil import Pencil, mechanism_of
 from ephs.mechanics.runs.assembling import FlatJoints, assembled, flat_joints
 from ephs.mechanics.tree.finding.frames import frames_of

@@ -23,6 +23,7 @@ from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.scene.tree import spanning_hops
+from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
@@ -248,19 +249,22 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     there = rebuilt(scene, now, poses, twists, elements(links, poses))
     heat = {name: float(solution.thermal(name).temperature[k]) for name, _ in scene.all_thermal()}
     states = solution.state_at(k)
+    found = resumed(
+        mapped(there, {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])}), states
+    )
+    if faults := list(lost_states(found, states)):
+        raise SceneError(scene.name, faults)
+    return found
+
+
+def resumed(scene: Scene, states: Mapping[Path, Array]) -> Scene:
+    """The scene with the states of elements of their own where states of its system have them."""
 
     def continued(section: str) -> Callable[[str, Any], Any]:
         return lambda path, of: of.continued(inner_states(section, path + of.name, states))
 
     own = {section for section, kind in {**KINDS, **REGISTERED}.items() if kind.continued is not Element.continued}
-    found = mapped(
-        there,
-        {"thermal": lambda path, node: replace(node, temperature=heat[path + node.name])}
-        | {section: continued(section) for section in own},
-    )
-    if faults := list(lost_states(found, states)):
-        raise SceneError(scene.name, faults)
-    return found
+    return mapped(scene, {section: continued(section) for section in own})
 
 
 def _given(now: Snapshot, values: Mapping[str, ArrayLike], what: str, where: str) -> dict[str, Array]:

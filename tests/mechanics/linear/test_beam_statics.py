@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
@@ -119,6 +120,53 @@ def test_a_thin_rod_is_the_elastica(number, order):
     limit = tips[1] + (tips[1] - tips[0]) / (2.0**order - 1.0)
     assert np.abs(limit - elastica(number)).max() <= np.abs(tips[1] - tips[0]).max() / 16.0
     assert (np.abs(tips[0] - elastica(number)).max() > 1e-4) == (order == 2)  # eight elements alone
+
+
+def hanging(number):
+    """Tip (x, y)/L of a rod clamped level, that hangs by its own weight, with ρ g A L³/EI given: by collocation."""
+    places = np.linspace(0.0, 1.0, 101)
+
+    def slopes(s, y):  # the turn and its rate: EI θ'' = −w (L − s) cos θ
+        return np.array([y[1], -number * (1.0 - s) * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
+
+    guess = np.zeros((4, places.size))
+    for part in np.linspace(0.1, 1.0, 10):
+        found = solve_bvp(
+            lambda s, y, part=part: slopes(s, y) * [[1.0], [part], [1.0], [1.0]],
+            lambda a, b: np.array([a[0], b[1], a[2], a[3]]),
+            places, guess, tol=1e-9, max_nodes=10**5,
+        )  # fmt: skip
+        assert found.success
+        guess = found.sol(places)
+    return -found.sol(1.0)[[2, 3]] * [-1.0, 1.0]
+
+
+WIRES = {
+    "steel 2 mm": (2e-3, 210e9, 7850.0, 1.0),
+    "steel 1 mm": (1e-3, 210e9, 7850.0, 1.0),
+    "steel 0.3 mm": (3e-4, 210e9, 7850.0, 1.0),
+    "rubber": (5e-3, 5e6, 1100.0, 0.5),
+}
+"""Radius, Young's modulus, density, length; the last two sag by 0.8 and 0.9 of their length."""
+
+
+@pytest.mark.parametrize("name", list(WIRES))
+def test_a_rod_of_any_softness_hangs_by_its_own_weight(name):
+    """From where it is straight, without parts of a load."""
+    radius, young, density, length = WIRES[name]
+    tips = []
+    for elements in (8, 16):
+        section = f"section = {{ circle = {radius}, E = {young}, nu = 0.3, rho = {density} }}"
+        text = f"[beams.rod]\npoints = [[0.0, 0.0, 0.0], [{length}, 0.0, 0.0]]\nelements = {elements}\n"
+        text += f'up = [0.0, 0.0, 1.0]\n{section}\nends = ["ground"]\norder = 2\n'
+        rest = ephs.equilibrium(scene_of_text("format = 1\n" + text))
+        assert rest.residual <= 1e-9 and rest.steps <= 15
+        tips.append(rest.model.body(f"rod.{elements}").pose[[4, 6]] / length)
+    exact = hanging(density * 9.81 * length**3 * 4.0 / (young * radius**2))
+    limit = tips[1] + (tips[1] - tips[0]) / 3.0
+    thick = (radius / length) ** 2 + density * 9.81 * length / young  # shear and stretch, which the elastica has not
+    assert np.abs(limit - exact).max() <= np.abs(tips[1] - tips[0]).max() / 8.0 + 10.0 * thick
+    assert exact[1] < -0.04
 
 
 def frame(elements, force, rigid=1.0):

@@ -26,6 +26,19 @@ def node_areas(places: Array, cells: Indices) -> Array:
     return out
 
 
+def area_slopes(places: Array, cells: Indices, moved: Array) -> Array:
+    """(m, 3, k) exact derivatives of `node_areas` along motions (m, 3, k) of the nodes."""
+    corner, out = places[cells], np.zeros_like(moved)
+    arms = np.einsum("iab,nak->nibk", _FORMS - _FORMS.transpose(0, 2, 1), corner)
+    np.add.at(out, cells, np.einsum("nibjk,nbkl->nijl", _hats(arms), moved[cells]))
+    return out
+
+
+def _hats(vectors: Array) -> Array:
+    """(…, 3, 3) matrices of cross products with vectors (…, 3)."""
+    return np.cross(vectors[..., None, :], np.eye(3)).swapaxes(-1, -2)
+
+
 def volume(places: Array, cells: Indices) -> float:
     """Volume of the cones from the origin to a surface with nodes at places (m, 3), m³: of a closed one its own."""
     return float(np.sum(node_areas(places, cells) * places)) / 3.0

@@ -8,6 +8,7 @@ from ephs.mechanics.rewrite.coordinates import unread
 from ephs.mechanics.road.records import LinkPlace
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
+from ephs.solve.equations.sparse import Index
 
 
 @final
@@ -69,6 +70,22 @@ class Linearised:
         if solve:
             forces = self._dense.solved(-forces, self._rows(slopes))
         return np.concatenate([forces, slopes[found.cut_rates], slopes[found.entropy_rates]])
+
+    def resting(self, q: Array, s: Array, following: Index) -> Array:
+        """(n, n) the derivatives by the tree's elements of the forces that hold the mechanism at rest, with those that
+        its loops need as they are.
+
+        Parameters
+        ----------
+        following
+            Places of entropies whose rates are those of a place, which are states of the configuration.
+        """
+        found = self._residual
+        self.forward(q, np.zeros(found.n), s)
+        found.at(np.zeros(found.n), self._dense.multiplier[self._dense.multiplier.size - found.m :])
+        slopes, first = self.columns(solve=False), found.nv + found.n
+        moved = slopes[found.nv + following, found.nv : found.nv + found.n]
+        return slopes[: found.n, : found.n] + slopes[: found.n, first + following] @ moved
 
     def _rows(self, slopes: Array) -> Array:
         """Slopes of all rows' accelerations: those that are prescribed stay."""

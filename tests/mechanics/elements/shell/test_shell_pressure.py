@@ -9,7 +9,6 @@ import ephs
 from ephs.mechanics.elements.shell.pressure import node_areas, volume
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
-from ephs.solve.posing.errors import OptionError
 from tests.written import scene_of_text
 
 EPS = float(np.finfo(float).eps)
@@ -136,7 +135,58 @@ def test_other_units_are_the_same_motion():
     assert works[1] == 16.0 * works[0] > 0.0
 
 
-@pytest.mark.parametrize("asked", [ephs.linearize, ephs.equilibrium, ephs.dynamics])
-def test_what_needs_its_derivatives_refuses_it(asked):
-    with pytest.raises(OptionError, match=r"shells\.box"):
-        asked(box())
+# ---- rest ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("surface", ["closed", "open"])
+def test_derivatives_are_exact_off_the_balance_and_a_potential_has_symmetric_ones(surface):
+    """Of dynamics, and of what the pressure adds; on an open surface it is no potential's."""
+    hub = HUB.replace("PINNED", "[false, false, false, true]")
+    scene = box() if surface == "closed" else scene_of_text(STILL + hub + SKIN)
+    model = ephs.dynamics(scene)
+    n, h = model.layout.n, 1e-5  # ∛ε: truncation and rounding of differences are equally small
+    at, zero = model.moved(model.state0, 0.05 * np.random.default_rng(3).standard_normal(n)), np.zeros(n)
+    forces, accelerations = model.derivatives(at, accelerations={}).force_q, model.derivatives(at).acceleration_q
+    exact = (forces, model.inverse_dynamics), (accelerations, model.acceleration)
+    for found, function in (*exact, (model.stiffness(at), model.inverse_dynamics)):
+        ends = [[function(model.moved(at, sign * h * unit), zero) for sign in (1.0, -1.0)] for unit in np.eye(n)]
+        differenced = np.array([(one - two) / (2.0 * h) for one, two in ends]).T
+        assert np.abs(found - differenced).max() <= 1e-8 * np.abs(found).max()
+    bare = ephs.dynamics(varied(scene, {f"shells.{next(iter(scene.shells))}.pressure": 0.0}))
+    added = (ephs.dynamics(scene).stiffness(model.state0) - bare.stiffness(model.state0))[np.ix_(*2 * [moved(model)])]
+    assert (np.abs(added - added.T).max() <= 1e-12 * np.abs(added).max()) == (surface == "closed")
+
+
+def moved(model):
+    """Places of the nodes' displacements among the freedoms: their axes are the world's at the start."""
+    return np.concatenate([where[3:] for name, where in model.freedoms.items() if "node" in name and where.size == 6])
+
+
+def test_an_inflated_cushion_rests_where_a_damped_run_ends():
+    scene = varied(box(), {"shells.box.damping": 0.1})
+    rest, run = ephs.equilibrium(scene), ephs.simulate(scene, 2.0, method="radau", rtol=1e-6)
+    ends = run.shell("box").position[-1]
+    places = np.array([rest.states[ephs.Path.of(f"shells.box.node{i}.pe.q")][4:] for i in range(8)])
+    apart = [np.linalg.norm(each[:, None] - each, axis=2) for each in (places, ends, BOX)]
+    assert np.abs(apart[0] - apart[1]).max() <= 1e-6  # what lags by the damping time dies out as exp(−2/0.1)
+    assert np.abs(apart[0] - apart[2]).max() > 1e-3  # it is inflated
+    linear = ephs.linearize(rest.model)
+    assert linear.structure is not None  # at rest, and with a potential
+    with_input = ephs.dynamics(scene, inputs={"shells.box": 0.0})
+    assert np.abs(with_input.acceleration(with_input.state0, np.zeros(with_input.layout.n))).max() <= 1e-9
+
+
+def test_a_long_tube_has_the_membrane_forces_of_its_radius():
+    """A ring of 12 by 1 elements, free along its axis: p R around to the order 2 of the elements, nothing along."""
+    count, radius, length, thickness, young, p = 12, 0.5, 0.1, 5e-3, 1e6, 20.0
+    angles = 2.0 * np.pi * np.arange(count) / count
+    rings = [[radius * float(np.cos(a)), radius * float(np.sin(a)), z] for z in (0.0, length) for a in angles]
+    cells = [[i, (i + 1) % count, count + (i + 1) % count, count + i] for i in range(count)]
+    text = f"points = {rings}\nelements = {cells}\nthickness = {thickness}\nE = {young}\nnu = 0.3\nrho = 100.0\n"
+    scene = scene_of_text(f"{STILL}[shells.tube]\n{text}pressure = {p}\n")
+    rest = ephs.equilibrium(scene)
+    places = np.array([rest.states[ephs.Path.of(f"shells.tube.node{i}.pe.q")][4:] for i in range(2 * count)])
+    middle = places.mean(axis=0)
+    wide = np.mean(np.linalg.norm((places - middle)[:, :2], axis=1)) if abs(middle[2] - 0.05) < 1e-6 else np.nan
+    stretch = p * radius / (young * thickness)
+    assert wide / radius - 1.0 == pytest.approx(stretch, rel=2.0 * (np.pi / count) ** 2 + 4.0 * stretch)
