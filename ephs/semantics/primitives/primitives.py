@@ -89,6 +89,7 @@ class _Structure(ABC):
     __slots__ = ()
     interface: Interface
     _verdict: StructureVerdict | None
+    _bundle: Bundle | None
 
     @property
     @abstractmethod
@@ -112,7 +113,10 @@ class _Structure(ABC):
     @property
     def bundle(self) -> Bundle:
         """The layout of the fibre."""
-        return Bundle.of(self.interface)
+        if self._bundle is None:
+            object.__setattr__(self, "_bundle", Bundle.of(self.interface))
+        assert self._bundle is not None
+        return self._bundle
 
     @property
     def algebra(self) -> "Algebra[Filling]":
@@ -182,6 +186,7 @@ class Storage(_Structure):
     initial: Initial = ()
     gap: object = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
+    _bundle: Bundle | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.trusted:
@@ -298,6 +303,7 @@ class Reversible(_Structure):
     working: bool = False
     external_field: bool = field(default=False, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
+    _bundle: Bundle | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.trusted:
@@ -342,6 +348,7 @@ class Irreversible(_Structure):
     support: Support | None = field(default=None, compare=False, repr=False)
     impulse: object = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
+    _bundle: Bundle | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.trusted:

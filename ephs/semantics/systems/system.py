@@ -106,7 +106,15 @@ class System:
         """The same system on one level: patterns substituted, primitives under the paths of their boxes."""
         if self.is_flat:
             return self
-        return System(self.nesting.flatten(), Directory.trusted(dict(self.leaves())))
+        return System.trusted(self.nesting.flatten(), Directory.trusted(dict(self.leaves())))
+
+    @staticmethod
+    def trusted(pattern: Pattern, fillings: Directory["Filling"]) -> "System":
+        """System of fillings known to fit a pattern in their frames, such as those with other numbers; unchecked."""
+        system = object.__new__(System)
+        for name, value in (("pattern", pattern), ("fillings", fillings), ("_kept", Kept())):
+            object.__setattr__(system, name, value)
+        return system
 
     def flatten_once(self) -> "System":
         """The same system with its subsystems opened by one level."""
@@ -125,24 +133,23 @@ class System:
 
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         """The primitives with their full paths, depth first."""
-        for box, filling in self.fillings.items():
-            if isinstance(filling, System):
-                for path, primitive in filling.leaves():
-                    yield box / path, primitive
-            else:
-                yield box, filling
+        return iter(once(self, "leaves", lambda: tuple(_leaves(self, ROOT))))
 
     @property
     def states(self) -> Directory[Quantity]:
         """The states of the storages: path of the component, then its port -> quantity."""
-        return Directory(
-            {
-                path / port: primitive.interface[port].quantity
-                for path, primitive in self.leaves()
-                if isinstance(primitive, Storage)
-                for port in primitive.bundle.ports
-            }
-        )
+
+        def found() -> Directory[Quantity]:
+            return Directory.trusted(
+                {
+                    path / port: quantity
+                    for path, primitive in self.leaves()
+                    if isinstance(primitive, Storage)
+                    for port, _, quantity in primitive.bundle.items()
+                }
+            )
+
+        return once(self, "states", found)
 
     @property
     def initial(self) -> dict[Path, Array]:
@@ -350,7 +357,17 @@ def _started(system: System, values: Mapping[Path, object], at: Path) -> System:
             fillings[box] = _started(part, given, at / box)
         elif isinstance(part, Storage):
             fillings[box] = started(part, given, at / box)
-    return System(system.pattern, Directory.trusted(fillings)) if inside else system
+    return System.trusted(system.pattern, Directory.trusted(fillings)) if inside else system
+
+
+def _leaves(system: System, at: Path) -> Iterator[tuple[Path, Primitive]]:
+    """The primitives of the system in the box ``at``, with their full paths."""
+    for box, filling in system.fillings.items():
+        path = at / box if at else box
+        if isinstance(filling, System):
+            yield from _leaves(filling, path)
+        else:
+            yield path, filling
 
 
 def fold(
