@@ -107,11 +107,12 @@ def shell_damper(rest: Array, stiffness: Array, damping: float) -> Irreversible:
         As of a `shell_spring`, or the damping is negative.
     """
     _require_damping(damping)
-    return _damper(*_numbers(*_checked(rest, stiffness)), damping)
+    rest, k = _checked(rest, stiffness)
+    return _damper(*_numbers(rest, k), damping, _row(damping * k))
 
 
-def _damper(rest: Numbers, stiffness: Numbers, damping: float) -> Irreversible:
-    matrix, kernel = logarithm_loss(EDGES, (*rest, *(damping * k for k in stiffness)), "shell_damper")
+def _damper(rest: Numbers, stiffness: Numbers, damping: float, resistance: Numbers) -> Irreversible:
+    matrix, kernel = logarithm_loss(EDGES, (*rest, *resistance), "shell_damper")
     return Irreversible(
         "shell_damper",
         _DAMPED,
@@ -192,21 +193,21 @@ def shell_element(
     _require_damping(damping)
     frames, between = np.asarray(sections, dtype=float), np.asarray(at_rest, dtype=float)
     pattern = shell_pattern(damped=damping != 0.0, heat=damping != 0.0 and heat)
-    return System(pattern, _parts(frames, between, _numbers(*_checked(rest, stiffness)), damping, heat=heat))
+    return System(pattern, _parts(frames, between, *_checked(rest, stiffness), damping, heat=heat))
 
 
 def _parts(
-    frames: Array, between: Array, numbers: tuple[Numbers, Numbers], damping: float, *, heat: bool
+    frames: Array, between: Array, rest: Array, stiffness: Array, damping: float, *, heat: bool
 ) -> Directory[System | Primitive]:
-    """What fills the boxes of an element."""
-    free = pair("free")
+    """What fills the boxes of an element; its numbers are checked."""
+    free, numbers = pair("free"), _numbers(rest, stiffness)
     parts: dict[Path, System | Primitive] = {_BOX["pe"]: _spring(*numbers)}
     for k, place in zip(OTHERS, between, strict=True):
         parts[_BOX[f"o1{k}"]] = frame_change(SE3.compose(frames[0], place), "p_j1", "p1")
         parts[_BOX[f"o{k}"]] = frame_change(frames[k - 1], "p_j2", "p2")
         parts[_BOX[f"hc{k}"]], parts[_BOX[f"pkc{k}"]] = components.holonomic(free), components.pair_coupling(free)
     if damping != 0.0:
-        parts[_BOX["mf"]] = _damper(*numbers, damping)
+        parts[_BOX["mf"]] = _damper(*numbers, damping, _row(damping * stiffness))
         if not heat:
             parts[_BOX["env"]] = library.environment()
     return Directory.trusted(parts)
@@ -268,14 +269,14 @@ def shell_system(
         raise StructureError("parameter", "shell", key="pinned", found=wrong, expected="held or carried nodes")
     given = (shell.poses, np.zeros((count, 6))) if start is None else start
     poses, twists = (np.asarray(each, dtype=float) for each in given)
-    momentum = quantity.body_momentum
-    junctions = {f"p{i}": junction(momentum, exposed=i in shared) for i in range(count)}
+    momentum, turning, outer = quantity.body_momentum, frozenset(pinned), frozenset(shared)
+    junctions = {f"p{i}": junction(momentum, exposed=i in outer) for i in range(count)}
     junctions |= {port: junction(momentum, exposed=True) for port in bodies}
     boxes: dict[str, dict[str, str]] = {}
     parts: dict[str, System | Primitive] = {}
     made: dict[bytes, System] = {}  # bodies, which nodes with one inertia share
     for i, pose in enumerate(poses):
-        if i in welded and i not in pinned:
+        if i in welded and i not in turning:
             port, at = welded[i]
             boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
             parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
@@ -286,7 +287,7 @@ def shell_system(
                 made[key] = rigid_body(float(inertia[i, 3]), tensors[i], gravity, strict=not spread)
             moving = np.concatenate([tensors[i] @ twists[i, :3], inertia[i, 3:] * twists[i, 3:]])
             parts[f"node{i}"] = made[key].with_initial({"pe.q": pose, "ke.p": moving})
-        if i in pinned:
+        if i in turning:
             port, at = welded[i]
             boxes[f"pin{i}"] = {"p1": port, "p2": f"p{i}"}
             apart = SE3.compose(SE3.inverse(at), pose)
@@ -300,13 +301,11 @@ def shell_system(
     at_rest = _from_first(shell)
     strained = None if np.array_equal(poses, shell.poses) else _strained(shell, at_rest, poses)
     _require_damping(damping)
-    pattern, (rest, stiffness) = (
-        shell_pattern(damped=damping != 0.0, heat=bool(warm)),
-        _checked(shell.rest, shell.matrix),
-    )
+    rest, stiffness = _checked(shell.rest, shell.matrix)
+    pattern = shell_pattern(damped=damping != 0.0, heat=bool(warm))
     for e, nodes in enumerate(shell.cells.tolist()):
         boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)} | warm
-        filled = _parts(sections[e], at_rest[e], _numbers(rest[e], stiffness[e]), damping, heat=bool(warm))
+        filled = _parts(sections[e], at_rest[e], rest[e], stiffness[e], damping, heat=bool(warm))
         element = System(pattern, filled) if e == 0 else System.trusted(pattern, filled)  # all like the first
         states = {} if strained is None else {f"pe.q_{k}": strained[e, k - 2] for k in OTHERS}
         parts[f"element{e}"] = element.with_initial(states) if states else element
@@ -357,4 +356,8 @@ def _require_damping(damping: float) -> None:
 
 def _numbers(rest: Array, stiffness: Array) -> tuple[Numbers, Numbers]:
     """Logarithms and K of an element as documents have them; its parts share them."""
-    return tuple(rest.ravel().tolist()), tuple(stiffness.ravel().tolist())
+    return _row(rest), _row(stiffness)
+
+
+def _row(values: Array) -> Numbers:
+    return tuple(values.ravel().tolist())

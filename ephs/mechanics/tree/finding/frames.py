@@ -272,7 +272,7 @@ class _Finder:
         return None
 
     def _around(self, number: int) -> Path:
-        return Path(tuple(self.wiring.components[number].path)[:-1])
+        return self.wiring.components[number].path.parent
 
     def _box(self, number: int, sharing: Counter[Path], most: int) -> Path:
         """The box that a component lies in; its own where that is the whole system, or has other bodies or joints."""
