@@ -42,4 +42,6 @@ def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tup
         out[:, 3:] = np.einsum("nij,ni->nj", rotations(found[pushed, :4]), forces)
         return out.ravel()
 
-    return [Path([PRESSURES, *name.split("."), f"node{node}"]) for node in pushed], Signal(wrenches)
+    return [Path([PRESSURES, *name.split("."), f"node{node}"]) for node in pushed], Signal(
+        wrenches, soft=pressure.constant or pressure.timed
+    )

@@ -130,11 +130,11 @@ def number_flat(flat: System) -> Numbering:
     reads: list[int] = []
     for path, primitive in flat.fillings.items():
         assert not isinstance(primitive, System)
-        ports = pattern.boxes[path].ports
+        on = {port: wire.junction for port, wire in pattern.boxes[path].ports.items()}
         order.append(primitives.number_of_object(primitive))
-        wires += [number[ports[port].junction] for port in primitive.bundle.ports]
+        wires += [number[on[port]] for port in primitive.bundle.ports]
         for port in primitive.reads:
-            junction = ports[port].junction
+            junction = on[port]
             state = provider.get(least.get(junction, junction))
             if state is None:
                 raise AssemblyError("unread-state", path, port=port, junction=junction)

@@ -56,6 +56,8 @@ class Kernel:
 
     def numbers(self, reference: Reference) -> tuple[float, ...]:
         """The parameters in a reference environment."""
+        if not self.potentials:
+            return self.parameters
         out = list(self.parameters)
         for place, carried in self.potentials:
             out[place] = sum(amount * reference.potential(charge) for charge, amount in carried)

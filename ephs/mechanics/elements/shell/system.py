@@ -17,7 +17,7 @@ from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.stiffness import EDGES
-from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
+from ephs.operad import Directory, Path, Pattern, Port, PortType, junction, quantity
 from ephs.operad.collector import paused_collector
 from ephs.semantics import library
 from ephs.semantics.bundles.bundle import Array
@@ -270,53 +270,60 @@ def shell_system(
     given = (shell.poses, np.zeros((count, 6))) if start is None else start
     poses, twists = (np.asarray(each, dtype=float) for each in given)
     momentum, turning, outer = quantity.body_momentum, frozenset(pinned), frozenset(shared)
-    junctions = {f"p{i}": junction(momentum, exposed=i in outer) for i in range(count)}
-    junctions |= {port: junction(momentum, exposed=True) for port in bodies}
-    boxes: dict[str, dict[str, str]] = {}
-    parts: dict[str, System | Primitive] = {}
+    inner, own = (junction(momentum, exposed=exposed) for exposed in (False, True))
+    on = [Path.of(f"p{i}") for i in range(count)]
+    junctions = {path: own if i in outer else inner for i, path in enumerate(on)}
+    junctions |= {Path.of(port): own for port in bodies}
+    boxes: dict[Path, Mapping[Path, Port] | dict[str, str]] = {}
+    parts: dict[Path, System | Primitive] = {}
     made: dict[bytes, System] = {}  # bodies, which nodes with one inertia share
     for i, pose in enumerate(poses):
+        node = Path.of(f"node{i}")
         if i in welded and i not in turning:
             port, at = welded[i]
-            boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
-            parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
+            boxes[node] = {"body": port, "p": f"p{i}"}
+            parts[node] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
         else:
-            boxes[f"node{i}"] = {"p": f"p{i}"}
+            boxes[node] = {"p": f"p{i}"}
             key = inertia[i, 3].tobytes() + tensors[i].tobytes()
             if key not in made:
                 made[key] = rigid_body(float(inertia[i, 3]), tensors[i], gravity, strict=not spread)
             moving = np.concatenate([tensors[i] @ twists[i, :3], inertia[i, 3:] * twists[i, 3:]])
-            parts[f"node{i}"] = made[key].with_initial({"pe.q": pose, "ke.p": moving})
+            parts[node] = made[key].with_initial({"pe.q": pose, "ke.p": moving})
         if i in turning:
             port, at = welded[i]
-            boxes[f"pin{i}"] = {"p1": port, "p2": f"p{i}"}
+            pin = Path.of(f"pin{i}")
+            boxes[pin] = {"p1": port, "p2": f"p{i}"}
             apart = SE3.compose(SE3.inverse(at), pose)
-            parts[f"pin{i}"] = joint("spherical", translation(apart[4:])).with_initial({"pe.q_r": apart[:4]})
+            parts[pin] = joint("spherical", translation(apart[4:])).with_initial({"pe.q_r": apart[:4]})
     if len(held):
-        junctions["p_ground"] = junction(momentum)
-        boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
-    warm = {"s": "s"} if heat and damping else {}
-    junctions |= {"s": junction(quantity.entropy, exposed=True)} if warm else {}
+        junctions[Path.of("p_ground")], ground = inner, Path.of("ground")
+        boxes[ground], parts[ground] = {"p": "p_ground"}, components.ground()
+    hot = Path.of("s")
+    warm = {hot: Port(hot, True)} if heat and damping else {}
+    junctions |= {hot: junction(quantity.entropy, exposed=True)} if warm else {}
     sections = np.concatenate([shell.axes, np.zeros((*shell.cells.shape, 3))], axis=2)
     at_rest = _from_first(shell)
     strained = None if np.array_equal(poses, shell.poses) else _strained(shell, at_rest, poses)
     _require_damping(damping)
     rest, stiffness = _checked(shell.rest, shell.matrix)
     pattern = shell_pattern(damped=damping != 0.0, heat=bool(warm))
+    corners, at_node = tuple(Path.of(f"p{corner}") for corner in (1, *OTHERS)), [Port(path, True) for path in on]
     for e, nodes in enumerate(shell.cells.tolist()):
-        boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)} | warm
+        box = Path.of(f"element{e}")
+        boxes[box] = {corner: at_node[node] for corner, node in zip(corners, nodes, strict=True)} | warm
         filled = _parts(sections[e], at_rest[e], rest[e], stiffness[e], damping, heat=bool(warm))
         element = System(pattern, filled) if e == 0 else System.trusted(pattern, filled)  # all like the first
         states = {} if strained is None else {f"pe.q_{k}": strained[e, k - 2] for k in OTHERS}
-        parts[f"element{e}"] = element.with_initial(states) if states else element
+        parts[box] = element.with_initial(states) if states else element
     return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
 
 
 def _from_first(shell: Shell) -> Array:
     """(n, 3, 7) poses of sections 2, 3, 4 of the elements at rest, relative to the first."""
-    along = [[SE3.exp(log) for log in logs] for logs in shell.rest]
+    along = [[SE3.exp(log) for log in logs[:3]] for logs in shell.rest]
     # corner 2 by edge 12, corner 4 by edge 14, corner 3 by edges 14 and 43: see `EDGES`
-    return np.array([[two, SE3.compose(four, three), four] for two, three, four, _ in along])
+    return np.array([[two, SE3.compose(four, three), four] for two, three, four in along])
 
 
 def _strained(shell: Shell, at_rest: Array, poses: Array) -> Array:

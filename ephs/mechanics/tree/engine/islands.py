@@ -37,7 +37,8 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
         Columns beyond the dimension of what an island may do are zero.
     """
     t, link = reduced.tables, found.bodies.link
-    ends = [[-1 if body < 0 else link[body] for body in (t.first[i], t.second[i])] for i in range(len(reduced.edges))]
+    both = zip(t.first.tolist(), t.second.tolist(), strict=True)
+    ends = [[-1 if body < 0 else link[body] for body in bodies] for bodies in both]
     groups = _joined(len(found.parts), ends)
     weight = _of_gravity(reduced)
     barred: dict[int, list[Array]] = {group: [weight] for group in groups}
