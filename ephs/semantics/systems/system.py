@@ -5,18 +5,18 @@ A system carries its states: isolated composites have no ports, and equality of 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, final
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, final
 
 import numpy as np
 
 from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Pattern, Quantity
 from ephs.operad.frames import in_frames_of
 from ephs.operad.links import closure
-from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.bundles.errors import AssemblyError, SemanticsError, listed
+from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.systems.fitting import interface_in_words, require_fillings
 from ephs.semantics.systems.initial import read_state, saved_state, started
 from ephs.semantics.systems.kept import Kept, once
 
@@ -313,7 +313,7 @@ class System:
         return draw(self).svg
 
     def __str__(self) -> str:
-        lines = [f"System with ports {_describe(self.interface)}"]
+        lines = [f"System with ports {interface_in_words(self.interface)}"]
         for box, filling in self.fillings.items():
             if isinstance(filling, System):
                 lines.append(f"  {box}: " + str(filling).replace("\n", "\n  "))
@@ -382,35 +382,3 @@ def fold(
     return compose(
         filling.pattern, {box: fold(each, leaf, compose, path / box) for box, each in filling.fillings.items()}
     )
-
-
-class _Filling(Protocol):
-    @property
-    def interface(self) -> Interface: ...
-
-
-def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> None:
-    """Refuse fillings unless each box has one with its interface.
-
-    Raises
-    ------
-    SemanticsError
-        A box without filling, a filling without box, or an interface that does not match.
-    """
-    boxes, given = set(pattern.boxes), set(fillings)
-    if boxes != given:
-        raise SemanticsError("fillings", ROOT, expected=_names(boxes), found=_names(given))
-    for box, filling in fillings.items():
-        wanted = pattern.boxes[box].interface
-        if not interfaces_match(wanted, filling.interface):
-            found, expected = _describe(filling.interface), _describe(wanted)
-            raise SemanticsError("interface", box, found=found, expected=expected)
-
-
-def _describe(interface: Interface) -> str:
-    ports = (f"{'' if t.power else '~'}{p}: {t.quantity.kind} on {t.quantity.space.name}" for p, t in interface.items())
-    return "{" + ", ".join(sorted(ports)) + "}"
-
-
-def _names(paths: set[Path]) -> str:
-    return ", ".join(sorted(map(str, paths))) or "none"
