@@ -55,6 +55,22 @@ def matrix_of(equations, state, *, sparse):
     return found.at(state)
 
 
+# ---- set-up ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("options", [{}, {"damping": 0.0}, {"heat": True}, {"spread": True}])
+def test_parts_that_are_not_checked_one_by_one_pass_the_checks(options):
+    """Elements fit as the first one does, bodies as without states of their own, the flat system as its levels."""
+    whole = patch(**options)
+    for part in (*whole.fillings.values(), whole.flatten()):
+        if isinstance(part, ephs.System):
+            assert ephs.System(part.pattern, part.fillings) == part
+    element = whole.fillings["element1"]
+    torn = ephs.Directory({path: part for path, part in element.fillings.items() if path != Path.of("pe")})
+    with pytest.raises(ephs.SemanticsError):  # the control
+        ephs.System(element.pattern, torn)
+
+
 # ---- losses between several joints ----------------------------------------------------------------------------------
 
 
