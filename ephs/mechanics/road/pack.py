@@ -131,8 +131,8 @@ def packed(parts: Sequence[PackedLink], gravity: Array, *, planar: bool, among: 
     """
     count, joints = len(parts), tuple(sorted({part.joint for part in parts} | set(among), key=repr))
     links, kinds = LinkConstants.table(count), {joint: k for k, joint in enumerate(joints)}
-    integers, reals = (array.reshape(count, -1) for array in links.arrays)
     of = LinkConstants
+    integers, reals = links.arrays[0].reshape(count, of.integer_width), links.arrays[1].reshape(count, of.real_width)
     for field, each in (
         (of.parent, [part.parent if part.parent >= 0 else count for part in parts]),
         (of.kind, [kinds[part.joint] for part in parts]),
