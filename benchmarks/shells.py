@@ -1,6 +1,7 @@
 """Shells against published values: displacements, large displacements, snaps, frequencies; time beside size; motion.
 
-Of damped sheets that swing by radau: time of set-up and of a step for each element; ratios are to the smallest one.
+Of damped sheets: processor time for each element of set-up, of their rates, and of a step by radau; ratios are to the
+smallest one.
 
 Linear: Scordelis and Lo's roof, MacNeal and Harder (1985) with Simo's 0.0930 of the hemisphere, Cook. Large: Sze, Liu
 and Lo (2004). Frequencies: NAFEMS FV12 and FV16, Rayleigh's ring. Values are ratios to the published ones.
@@ -25,6 +26,8 @@ from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.section import ShellSection
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.system import shell_system
+from ephs.mechanics.runs.system_problem import problem_of_system
+from ephs.mechanics.tree.equations.equations import ReducedEquations
 
 WX, WY, WZ, X, Y, Z = range(6)
 ALL = tuple(range(6))
@@ -365,16 +368,36 @@ LARGE: dict[str, tuple[Callable[[], tuple[float, ...]], tuple[float, ...]]] = {
 }
 
 
+def sheet(n: int) -> ephs.System:
+    """A sheet of n × n damped elements that is clamped on one side."""
+    points, at, cells = grid(lambda u, v: (0.4 * u, 0.2 * v, 0.0), (n, n))
+    shell = Shell.of(points, cells, ShellSection.isotropic(0.002, 1e7, 0.3, 1000.0))
+    held = np.flatnonzero(at[:, 0] == 0.0)
+    return shell_system(shell, gravity=(0.0, 0.0, -9.81), damping=1e-3, held=held.tolist())
+
+
+def ready(n: int) -> tuple[float, float]:
+    """Processor time in s for each of n × n elements: from the mesh to the first rates; and of rates then."""
+    start = time.process_time()
+    equations = ReducedEquations(problem_of_system(sheet(n)), 0.0)
+    state = equations.start(0.0)
+    y = equations.vector(state)
+    equations.rates(0.0, state.q, y)
+    made, times = time.process_time() - start, list[float]()
+    for _ in range(5):
+        start = time.process_time()
+        for _ in range(1 + 1000 // n**2):
+            equations.rates(0.0, state.q, y)
+        times.append((time.process_time() - start) / (1 + 1000 // n**2))
+    return made / n**2, min(times) / n**2
+
+
 def swung(n: int) -> tuple[float, float]:
-    """Processor time in s for each of n × n damped elements: to a problem that is ready to step; and of a step."""
+    """Processor time in s for each of n × n elements: of all before steps; and of a step."""
 
     def run(span: float) -> tuple[float, int]:
         start = time.process_time()
-        points, at, cells = grid(lambda u, v: (0.4 * u, 0.2 * v, 0.0), (n, n))
-        shell = Shell.of(points, cells, ShellSection.isotropic(0.002, 1e7, 0.3, 1000.0))
-        held = np.flatnonzero(at[:, 0] == 0.0)
-        sheet = shell_system(shell, gravity=(0.0, 0.0, -9.81), damping=1e-3, held=held.tolist())
-        solution = ephs.simulate(sheet, span, method="radau", audit="off")
+        solution = ephs.simulate(sheet(n), span, method="radau", audit="off")
         return time.process_time() - start, int(solution.stats["steps"])
 
     run(1e-7)  # compile
@@ -405,12 +428,21 @@ def report() -> Report:
         for have, want in zip(found, known, strict=False):  # of equal frequencies all are found
             row = {"problem": name, "published": want, "found": float(have), "ratio": float(have) / want}
             rows.append(row | {"seconds": seconds})
-    times = {n: swung(n) for n in (8, 16, 32)}
-    for k, name in enumerate(("swinging sheet, set-up of an element in s", "a step of an element in s")):
-        rows += [
-            {"problem": name, "elements": n, "found": found[k], "ratio": found[k] / times[8][k]}
-            for n, found in times.items()
-        ]
+    ready(2)  # compile
+    for run, sizes, names in (
+        (ready, (10, 32, 100), ("sheet, set-up of an element in s", "rates of an element in s")),
+        (
+            swung,
+            (8, 16, 32),
+            ("sheet, set-up and first steps of radau, of an element in s", "a step of an element in s"),
+        ),
+    ):
+        times = {n: run(n) for n in sizes}
+        for k, name in enumerate(names):
+            rows += [
+                {"problem": name, "elements": n, "found": found[k], "ratio": found[k] / times[sizes[0]][k]}
+                for n, found in times.items()
+            ]
     motions = list(fallen())
     return Report(table_of(rows, COLUMNS) + "\n\n" + table_of(motions, MOTION), [*rows, *motions])
 

@@ -14,4 +14,7 @@ def paused_collector() -> Generator[None, None, None]:
         yield
     finally:
         if enabled:
+            if not gc.get_freeze_count():  # what was made is old at once; else all of it would be traversed now
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()

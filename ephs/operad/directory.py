@@ -80,6 +80,9 @@ class Directory(Mapping[Path, T_co]):
             raise KeyError(key) from None  # what cannot be a path is in no directory
         return self._items[path]
 
+    def __contains__(self, key: object) -> bool:
+        return key in self._items if isinstance(key, Path) else super().__contains__(key)
+
     def __iter__(self) -> Iterator[Path]:
         return iter(self._items)
 

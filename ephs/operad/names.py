@@ -60,10 +60,15 @@ class Path(tuple[str, ...]):
         raise PatternError("path", found=value, expected="a Path, a dotted name or a tuple of names")
 
     def __truediv__(self, other: "PathLike") -> "Path":
-        return _trusted((*self, *Path.of(other)))
+        return _trusted((*self, *(other if isinstance(other, Path) else Path.of(other))))
 
     def __rtruediv__(self, other: "PathLike") -> "Path":
         return Path.of(other) / self
+
+    @property
+    def parent(self) -> "Path":
+        """The path without its last name; the root's is the root."""
+        return _trusted(self[:-1])
 
     def is_prefix_of(self, other: "Path") -> bool:
         """Whether the other path is this one, or continues it."""

@@ -61,7 +61,7 @@ class Nesting:
                 raise PatternError("filling-type", box=box, found=type(child).__name__, expected=expected)
             found[box] = child if isinstance(child, Nesting) else Nesting(child)
         object.__setattr__(self, "pattern", pattern)
-        object.__setattr__(self, "children", Directory(found))
+        object.__setattr__(self, "children", Directory.trusted(found))
 
     @property
     def depth(self) -> int:

@@ -33,7 +33,7 @@ def flatten(nesting: Nesting) -> Pattern:
     whole = _Whole(dict(nesting.pattern.junctions), {}, [tuple(group) for group in nesting.pattern.links], set())
     # Each level knows what its junctions are called in the whole. A list, as recursion would bound the depth;
     # of iterators, as boxes keep their order.
-    top = _FlatteningLevel(ROOT, nesting, {path: path for path in nesting.pattern.junctions})
+    top = _FlatteningLevel(ROOT, nesting, {path: path for path in nesting.pattern.junctions}, same=False)
     changed = False
     pending = [(top, iter(nesting.pattern.boxes.items()))]
     while pending:
@@ -84,6 +84,8 @@ class _FlatteningLevel:
     path: Path
     nesting: Nesting
     target: Mapping[Path, Path]
+    same: bool
+    """Whether its junctions have their own quantities in the whole: then interfaces of boxes stay the same objects."""
 
 
 def _opened(box: Path, content: Box, child: Nesting, outer: _FlatteningLevel, whole: _Whole) -> _FlatteningLevel:
@@ -101,7 +103,8 @@ def _opened(box: Path, content: Box, child: Nesting, outer: _FlatteningLevel, wh
             # Its power balance stays its own; only the state is shared.
             whole.links.append((kept, outer.target[content.ports[path].junction]))
     whole.links.extend(tuple(target[path] for path in group) for group in filling.links)
-    return _FlatteningLevel(box, child, target)
+    same = all(whole.junctions[target[path]].quantity is inner.quantity for path, inner in filling.junctions.items())
+    return _FlatteningLevel(box, child, target, same)
 
 
 def _moved(content: Box, level: _FlatteningLevel, new: Mapping[Path, Junction]) -> Box:
@@ -113,7 +116,7 @@ def _moved(content: Box, level: _FlatteningLevel, new: Mapping[Path, Junction]) 
         junction = target[port.junction]
         ports[name] = port if junction is port.junction else Port(junction, port.power)
         # Where no frame was gained or lost the interface stays the same object.
-        same = same and new[junction].quantity is old[port.junction].quantity
+        same = level.same or (same and new[junction].quantity is old[port.junction].quantity)
     found = Directory.trusted(ports)
     return Box(found, content.interface) if same else box_of(found, new)
 

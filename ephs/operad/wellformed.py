@@ -28,7 +28,7 @@ def read_junctions(junctions: Entries[Junction]) -> Directory[Junction]:
 def read_boxes(boxes: Boxes, junctions: Mapping[Path, Junction]) -> Directory[Box]:
     """The boxes of a pattern; each port is on exactly one junction and has its quantity (P1, P2)."""
     found = Directory(cast("Entries[object]", boxes), what="boxes")
-    return Directory([(path, _read_box(path, value, junctions)) for path, value in found.items()])
+    return Directory.trusted({path: _read_box(path, value, junctions) for path, value in found.items()})
 
 
 def _read_box(box: Path, value: object, junctions: Mapping[Path, Junction]) -> Box:
@@ -37,7 +37,7 @@ def _read_box(box: Path, value: object, junctions: Mapping[Path, Junction]) -> B
     if not isinstance(value, Mapping):
         raise PatternError("box-type", box=box, found=repr(value), expected=f"a mapping: {_PORTS}")
     wires = Directory(cast("Mapping[Path, object]", value), what=f"ports of box {box}")
-    ports = Directory([(name, _read_port(box, name, wire)) for name, wire in wires.items()])
+    ports = Directory.trusted({name: _read_port(box, name, wire) for name, wire in wires.items()})
     if ROOT in ports:
         raise PatternError("root-port", box=box, port=ROOT, found="a port at the root path", expected="a name")
     for name, port in ports.items():
@@ -60,8 +60,8 @@ def _read_port(box: Path, name: Path, wire: object) -> Port:
 
 def box_of(ports: Directory[Port], junctions: Mapping[Path, Junction]) -> Box:
     """A box with its interface, which follows from its ports and their junctions."""
-    types = [(name, PortType(junctions[port.junction].quantity, port.power)) for name, port in ports.items()]
-    return Box(ports, Directory(types))
+    types = {name: PortType(junctions[port.junction].quantity, port.power) for name, port in ports.items()}
+    return Box(ports, Directory.trusted(types))
 
 
 def read_links(links: Iterable[Iterable[PathLike]], junctions: Mapping[Path, Junction]) -> list[list[Path]]:

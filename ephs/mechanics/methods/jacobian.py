@@ -30,7 +30,8 @@ TANGENT, MADE = 8, 100
 class Jacobian:
     """∂ẏ/∂y of y = (v, r, heats) at v = 0, by tangents.
 
-    It is made of differences where inputs are Python functions of the state.
+    It is made of differences where inputs are Python functions of the state, unless it is sparse and these are soft:
+    then their derivatives are left out, and iterations are those of an inexact matrix.
     With ``counts`` the matrices are counted there, as ``jacobians``; ``holding`` is what held contacts in the last one.
 
     Attributes
@@ -77,10 +78,10 @@ class Jacobian:
         return value
 
     def _by_tangents(self, state: ReducedState) -> "Array | csc_array | None":
-        """By tangents of the rates under the inputs there, where these know no state; by those of the dense equations
-        where constraints nearly repeat each other."""
+        """By tangents of the rates under the inputs there, where these know no state or, of a sparse matrix, are soft;
+        by those of the dense equations where constraints nearly repeat each other."""
         eq = self.equations
-        if not (eq.constant or eq.timed):
+        if not (eq.constant or eq.timed or (self.sparse and eq.problem.soft)):
             return None
         if self._slopes is None or self._slopes.engine is not eq.engine:
             self._slopes = RateSlopes(eq.engine, eq.reduced, self._calls, self.size, sparse=self.sparse)

@@ -97,7 +97,7 @@ class Stages:
         self.kept: KeptMatrices[ReducedState, Array | SparseSystems] = KeptMatrices(
             scheme, self._made, self._solver, counts
         )
-        self._solvers = Solvers(lambda _: "", PIVOTS)
+        self._solvers = Solvers(lambda _: "", PIVOTS, _places(equations) if self.jacobian.sparse else None)
         self._fast = PATIENT if self.jacobian.sparse else FAST
         self.heat = slice(equations.nv + equations.n, self.jacobian.size)
 
@@ -250,3 +250,10 @@ def _singular(_: int) -> SolveError:
 def _parts(rows: Array, sign: float) -> Array:
     """Rows in real numbers: the first, which is real, and both parts of each other one, the second times a sign."""
     return np.array([np.real(rows[0]), *(part for row in rows[1:] for part in (np.real(row), sign * np.imag(row)))])
+
+
+def _places(equations: ReducedEquations) -> Array:
+    """(freedoms, 3) positions at the start of the bodies that joints lead to, by the joints' rates; 0 of frames."""
+    initial, reduced = equations.problem.initial, equations.reduced
+    found = [np.zeros(3) if link.pose is None else initial[link.pose.path][4:] for link in reduced.places]
+    return np.repeat(np.array(found).reshape(-1, 3), reduced.tables.dim[: reduced.links], axis=0)

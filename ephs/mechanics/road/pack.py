@@ -130,27 +130,41 @@ def packed(parts: Sequence[PackedLink], gravity: Array, *, planar: bool, among: 
         Further kinds of joints that the class has.
     """
     count, joints = len(parts), tuple(sorted({part.joint for part in parts} | set(among), key=repr))
-    links = LinkConstants.table(count)
-    for i, part in enumerate(parts):
-        link, c = links[i], [float(x) for x in part.numbers]
-        link.parent = part.parent if part.parent >= 0 else count
-        link.kind = joints.index(part.joint)
-        link.armature = part.armature
-        link.q_at, link.r_at, link.sense = part.q_at, part.r_at, float(part.sense)
-        link.place, link.mass, link.moment, link.inertia = _clean(c[9:12]), c[12], _clean(c[13:16]), _clean(c[16:22])
-        link.rotation = [_clean(c[k : k + 3]) for k in (0, 3, 6)]
-        if planar:
-            angle, turning = math.atan2(c[3], c[0]), part.joint.revolute
-            link.shift = angle if turning else 0.0
-            link.rotation = _about_z(0.0 if turning else angle)
-            link.moment, link.inertia = [c[13], c[14], 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, c[21]]
+    links, kinds = LinkConstants.table(count), {joint: k for k, joint in enumerate(joints)}
+    of = LinkConstants
+    integers, reals = links.arrays[0].reshape(count, of.integer_width), links.arrays[1].reshape(count, of.real_width)
+    for field, each in (
+        (of.parent, [part.parent if part.parent >= 0 else count for part in parts]),
+        (of.kind, [kinds[part.joint] for part in parts]),
+        (of.q_at, [part.q_at for part in parts]),
+        (of.r_at, [part.r_at for part in parts]),
+    ):
+        integers[:, field.offset] = each
+    numbers = np.array([part.numbers for part in parts]).reshape(count, 22)
+    for field, columns in (
+        (of.rotation, np.hstack([_clean(numbers[:, k : k + 3]) for k in (0, 3, 6)])),
+        (of.place, _clean(numbers[:, 9:12])),
+        (of.mass, numbers[:, 12:13]),
+        (of.moment, _clean(numbers[:, 13:16])),
+        (of.inertia, _clean(numbers[:, 16:22])),
+        (of.sense, np.array([[float(part.sense)] for part in parts]).reshape(count, 1)),
+        (of.armature, np.array([[part.armature] for part in parts]).reshape(count, 1)),
+    ):
+        reals[:, field.offset : field.offset + columns.shape[1]] = columns
+    for i, part in enumerate(parts if planar else ()):
+        link, c = links[i], part.numbers.tolist()
+        angle, turning = math.atan2(c[3], c[0]), part.joint.revolute
+        link.shift = angle if turning else 0.0
+        link.rotation = _about_z(0.0 if turning else angle)
+        link.moment, link.inertia = [c[13], c[14], 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, c[21]]
     return Packed(Class(joints, planar), links, np.array(gravity, dtype=float))
 
 
-def _clean(numbers: list[float]) -> list[float]:
-    """Numbers with those that are rounding beside the others, or beside 1, as zeros and ones."""
-    near = 4.0 * float(np.finfo(float).eps) * max(abs(x) for x in numbers)
-    return [0.0 if abs(x) <= near else math.copysign(1.0, x) if abs(abs(x) - 1.0) <= near else x for x in numbers]
+def _clean(rows: Array) -> Array:
+    """Rows of numbers with those that are rounding beside the others, or beside 1, as zeros and ones."""
+    near = 4.0 * float(np.finfo(float).eps) * np.abs(rows).max(axis=1, initial=0.0, keepdims=True)
+    unit = np.where(np.abs(np.abs(rows) - 1.0) <= near, np.copysign(1.0, rows), rows)
+    return np.where(np.abs(rows) <= near, 0.0, unit)
 
 
 def _about_z(angle: float) -> list[list[float]]:

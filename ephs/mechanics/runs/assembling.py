@@ -129,11 +129,12 @@ def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection
             out[path] = np.array(pose)
     length = extent(joints.links, poses)[1] or 1.0
     for link, path in zip(joints.links, joints.relative, strict=True):
-        x = out[path] if path in given else link.coupling.fit(link.relative(poses), out[path])
-        distance, angle = link.gap(poses, x)
+        stays, loose = path in given, link.coupling.dim == 6
+        x = out[path] if stays else link.coupling.fit(link.relative(poses), out[path])
+        distance, angle = (0.0, 0.0) if loose and not stays else link.gap(poses, x)  # a loose one follows its bodies
         if distance > ASSEMBLY * length or angle > ASSEMBLY:
             raise AssemblyError("open-joint", link.name, found=f"{distance:.3g} m and {angle:.3g} rad")
-        if path not in given:
+        if not stays:
             out[path] = x
     return out
 

@@ -41,4 +41,5 @@ def pressed(scene: Scene, name: str, sheet: ShellSheet, pressure: Signal) -> tup
         out[:, 3:] = np.einsum("nij,ni->nj", rotations(found[pushed, :4]), forces)
         return out.ravel()
 
-    return [sheet.node(node) for node in pushed], Signal(wrenches)
+    softly = pressure.constant or pressure.timed
+    return [sheet.node(node) for node in pushed], Signal(wrenches, soft=softly)

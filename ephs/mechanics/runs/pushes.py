@@ -24,7 +24,7 @@ def part_of(whole: Signal, where: slice) -> Signal:
     """Some of a signal's numbers."""
     if whole.constant:
         return Signal(whole.at(0.0, {})[where])
-    return Signal(lambda t, state: whole.at(t, state)[where], held=whole.held, timed=whole.timed)
+    return Signal(lambda t, state: whole.at(t, state)[where], held=whole.held, timed=whole.timed, soft=whole.soft)
 
 
 def sum_of(one: Signal, other: Signal) -> Signal:
@@ -91,7 +91,7 @@ def scene_signals(
         wrenches[name] = sum_of(wrenches[name], given) if name in wrenches else given
     for name, sheet in blown.items():
         nodes, whole = pressed(scene, name, sheet, pressures[name])
-        shared = Signal(_Latest(whole).at)
+        shared = Signal(_Latest(whole).at, soft=whole.soft)
         wrenches |= {node: part_of(shared, slice(6 * i, 6 * i + 6)) for i, node in enumerate(nodes)}
     return forces, wrenches, others
 

@@ -70,6 +70,7 @@ class Bundle:
     ports: tuple[Path, ...]
     offsets: tuple[int, ...]
     size: int
+    _items: tuple[tuple[Path, Span, Quantity], ...] = field(compare=False, repr=False)
 
     @staticmethod
     def of(interface: Interface) -> "Bundle":
@@ -87,9 +88,7 @@ class Bundle:
 
     def items(self) -> Iterator[tuple[Path, Span, Quantity]]:
         """Iterate over power ports with their slices and quantities."""
-        for port, start in zip(self.ports, self.offsets, strict=True):
-            quantity = self.quantity(port)
-            yield port, Span(start, start + quantity.space.dim), quantity
+        return iter(self._items)
 
     def split(self, vector: Array) -> dict[Path, Array]:
         """Cut a fibre vector into the ports' parts."""
@@ -126,12 +125,12 @@ class Bundle:
 
 @lru_cache(maxsize=1024)
 def _bundle(items: tuple[tuple[Path, PortType], ...]) -> Bundle:
-    ports: list[Path] = []
-    offsets: list[int] = []
+    found: list[tuple[Path, Span, Quantity]] = []
     size = 0
     for port, port_type in items:
         if port_type.power:
-            ports.append(port)
-            offsets.append(size)
-            size += port_type.quantity.space.dim
-    return Bundle(Interface(items), tuple(ports), tuple(offsets), size)
+            dim = port_type.quantity.space.dim
+            found.append((port, Span(size, size + dim), port_type.quantity))
+            size += dim
+    offsets = tuple(span.start for _, span, _ in found)
+    return Bundle(Interface(items), tuple(port for port, _, _ in found), offsets, size, tuple(found))

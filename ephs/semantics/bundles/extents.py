@@ -11,7 +11,7 @@ from ephs.semantics.bundles.bundle import Array
 def inside(quantity: Quantity, x: Array) -> bool:
     """Whether all numbers of a state lie in the quantity's domain."""
     low, high = quantity.domain
-    return bool(np.all((x > low) & (x < high)))
+    return all(low < number < high for number in x.ravel().tolist())
 
 
 def into(quantity: Quantity, x: Array) -> Array:

@@ -121,21 +121,21 @@ def number_flat(flat: System) -> Numbering:
     AssemblyError
         A state stored twice, or read and stored nowhere.
     """
-    pattern = flat.pattern
+    pattern, least = flat.pattern, _least(flat)
     primitives, quantities = Interned[Primitive](), Interned[Quantity]()
     number = {path: i for i, path in enumerate(bearing_junctions(flat))}
-    states, provider = _states(flat, quantities)
+    states, provider = _states(flat, least, quantities)
     order: list[int] = []
     wires: list[int] = []
     reads: list[int] = []
     for path, primitive in flat.fillings.items():
         assert not isinstance(primitive, System)
-        ports = pattern.boxes[path].ports
+        on = {port: wire.junction for port, wire in pattern.boxes[path].ports.items()}
         order.append(primitives.number_of_object(primitive))
-        wires += [number[ports[port].junction] for port in primitive.bundle.ports]
+        wires += [number[on[port]] for port in primitive.bundle.ports]
         for port in primitive.reads:
-            junction = ports[port].junction
-            state = provider.get(min(pattern.state_class(junction)))
+            junction = on[port]
+            state = provider.get(least.get(junction, junction))
             if state is None:
                 raise AssemblyError("unread-state", path, port=port, junction=junction)
             reads.append(state)
@@ -145,7 +145,12 @@ def number_flat(flat: System) -> Numbering:
     return Numbering(tuple(primitives.values), tuple(quantities.values), *index)
 
 
-def _states(flat: System, quantities: Interned[Quantity]) -> tuple[list[int], dict[Path, int]]:
+def _least(flat: System) -> dict[Path, Path]:
+    """The least junction of the class of each linked one."""
+    return {path: least for members in flat.pattern.links for least in (min(members),) for path in members}
+
+
+def _states(flat: System, least: dict[Path, Path], quantities: Interned[Quantity]) -> tuple[list[int], dict[Path, int]]:
     """The quantity of each state, and the state that lives on each class of junctions, by its least path."""
     states: list[int] = []
     provider: dict[Path, int] = {}
@@ -155,7 +160,7 @@ def _states(flat: System, quantities: Interned[Quantity]) -> tuple[list[int], di
             continue
         for port in primitive.bundle.ports:
             junction = flat.pattern.boxes[path].ports[port].junction
-            key = min(flat.pattern.state_class(junction))
+            key = least.get(junction, junction)
             if key in provider:
                 found = f"{paths[provider[key]]} and {path / port}"
                 raise AssemblyError("two-storages", path, junction=junction, found=found)

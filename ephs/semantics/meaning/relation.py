@@ -26,7 +26,8 @@ from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
 from ephs.semantics.meaning.variables import ONE, RelationVariable, into, own
 from ephs.semantics.primitives.primitives import Primitive, Storage
-from ephs.semantics.systems.system import Filling, as_system, fold, require_fillings
+from ephs.semantics.systems.fitting import require_fillings
+from ephs.semantics.systems.system import Filling, as_system, fold
 
 Route: TypeAlias = Literal["flat", "nested"]
 Numbers: TypeAlias = Literal["float", "rational"]

@@ -13,7 +13,7 @@ from ephs.semantics.primitives.forms import StorageForm
 from ephs.semantics.primitives.primitives import Kernel, Point
 
 
-def logarithm_form(edges: tuple[tuple[int, int], ...], rest: Array, stiffness: Array, label: str) -> StorageForm:
+def logarithm_form(edges: tuple[tuple[int, int], ...], parameters: tuple[float, ...], label: str) -> StorageForm:
     """The form of E = ½ Δᵀ K Δ; states are poses relative to one another, each 1 at rest.
 
     Parameters
@@ -21,57 +21,53 @@ def logarithm_form(edges: tuple[tuple[int, int], ...], rest: Array, stiffness: A
     edges
         Numbers of the poses that each edge goes from and to: 0 is the one that does not move, others are the ports in
         their order.
-    rest
-        (6 edges,) logarithms of the edges without stress: rad, m.
-    stiffness
-        (6 edges, 6 edges) K, symmetric and non-negative.
+    parameters
+        (6 edges,) logarithms of the edges without stress, rad, m; then (6 edges · 6 edges,) K, symmetric and
+        non-negative, row by row.
     """
     relation = LogarithmStep(PoseEdges(edges))
-    kernel = Kernel(label, relation, (*rest.ravel().tolist(), *stiffness.ravel().tolist()))
-    numbers, sizes, dims = np.array(kernel.parameters), relations.sizes(relation), np.array(relation.dimensions)
 
     def over(x: Point, v: Array) -> tuple[Array, float]:
         """Efforts over a step, and the energy at its end; NaN where it is not finite."""
-        given = {name: np.zeros(size) for name, size in sizes.items()}
-        given |= {"p": numbers, "x0": np.concatenate(list(x.values())), "v": np.asarray(v, dtype=float)}
+        given = {name: np.zeros(size) for name, size in relations.sizes(relation).items()}
+        given |= {"p": np.array(parameters), "x0": np.concatenate(list(x.values())), "v": np.asarray(v, dtype=float)}
         call = relations.bare(relation).compiled()["value"]
-        status = call(dims, *(np.ascontiguousarray(array) for array in given.values()))
+        status = call(np.array(relation.dimensions), *(np.ascontiguousarray(array) for array in given.values()))
         scale = np.nan if status else 1.0
         return scale * given["e"], scale * float(given["c"][0])
 
     still = np.zeros(relation.dimensions[0])
     return StorageForm(
-        lambda x: over(x, still)[1], lambda x: over(x, still)[0], lambda x, v: over(x, v)[0], kernel
-    )  # fmt: skip
+        lambda x: over(x, still)[1],
+        lambda x: over(x, still)[0],
+        lambda x, v: over(x, v)[0],
+        Kernel(label, relation, parameters),
+    )
 
 
 def logarithm_loss(
-    edges: tuple[tuple[int, int], ...], rest: Array, resistance: Array, label: str
+    edges: tuple[tuple[int, int], ...], parameters: tuple[float, ...], label: str
 ) -> tuple[Callable[[Point, Array, Reference], Array], Kernel]:
     """M (n, n) of states, efforts and reference, and the kernel, of the loss μ = Bᵀ R B; ports of rates, then entropy.
 
     Parameters
     ----------
-    edges, rest
-        As of a `logarithm_form`.
-    resistance
-        (6 edges, 6 edges) R, symmetric and non-negative.
+    edges, parameters
+        As of a `logarithm_form`, with R in place of K.
     """
     relation = LogarithmLoss(PoseEdges(edges))
-    kernel = Kernel(label, relation, (*rest.ravel().tolist(), *resistance.ravel().tolist()))
-    numbers, sizes, dims = np.array(kernel.parameters), relations.sizes(relation), np.array(relation.dimensions)
 
     def matrix(x: Point, e: Array, reference: Reference) -> Array:
         n, call = len(e), relations.at_rest(relation).compiled()["value"]
-        given = {name: np.zeros(size) for name, size in sizes.items()}
-        given |= {"p": numbers, "x0": np.concatenate(list(x.values())), "scal": np.array([0.0, 1.0, 0.0])}
+        given = {name: np.zeros(size) for name, size in relations.sizes(relation).items()}
+        given |= {"p": np.array(parameters), "x0": np.concatenate(list(x.values())), "scal": np.array([0.0, 1.0, 0.0])}
         mu = np.zeros((n - 1, n - 1))
         for column, unit in enumerate(np.eye(n)[:-1]):
             given["e"] = unit
-            call(dims, *given.values())
+            call(np.array(relation.dimensions), *given.values())
             mu[:, column] = given["f"][:-1]
         mu, u, theta = 0.5 * (mu + mu.T), e[:-1], e[-1] + reference.temperature
         drag = (mu @ u)[:, None]
         return np.block([[theta * mu, -drag], [-drag.T, np.array([[u @ drag[:, 0] / theta]])]])
 
-    return matrix, kernel
+    return matrix, Kernel(label, relation, parameters)

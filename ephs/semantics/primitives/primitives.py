@@ -56,6 +56,8 @@ class Kernel:
 
     def numbers(self, reference: Reference) -> tuple[float, ...]:
         """The parameters in a reference environment."""
+        if not self.potentials:
+            return self.parameters
         out = list(self.parameters)
         for place, carried in self.potentials:
             out[place] = sum(amount * reference.potential(charge) for charge, amount in carried)
@@ -89,6 +91,7 @@ class _Structure(ABC):
     __slots__ = ()
     interface: Interface
     _verdict: StructureVerdict | None
+    _bundle: Bundle | None
 
     @property
     @abstractmethod
@@ -112,7 +115,10 @@ class _Structure(ABC):
     @property
     def bundle(self) -> Bundle:
         """The layout of the fibre."""
-        return Bundle.of(self.interface)
+        if self._bundle is None:
+            object.__setattr__(self, "_bundle", Bundle.of(self.interface))
+        assert self._bundle is not None
+        return self._bundle
 
     @property
     def algebra(self) -> "Algebra[Filling]":
@@ -182,6 +188,7 @@ class Storage(_Structure):
     initial: Initial = ()
     gap: object = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
+    _bundle: Bundle | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.trusted:
@@ -298,6 +305,7 @@ class Reversible(_Structure):
     working: bool = False
     external_field: bool = field(default=False, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
+    _bundle: Bundle | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.trusted:
@@ -342,6 +350,7 @@ class Irreversible(_Structure):
     support: Support | None = field(default=None, compare=False, repr=False)
     impulse: object = field(default=None, compare=False, repr=False)
     _verdict: StructureVerdict | None = field(default=None, init=False, compare=False, repr=False)
+    _bundle: Bundle | None = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.trusted:

@@ -1,7 +1,6 @@
 """Initial states: numbers that storages carry, and that systems collect."""
 
 from collections.abc import Mapping
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,9 @@ def started(storage: Storage, values: Mapping[Path, object], at: Path) -> Storag
         if port not in storage.interface:
             raise AssemblyError("unknown-state", at / port, expected=listed(port, sorted(map(str, storage.interface))))
         found[port] = tuple(read_state(at / port, storage.interface[port].quantity, value).tolist())
-    made = copy(storage)  # its structure was examined before
+    made: Storage = object.__new__(Storage)  # its structure was examined before
+    for name in Storage.__slots__:
+        object.__setattr__(made, name, getattr(storage, name))
     initial: Initial = tuple(sorted(found.items()))
     object.__setattr__(made, "initial", initial)
     return made

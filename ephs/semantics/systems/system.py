@@ -5,18 +5,18 @@ A system carries its states: isolated composites have no ports, and equality of 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, final
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, final
 
 import numpy as np
 
 from ephs.operad import ROOT, Algebra, Directory, Interface, Nesting, Path, Pattern, Quantity
 from ephs.operad.frames import in_frames_of
 from ephs.operad.links import closure
-from ephs.operad.matching import interfaces_match
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.bundles.errors import AssemblyError, SemanticsError, listed
+from ephs.semantics.bundles.errors import AssemblyError, listed
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
+from ephs.semantics.systems.fitting import interface_in_words, require_fillings
 from ephs.semantics.systems.initial import read_state, saved_state, started
 from ephs.semantics.systems.kept import Kept, once
 
@@ -106,7 +106,15 @@ class System:
         """The same system on one level: patterns substituted, primitives under the paths of their boxes."""
         if self.is_flat:
             return self
-        return System(self.nesting.flatten(), Directory.trusted(dict(self.leaves())))
+        return System.trusted(self.nesting.flatten(), Directory.trusted(dict(self.leaves())))
+
+    @staticmethod
+    def trusted(pattern: Pattern, fillings: Directory["Filling"]) -> "System":
+        """System of fillings known to fit a pattern in their frames, such as those with other numbers; unchecked."""
+        system = object.__new__(System)
+        for name, value in (("pattern", pattern), ("fillings", fillings), ("_kept", Kept())):
+            object.__setattr__(system, name, value)
+        return system
 
     def flatten_once(self) -> "System":
         """The same system with its subsystems opened by one level."""
@@ -125,24 +133,23 @@ class System:
 
     def leaves(self) -> Iterator[tuple[Path, Primitive]]:
         """The primitives with their full paths, depth first."""
-        for box, filling in self.fillings.items():
-            if isinstance(filling, System):
-                for path, primitive in filling.leaves():
-                    yield box / path, primitive
-            else:
-                yield box, filling
+        return iter(once(self, "leaves", lambda: tuple(_leaves(self, ROOT))))
 
     @property
     def states(self) -> Directory[Quantity]:
         """The states of the storages: path of the component, then its port -> quantity."""
-        return Directory(
-            {
-                path / port: primitive.interface[port].quantity
-                for path, primitive in self.leaves()
-                if isinstance(primitive, Storage)
-                for port in primitive.bundle.ports
-            }
-        )
+
+        def found() -> Directory[Quantity]:
+            return Directory.trusted(
+                {
+                    path / port: quantity
+                    for path, primitive in self.leaves()
+                    if isinstance(primitive, Storage)
+                    for port, _, quantity in primitive.bundle.items()
+                }
+            )
+
+        return once(self, "states", found)
 
     @property
     def initial(self) -> dict[Path, Array]:
@@ -306,7 +313,7 @@ class System:
         return draw(self).svg
 
     def __str__(self) -> str:
-        lines = [f"System with ports {_describe(self.interface)}"]
+        lines = [f"System with ports {interface_in_words(self.interface)}"]
         for box, filling in self.fillings.items():
             if isinstance(filling, System):
                 lines.append(f"  {box}: " + str(filling).replace("\n", "\n  "))
@@ -350,7 +357,17 @@ def _started(system: System, values: Mapping[Path, object], at: Path) -> System:
             fillings[box] = _started(part, given, at / box)
         elif isinstance(part, Storage):
             fillings[box] = started(part, given, at / box)
-    return System(system.pattern, Directory.trusted(fillings)) if inside else system
+    return System.trusted(system.pattern, Directory.trusted(fillings)) if inside else system
+
+
+def _leaves(system: System, at: Path) -> Iterator[tuple[Path, Primitive]]:
+    """The primitives of the system in the box ``at``, with their full paths."""
+    for box, filling in system.fillings.items():
+        path = at / box if at else box
+        if isinstance(filling, System):
+            yield from _leaves(filling, path)
+        else:
+            yield path, filling
 
 
 def fold(
@@ -365,35 +382,3 @@ def fold(
     return compose(
         filling.pattern, {box: fold(each, leaf, compose, path / box) for box, each in filling.fillings.items()}
     )
-
-
-class _Filling(Protocol):
-    @property
-    def interface(self) -> Interface: ...
-
-
-def require_fillings(pattern: Pattern, fillings: Mapping[Path, _Filling]) -> None:
-    """Refuse fillings unless each box has one with its interface.
-
-    Raises
-    ------
-    SemanticsError
-        A box without filling, a filling without box, or an interface that does not match.
-    """
-    boxes, given = set(pattern.boxes), set(fillings)
-    if boxes != given:
-        raise SemanticsError("fillings", ROOT, expected=_names(boxes), found=_names(given))
-    for box, filling in fillings.items():
-        wanted = pattern.boxes[box].interface
-        if not interfaces_match(wanted, filling.interface):
-            found, expected = _describe(filling.interface), _describe(wanted)
-            raise SemanticsError("interface", box, found=found, expected=expected)
-
-
-def _describe(interface: Interface) -> str:
-    ports = (f"{'' if t.power else '~'}{p}: {t.quantity.kind} on {t.quantity.space.name}" for p, t in interface.items())
-    return "{" + ", ".join(sorted(ports)) + "}"
-
-
-def _names(paths: set[Path]) -> str:
-    return ", ".join(sorted(map(str, paths))) or "none"

@@ -106,10 +106,11 @@ class Model:
         """(components,) addresses; those of the chosen ones are of relations at rest, without derivatives, where they
         are compiled."""
         n, found = self.descriptor.numbering, self.tables.address.copy()
-        for number in np.unique(n.primitive[chosen]).tolist():
-            kernel = n.primitives[number].kernel
-            if kernel is not None:
-                found[chosen[n.primitive[chosen] == number]] = compiled(kernel.relation, rest=True).address
+        numbers, places = np.unique(n.primitive[chosen], return_inverse=True)
+        kernels = [n.primitives[number].kernel for number in numbers.tolist()]
+        addresses = [0 if kernel is None else compiled(kernel.relation, rest=True).address for kernel in kernels]
+        has = np.array([kernel is not None for kernel in kernels], dtype=bool)[places]
+        found[chosen[has]] = np.array(addresses, dtype=np.int64)[places[has]]
         return found
 
     def path_of(self, component: int) -> Path:

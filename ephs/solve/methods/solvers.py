@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
+from ephs.solve.methods.dissection import dissected
 from ephs.solve.posing.errors import Outcome, SolveError
 
 DENSE = 48
@@ -143,13 +144,16 @@ class Solvers:
         Of an unknown by its number, for messages.
     pivots
         How SuperLU is to choose pivots, options of `scipy.sparse.linalg.splu`.
+    places
+        (n, 3) of the unknowns of the matrices of n, in m: their order is then that of nested dissection.
     """
 
-    __slots__ = ("_band", "_name", "_pivots", "_sums")
+    __slots__ = ("_band", "_name", "_order", "_pivots", "_places", "_sums")
 
-    def __init__(self, name: Callable[[int], str], pivots: Mapping[str, Any]) -> None:
-        self._name, self._pivots = name, pivots
+    def __init__(self, name: Callable[[int], str], pivots: Mapping[str, Any], places: Array | None = None) -> None:
+        self._name, self._pivots, self._places = name, pivots, places
         self._band: _Band | None = None
+        self._order: tuple[csc_array, Index] | None = None
         self._sums: _Sums | None = None
 
     def of_sum(self, a: "csc_array | Array", weight: complex, b: "csc_array | Array") -> Solver:
@@ -177,9 +181,25 @@ class Solvers:
         if self._band.narrow:
             return self._band.solver(matrix, self._singular)
         try:
-            return splu(matrix, **self._pivots).solve
+            if self._places is None or len(self._places) != matrix.indptr.size - 1:
+                return splu(matrix, **self._pivots).solve
+            return self._dissected(matrix, self._places)
         except RuntimeError as error:  # SuperLU's message for a singular matrix
             raise self._singular(-1) from error
+
+    def _dissected(self, matrix: csc_array, places: Array) -> Solver:
+        if self._order is None or not _alike(self._order[0], matrix):
+            self._order = matrix, dissected(matrix, places)
+        _, order = self._order
+        factors = splu(csc_array(matrix[order][:, order]), **{**self._pivots, "permc_spec": "NATURAL"})
+
+        def solved(right: Array) -> Array:
+            found = factors.solve(right[order])
+            out = np.empty_like(found)
+            out[order] = found
+            return out
+
+        return solved
 
     def _singular(self, unknown: int) -> SolveError:
         return SolveError(Outcome.SINGULAR, "", self._name(unknown) if unknown >= 0 else "")

@@ -62,6 +62,9 @@ class Signal:
         Whether the value changes where steps end, and nowhere else: of a sampled input.
     timed
         Whether a function reads the time alone.
+    soft
+        Whether it turns and grows with the states as slowly as what it moves: matrices of implicit steps may take it
+        as it is at the start of a step, which costs iterations alone.
     """
 
     value: Array | Callable[[float, State], Array]
@@ -70,6 +73,7 @@ class Signal:
     size: int | None = None
     held: bool = False
     timed: bool = False
+    soft: bool = False
 
     @staticmethod
     def of_motion(law: MotionLaw, name: str = "") -> "Signal":
@@ -301,3 +305,8 @@ class Problem:
     def timed(self) -> bool:
         """Whether inputs depend on the time alone."""
         return all(signal.constant or signal.timed for signal in self.signals.values())
+
+    @property
+    def soft(self) -> bool:
+        """Whether inputs depend on the time alone, or softly on the states: see `Signal`."""
+        return all(signal.constant or signal.timed or signal.soft for signal in self.signals.values())

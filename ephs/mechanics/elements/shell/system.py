@@ -7,7 +7,7 @@ their pattern and their machine code. Everything else is a joint's.
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ephs.mechanics.elements.joints import joint
 from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.stiffness import EDGES
-from ephs.operad import Directory, Path, Pattern, PortType, junction, quantity
+from ephs.operad import Directory, Path, Pattern, Port, PortType, junction, quantity
 from ephs.operad.collector import paused_collector
 from ephs.semantics import library
 from ephs.semantics.bundles.bundle import Array
@@ -29,7 +29,7 @@ from ephs.semantics.spaces import SE3, pair, translation
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.systems.system import System
 from ephs.semantics.verdicts.checks import STATEMENTS
-from ephs.semantics.verdicts.verdict import proved
+from ephs.semantics.verdicts.verdict import Condition, proved
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -41,6 +41,17 @@ SPRING = "shell_spring"
 """Name of the storage of an element."""
 OTHERS = (2, 3, 4)
 """Corners whose poses are relative to that of corner 1."""
+Numbers: TypeAlias = tuple[float, ...]
+_STORED = power_ports(**{f"q_{corner}": RELATIVE for corner in OTHERS})
+_READ = tuple(Path.of(f"q_{corner}") for corner in OTHERS)
+_DAMPED = Directory(
+    {f"p_{corner}": PortType(quantity.joint_momentum("free"), True) for corner in OTHERS}
+    | {"s": PortType(quantity.entropy, True)}
+    | {f"q_{corner}": PortType(RELATIVE, False) for corner in OTHERS}
+)
+_BOX = {
+    name: Path.of(name) for name in ("pe", "mf", "env", *(f"{x}{k}" for x in ("o1", "o", "hc", "pkc") for k in OTHERS))
+}
 
 
 def shell_spring(rest: Array, stiffness: Array) -> Storage:
@@ -58,19 +69,26 @@ def shell_spring(rest: Array, stiffness: Array) -> Storage:
     StructureError
         An array of a wrong shape, a number that is not finite, or K is not symmetric and non-negative.
     """
-    rest, k = _checked(rest, stiffness)
-    form = logarithm_form(EDGES, rest, k, SPRING)
+    return _spring(*_numbers(*_checked(rest, stiffness)))
+
+
+def _spring(rest: Numbers, stiffness: Numbers) -> Storage:
+    form = logarithm_form(EDGES, (*rest, *stiffness), SPRING)
     return Storage(
         SPRING,
-        power_ports(**{f"q_{corner}": RELATIVE for corner in OTHERS}),
+        _STORED,
         energy=form.energy,
         gradient=form.gradient,
         discrete_gradient=form.discrete_gradient,
-        parameters=_numbers(rest, k),
+        parameters=(("rest", rest), ("stiffness", stiffness)),
         kernel=form.kernel,
-        proof=lambda: proved("poses are even, and log reads q and −q alike; dE = Σ Bᵀ K Δ", *STATEMENTS["storage"]),
+        proof=_elastic,
         trusted=True,
     )
+
+
+def _elastic() -> tuple[Condition, ...]:
+    return proved("poses are even, and log reads q and −q alike; dE = Σ Bᵀ K Δ", *STATEMENTS["storage"])
 
 
 def shell_damper(rest: Array, stiffness: Array, damping: float) -> Irreversible:
@@ -88,24 +106,27 @@ def shell_damper(rest: Array, stiffness: Array, damping: float) -> Irreversible:
     StructureError
         As of a `shell_spring`, or the damping is negative.
     """
+    _require_damping(damping)
     rest, k = _checked(rest, stiffness)
-    if not 0.0 <= damping < np.inf:
-        raise StructureError("parameter", "shell", key="damping", found=damping, expected="a number ≥ 0")
-    matrix, kernel = logarithm_loss(EDGES, rest, damping * k, "shell_damper")
-    ports = {f"p_{corner}": PortType(quantity.joint_momentum("free"), True) for corner in OTHERS}
-    ports |= {"s": PortType(quantity.entropy, True)}
-    reads = {f"q_{corner}": PortType(RELATIVE, False) for corner in OTHERS}
-    interface = Directory(ports | reads)
+    return _damper(*_numbers(rest, k), damping, _row(damping * k))
+
+
+def _damper(rest: Numbers, stiffness: Numbers, damping: float, resistance: Numbers) -> Irreversible:
+    matrix, kernel = logarithm_loss(EDGES, (*rest, *resistance), "shell_damper")
     return Irreversible(
         "shell_damper",
-        interface,
+        _DAMPED,
         matrix,
-        tuple(map(Path.of, reads)),
-        (*_numbers(rest, k), ("damping", float(damping))),
+        _READ,
+        (("rest", rest), ("stiffness", stiffness), ("damping", float(damping))),
         kernel,
-        proof=lambda: structures.dissipation_proof(interface, None),
+        proof=_dissipative,
         trusted=True,
     )
+
+
+def _dissipative() -> tuple[Condition, ...]:
+    return structures.dissipation_proof(_DAMPED, None)
 
 
 @cache
@@ -169,18 +190,27 @@ def shell_element(
     StructureError
         As of `shell_spring`, or the damping is negative.
     """
-    frames, between, free = np.asarray(sections, dtype=float), np.asarray(at_rest, dtype=float), pair("free")
-    numbers = np.asarray(rest, dtype=float), np.asarray(stiffness, dtype=float)
-    parts: dict[str, Primitive] = {"pe": shell_spring(*numbers)}
+    _require_damping(damping)
+    frames, between = np.asarray(sections, dtype=float), np.asarray(at_rest, dtype=float)
+    pattern = shell_pattern(damped=damping != 0.0, heat=damping != 0.0 and heat)
+    return System(pattern, _parts(frames, between, *_checked(rest, stiffness), damping, heat=heat))
+
+
+def _parts(
+    frames: Array, between: Array, rest: Array, stiffness: Array, damping: float, *, heat: bool
+) -> Directory[System | Primitive]:
+    """What fills the boxes of an element; its numbers are checked."""
+    free, numbers = pair("free"), _numbers(rest, stiffness)
+    parts: dict[Path, System | Primitive] = {_BOX["pe"]: _spring(*numbers)}
     for k, place in zip(OTHERS, between, strict=True):
-        parts[f"o1{k}"] = frame_change(SE3.compose(frames[0], place), "p_j1", "p1")
-        parts[f"o{k}"] = frame_change(frames[k - 1], "p_j2", "p2")
-        parts[f"hc{k}"], parts[f"pkc{k}"] = components.holonomic(free), components.pair_coupling(free)
-    damped = damping != 0.0
-    if damped:
-        parts["mf"] = shell_damper(*numbers, damping)
-        parts |= {} if heat else {"env": library.environment()}
-    return System.of(shell_pattern(damped=damped, heat=damped and heat), parts)
+        parts[_BOX[f"o1{k}"]] = frame_change(SE3.compose(frames[0], place), "p_j1", "p1")
+        parts[_BOX[f"o{k}"]] = frame_change(frames[k - 1], "p_j2", "p2")
+        parts[_BOX[f"hc{k}"]], parts[_BOX[f"pkc{k}"]] = components.holonomic(free), components.pair_coupling(free)
+    if damping != 0.0:
+        parts[_BOX["mf"]] = _damper(*numbers, damping, _row(damping * stiffness))
+        if not heat:
+            parts[_BOX["env"]] = library.environment()
+    return Directory.trusted(parts)
 
 
 @paused_collector()
@@ -244,55 +274,66 @@ def shell_system(
             raise StructureError("parameter", "shell", key=key, found=wrong, expected="held or carried nodes")
     given = (shell.poses, np.zeros((count, 6))) if start is None else start
     poses, twists = (np.asarray(each, dtype=float) for each in given)
-    momentum = quantity.body_momentum
-    junctions = {f"p{i}": junction(momentum, exposed=i in shared) for i in range(count)}
-    junctions |= {port: junction(momentum, exposed=True) for port in bodies}
-    boxes: dict[str, dict[str, str]] = {}
-    parts: dict[str, System | Primitive] = {}
+    momentum, turning, weighing, outer = quantity.body_momentum, *map(frozenset, (pinned, fixed, shared))
+    inner, own = (junction(momentum, exposed=exposed) for exposed in (False, True))
+    on = [Path.of(f"p{i}") for i in range(count)]
+    junctions = {path: own if i in outer else inner for i, path in enumerate(on)}
+    junctions |= {Path.of(port): own for port in bodies}
+    boxes: dict[Path, Mapping[Path, Port] | dict[str, str]] = {}
+    parts: dict[Path, System | Primitive] = {}
     made: dict[bytes, System] = {}  # bodies, which nodes with one inertia share
     for i, pose in enumerate(poses):
-        if i in welded and i not in pinned and i not in fixed:
+        node = Path.of(f"node{i}")
+        if i in welded and i not in turning and i not in weighing:
             port, at = welded[i]
-            boxes[f"node{i}"] = {"body": port, "p": f"p{i}"}
-            parts[f"node{i}"] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
+            boxes[node] = {"body": port, "p": f"p{i}"}
+            parts[node] = frame_change(SE3.compose(SE3.inverse(at), pose), "p", "body")
         else:
-            boxes[f"node{i}"] = {"p": f"p{i}"}
+            boxes[node] = {"p": f"p{i}"}
             key = inertia[i, 3].tobytes() + tensors[i].tobytes()
             if key not in made:
                 made[key] = rigid_body(float(inertia[i, 3]), tensors[i], gravity, strict=not spread)
             moving = np.concatenate([tensors[i] @ twists[i, :3], inertia[i, 3:] * twists[i, 3:]])
-            parts[f"node{i}"] = made[key].with_initial({"pe.q": pose, "ke.p": moving})
-        if i in pinned:
+            parts[node] = made[key].with_initial({"pe.q": pose, "ke.p": moving})
+        if i in turning:
             port, at = welded[i]
-            boxes[f"pin{i}"] = {"p1": port, "p2": f"p{i}"}
+            pin = Path.of(f"pin{i}")
+            boxes[pin] = {"p1": port, "p2": f"p{i}"}
             apart = SE3.compose(SE3.inverse(at), pose)
-            parts[f"pin{i}"] = joint("spherical", translation(apart[4:])).with_initial({"pe.q_r": apart[:4]})
-        elif i in fixed:
+            parts[pin] = joint("spherical", translation(apart[4:])).with_initial({"pe.q_r": apart[:4]})
+        elif i in weighing:
             port, at = welded[i]
-            boxes[f"weld{i}"] = {"p1": port, "p2": f"p{i}"}
-            parts[f"weld{i}"] = joint("fixed", SE3.compose(SE3.inverse(at), pose))
+            weld = Path.of(f"weld{i}")
+            boxes[weld] = {"p1": port, "p2": f"p{i}"}
+            parts[weld] = joint("fixed", SE3.compose(SE3.inverse(at), pose))
     if len(held):
-        junctions["p_ground"] = junction(momentum)
-        boxes["ground"], parts["ground"] = {"p": "p_ground"}, components.ground()
-    warm = {"s": "s"} if heat and damping else {}
-    junctions |= {"s": junction(quantity.entropy, exposed=True)} if warm else {}
+        junctions[Path.of("p_ground")], ground = inner, Path.of("ground")
+        boxes[ground], parts[ground] = {"p": "p_ground"}, components.ground()
+    hot = Path.of("s")
+    warm = {hot: Port(hot, True)} if heat and damping else {}
+    junctions |= {hot: junction(quantity.entropy, exposed=True)} if warm else {}
     sections = np.concatenate([shell.axes, np.zeros((*shell.cells.shape, 3))], axis=2)
     at_rest = _from_first(shell)
     strained = None if np.array_equal(poses, shell.poses) else _strained(shell, at_rest, poses)
+    _require_damping(damping)
+    rest, stiffness = _checked(shell.rest, shell.matrix)
+    pattern = shell_pattern(damped=damping != 0.0, heat=bool(warm))
+    corners, at_node = tuple(Path.of(f"p{corner}") for corner in (1, *OTHERS)), [Port(path, True) for path in on]
     for e, nodes in enumerate(shell.cells.tolist()):
-        boxes[f"element{e}"] = {f"p{corner}": f"p{node}" for corner, node in enumerate(nodes, 1)} | warm
-        numbers = sections[e], at_rest[e], shell.rest[e], shell.matrix[e], damping
-        element = shell_element(*numbers, heat=bool(warm))
+        box = Path.of(f"element{e}")
+        boxes[box] = {corner: at_node[node] for corner, node in zip(corners, nodes, strict=True)} | warm
+        filled = _parts(sections[e], at_rest[e], rest[e], stiffness[e], damping, heat=bool(warm))
+        element = System(pattern, filled) if e == 0 else System.trusted(pattern, filled)  # all like the first
         states = {} if strained is None else {f"pe.q_{k}": strained[e, k - 2] for k in OTHERS}
-        parts[f"element{e}"] = element.with_initial(states) if states else element
+        parts[box] = element.with_initial(states) if states else element
     return System.of(Pattern(junctions=junctions, boxes=boxes), parts)
 
 
 def _from_first(shell: Shell) -> Array:
     """(n, 3, 7) poses of sections 2, 3, 4 of the elements at rest, relative to the first."""
-    along = [[SE3.exp(log) for log in logs] for logs in shell.rest]
+    along = [[SE3.exp(log) for log in logs[:3]] for logs in shell.rest]
     # corner 2 by edge 12, corner 4 by edge 14, corner 3 by edges 14 and 43: see `EDGES`
-    return np.array([[two, SE3.compose(four, three), four] for two, three, four, _ in along])
+    return np.array([[two, SE3.compose(four, three), four] for two, three, four in along])
 
 
 def _strained(shell: Shell, at_rest: Array, poses: Array) -> Array:
@@ -307,22 +348,33 @@ def _strained(shell: Shell, at_rest: Array, poses: Array) -> Array:
     return out
 
 
-def _checked(given: Array, stiffness: Array) -> tuple[Array, Array]:
+def _checked(given: "ArrayLike", stiffness: "ArrayLike") -> tuple[Array, Array]:
+    """Logarithms (…, 4, 6) and K (…, 24, 24) of one element, or of many."""
     rest, k = np.asarray(given, dtype=float), np.asarray(stiffness, dtype=float)
     for key, found, sound, expected in (
-        ("rest", rest, rest.shape == (4, 6) and bool(np.isfinite(rest).all()), "finite numbers (4, 6)"),
-        ("stiffness", k, k.shape == (24, 24) and bool(np.isfinite(k).all()), "finite numbers (24, 24)"),
-        ("stiffness", k, bool(np.array_equal(k, k.T)), "a symmetric matrix"),
+        ("rest", rest, rest.shape[-2:] == (4, 6) and bool(np.isfinite(rest).all()), "finite numbers (4, 6)"),
+        ("stiffness", k, k.shape[-2:] == (24, 24) and bool(np.isfinite(k).all()), "finite numbers (24, 24)"),
+        ("stiffness", k, k.ndim > 1 and bool(np.array_equal(k, k.swapaxes(-1, -2))), "a symmetric matrix"),
     ):
         if not sound:
             raise StructureError("parameter", "shell", key=key, found=f"shape {found.shape}", expected=expected)
-    least, most = symmetric_eigenvalues(k)[[0, -1]]
-    if least < -ROUNDING * most:
-        text = f"the eigenvalue {least:.3g}"
+    values = symmetric_eigenvalues(k)
+    least, most = values[..., 0], values[..., -1]
+    if (below := least < -ROUNDING * most).any():
+        text = f"the eigenvalue {least[below].min():.3g}"
         raise StructureError("parameter", "shell", key="stiffness", found=text, expected="none below 0")
     return rest, k
 
 
-def _numbers(rest: Array, stiffness: Array) -> tuple[tuple[str, object], ...]:
-    """The parameters of a part, as documents have them."""
-    return ("rest", tuple(rest.ravel().tolist())), ("stiffness", tuple(stiffness.ravel().tolist()))
+def _require_damping(damping: float) -> None:
+    if not 0.0 <= damping < np.inf:
+        raise StructureError("parameter", "shell", key="damping", found=damping, expected="a number ≥ 0")
+
+
+def _numbers(rest: Array, stiffness: Array) -> tuple[Numbers, Numbers]:
+    """Logarithms and K of an element as documents have them; its parts share them."""
+    return _row(rest), _row(stiffness)
+
+
+def _row(values: Array) -> Numbers:
+    return tuple(values.ravel().tolist())

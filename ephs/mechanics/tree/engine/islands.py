@@ -37,17 +37,22 @@ def islands_of(reduced: "Reduced", found: Found, acted: tuple[frozenset[int], fr
         Columns beyond the dimension of what an island may do are zero.
     """
     t, link = reduced.tables, found.bodies.link
-    ends = [[-1 if body < 0 else link[body] for body in (t.first[i], t.second[i])] for i in range(len(reduced.edges))]
+    both = zip(t.first.tolist(), t.second.tolist(), strict=True)
+    ends = [[-1 if body < 0 else link[body] for body in bodies] for bodies in both]
     groups = _joined(len(found.parts), ends)
     weight = _of_gravity(reduced)
     barred: dict[int, list[Array]] = {group: [weight] for group in groups}
+    held: dict[bytes, Array] = {}  # complements, which equal joints share
     for i, (one, two) in enumerate(ends):
         if (one < 0) == (two < 0):
             continue
         inside = max(t.spring[i], t.several[i], t.friction[i]) >= 0
         acting = inside or i in acted[0] or _inert(reduced, i)
         free = np.zeros((6, 0)) if acting else reduced.twists[i] if t.kind[i] != SPRING else np.eye(6)
-        barred[groups[max(one, two)]].append(complement(free))
+        key = free.tobytes()
+        if key not in held:
+            held[key] = complement(free)
+        barred[groups[max(one, two)]].append(held[key])
     for body in acted[1]:
         if link[body] >= 0:
             barred[groups[link[body]]].append(np.eye(6))

@@ -146,7 +146,7 @@ class _Finder:
         self.frames: dict[int, Frame] = {}
         self.links: list[Link] = []
         self._through: dict[int, int] = {}  # junction -> the offset by which it was reached
-        self._inertias: dict[int, Array | None] = {}  # by primitive, which equal bodies share
+        self._inertias: dict[tuple[int, int], Array | None] = {}  # by kernel and parameters, which equal bodies share
         self._shared = Counter(map(self._around, [*self._with(Role.POSE), *self._with(Role.KINETIC)]))
         self._of_joints = Counter(map(self._around, self._with(Role.JOINT)))
         self._beside: dict[int, list[tuple[int, int, bool]]] = {}
@@ -214,9 +214,10 @@ class _Finder:
         for number, port in self.wiring.on(junction):
             role, slot = self.roles[number], self.wiring.components[number]
             if role is Role.KINETIC:
-                if id(slot.primitive) not in self._inertias:
-                    self._inertias[id(slot.primitive)] = inertia_of(slot.primitive)
-                found = self._inertias[id(slot.primitive)]
+                key = id(slot.primitive.kernel), id(slot.primitive.parameters)
+                if key not in self._inertias:
+                    self._inertias[key] = inertia_of(slot.primitive)
+                found = self._inertias[key]
                 if found is None:
                     self._fault(number, "is no kinetic energy about a centre of mass")
                     continue
@@ -272,7 +273,7 @@ class _Finder:
         return None
 
     def _around(self, number: int) -> Path:
-        return Path(tuple(self.wiring.components[number].path)[:-1])
+        return self.wiring.components[number].path.parent
 
     def _box(self, number: int, sharing: Counter[Path], most: int) -> Path:
         """The box that a component lies in; its own where that is the whole system, or has other bodies or joints."""

@@ -1,5 +1,6 @@
 """From a flat system to the tables of its reduced form: a spanning tree of joints, the rest cut."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, final
@@ -232,8 +233,8 @@ def _tables(
     for called, mine in zip(parts.network.attached, flows, strict=True):
         sinks += [[int(flow), taken, int(mine[0])] for flow, (_, taken) in zip(mine, called.heated, strict=True)]
     storages = [(number, components[number].primitive) for number in parts.entropies.values()]
-    owners = [owner for _, _, owner in sinks]
-    rubs = [0 <= taken < len(storages) and owners.count(owner) == 1 for _, taken, owner in sinks]
+    owners = Counter(owner for _, _, owner in sinks)
+    rubs = [0 <= taken < len(storages) and owners[owner] == 1 for _, taken, owner in sinks]
     acting = np.unique([*spring, *several, *friction, *_called(parts.network)]).astype(np.int64)
     return MechanismTables(
         parent=np.array(parents, dtype=np.int64),

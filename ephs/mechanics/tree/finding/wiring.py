@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, StateSlot
-from ephs.semantics.descriptor.numbering import Index, starts
+from ephs.semantics.descriptor.numbering import starts
 from ephs.semantics.primitives.primitives import Storage
 
 
@@ -24,17 +24,17 @@ class Incidence:
     wires, first
         Junctions of all ports, one component after the other, and where those of each begin.
     owners, begin
-        Components with a port on each junction, one junction after the other, and where those of each begin.
+        Components with each port on a junction, one junction after the other, and where those of each begin.
     outer
         Junction -> the outer port that it is.
     """
 
     components: tuple[ComponentSlot, ...]
     names: tuple[tuple[str, ...], ...]
-    wires: Index
-    first: Index
-    owners: Index
-    begin: Index
+    wires: list[int]
+    first: list[int]
+    owners: list[tuple[int, str]]
+    begin: list[int]
     outer: dict[int, Path]
 
     @staticmethod
@@ -44,22 +44,23 @@ class Incidence:
         each = [tuple(map(str, primitive.bundle.ports)) for primitive in n.primitives]
         names = tuple(each[i] for i in n.primitive.tolist())
         count = np.array([len(ports) for ports in each], dtype=np.int64)[n.primitive]
-        owners = np.repeat(np.arange(count.size), count)[np.argsort(n.wires, kind="stable")]
-        begin = np.append(0, np.cumsum(np.bincount(n.wires, minlength=n.junctions.size)))
+        every = [(number, port) for number, ports in enumerate(names) for port in ports]
+        owners = [every[i] for i in np.argsort(n.wires, kind="stable").tolist()]
+        begin = np.append(0, np.cumsum(np.bincount(n.wires, minlength=n.junctions.size))).tolist()
         outer = [slot.path for slot in descriptor.outer]
         return Incidence(
-            components, names, n.wires, starts(count), owners, begin, dict(zip(n.outer.tolist(), outer, strict=True))
-        )
+            components, names, n.wires.tolist(), starts(count).tolist(), owners, begin,
+            dict(zip(n.outer.tolist(), outer, strict=True)),
+        )  # fmt: skip
 
     def ports(self, number: int) -> dict[str, int]:
         """Ports of a component, each with its junction."""
         names, at = self.names[number], self.first[number]
-        return dict(zip(names, self.wires[at : at + len(names)].tolist(), strict=True))
+        return dict(zip(names, self.wires[at : at + len(names)], strict=True))
 
     def on(self, junction: int) -> list[tuple[int, str]]:
         """The components with a port on a junction, each with the port."""
-        owners = dict.fromkeys(self.owners[self.begin[junction] : self.begin[junction + 1]].tolist())
-        return [(number, port) for number in owners for port, at in self.ports(number).items() if at == junction]
+        return self.owners[self.begin[junction] : self.begin[junction + 1]]
 
     def stored(self, junction: int) -> tuple[int, StateSlot] | None:
         """The storage on a junction with its state there; None where nothing is stored."""

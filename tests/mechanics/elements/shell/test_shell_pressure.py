@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.elements.shell.pressure import node_areas, volume
+from ephs.mechanics.methods import jacobian
+from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
 from tests.written import scene_of_text
@@ -190,3 +192,23 @@ def test_a_long_tube_has_the_membrane_forces_of_its_radius():
     wide = np.mean(np.linalg.norm((places - middle)[:, :2], axis=1)) if abs(middle[2] - 0.05) < 1e-6 else np.nan
     stretch = p * radius / (young * thickness)
     assert wide / radius - 1.0 == pytest.approx(stretch, rel=2.0 * (np.pi / count) ** 2 + 4.0 * stretch)
+
+
+@pytest.mark.parametrize("feedback", [False, True])
+def test_sparse_matrices_leave_out_how_a_pressure_turns_and_steps_lead_to_the_same(monkeypatch, feedback):
+    """To the tolerance: what is left out costs iterations. A pressure that is a function of states has all of them."""
+    monkeypatch.setattr(jacobian, "MANY", 0)
+    monkeypatch.setattr(jacobian, "FULL", 1.0)
+    free, made = box(), []
+    differences = Jacobian._by_differences
+    monkeypatch.setattr(Jacobian, "_by_differences", lambda self, state: made.append(1) or differences(self, state))
+    rest = {"inputs": {"shells.box": lambda t, state: PRESSURE}} if feedback else {}
+    ends = [
+        ephs.simulate(free, UNTIL, method=method, rtol=1e-8, audit="off", **given).shell("box").position[-1]
+        for method, given in (("radau", rest), ("rk87", {}))
+    ]
+    assert bool(made) == feedback
+    moved = np.abs(ends[1] - BOX).max()
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-5 * moved
+    still = ephs.simulate(free, UNTIL, method="rk87", inputs={"shells.box": 0.0}).shell("box").position[-1]
+    assert np.abs(still - ends[1]).max() > 0.5 * moved  # the control: without the pressure

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 import ephs
 from ephs.mechanics import Shell, ShellSection, shell_system
@@ -18,6 +20,7 @@ from ephs.mechanics.tree.engine import apart
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3, pair
+from ephs.solve.methods.dissection import dissected
 from ephs.solve.methods.solvers import Solvers
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
@@ -50,6 +53,22 @@ def matrix_of(equations, state, *, sparse):
     found = Jacobian(equations)
     found.sparse = sparse
     return found.at(state)
+
+
+# ---- set-up ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("options", [{}, {"damping": 0.0}, {"heat": True}, {"spread": True}])
+def test_parts_that_are_not_checked_one_by_one_pass_the_checks(options):
+    """Elements fit as the first one does, bodies as without states of their own, the flat system as its levels."""
+    whole = patch(**options)
+    for part in (*whole.fillings.values(), whole.flatten()):
+        if isinstance(part, ephs.System):
+            assert ephs.System(part.pattern, part.fillings) == part
+    element = whole.fillings["element1"]
+    torn = ephs.Directory({path: part for path, part in element.fillings.items() if path != Path.of("pe")})
+    with pytest.raises(ephs.SemanticsError):  # the control
+        ephs.System(element.pattern, torn)
 
 
 # ---- losses between several joints ----------------------------------------------------------------------------------
@@ -145,8 +164,8 @@ def test_sparse_matrices_of_mechanisms_are_dense_ones(scene):
 
 
 @settings(max_examples=15)
-@given(seeds, st.floats(1e-5, 1e-2), st.booleans(), st.booleans())
-def test_systems_of_sparse_matrices_are_solved(seed, h, pair, heated):
+@given(seeds, st.floats(1e-5, 1e-2), st.booleans(), st.booleans(), st.booleans())
+def test_systems_of_sparse_matrices_are_solved(seed, h, pair, heated, dissecting):
     """(1/(h μ) − J) x = b to 10 κ ε, with the rates of a node alone where none depends on heats, and with all else."""
     rng = np.random.default_rng(seed)
     equations = ReducedEquations(PATCH, 0.0)
@@ -157,7 +176,8 @@ def test_systems_of_sparse_matrices_are_solved(seed, h, pair, heated):
     matrix = matrix.tocsc()
     length = h * (0.16 + 0.2j * pair)
     right = rng.standard_normal(size) * (1.0 + 1j * pair)
-    systems = SparseSystems(matrix, equations.nv, n, Solvers(lambda _: "", PIVOTS))
+    places = rng.standard_normal((n, 3)) if dissecting else None
+    systems = SparseSystems(matrix, equations.nv, n, Solvers(lambda _: "", PIVOTS, places))
     found = systems.solver(length)(right)
     whole = np.eye(size) / length - matrix.toarray()
     expected = np.linalg.solve(whole, right)
@@ -166,6 +186,36 @@ def test_systems_of_sparse_matrices_are_solved(seed, h, pair, heated):
     condition = np.linalg.cond(whole * scale)
     off = np.abs(found - expected) / scale
     assert off.max() <= 10.0 * condition * EPS * np.abs(expected / scale).max()
+
+
+def lattice(points, ways):
+    """The matrix of points (n, 3) each of which acts on all within one step in each direction."""
+    near = np.abs(points[:, None] - points[None]).max(axis=2) < 1.5
+    return csc_array(np.where(near, -1.0, 0.0) + np.diag(ways + near.sum(axis=1)))
+
+
+@settings(max_examples=10)
+@given(st.integers(8, 16), st.integers(8, 16), seeds)
+def test_halves_of_a_dissected_mesh_do_not_meet_in_its_factors(wide, high, seed):
+    """Whatever the numbers of its unknowns: entries between the halves stay zero, as their order puts what joins last.
+
+    In the order of the rows the control has such entries.
+    """
+    grid_points = np.array([(x, y, 0.0) for x in range(wide) for y in range(high)])
+    points = grid_points[np.random.default_rng(seed).permutation(wide * high)]
+    matrix = lattice(points, 1.0)
+    order = dissected(matrix, points)
+    assert np.array_equal(np.sort(order), np.arange(wide * high))
+    across = int(np.argmax([wide, high]))
+    middle = np.sort(points[:, across])[points.shape[0] // 2]
+
+    def meeting(one):
+        found = splu(csc_array(matrix[one][:, one]), **{**PIVOTS, "permc_spec": "NATURAL"}).L.tocoo()
+        side = np.sign(points[one, across] - middle)
+        return int(np.sum(side[found.row] * side[found.col] < 0.0))
+
+    assert meeting(order) == 0
+    assert meeting(np.argsort(points[:, 1 - across], kind="stable")) > 0
 
 
 def run(problem_system, *, sparse, **options):
