@@ -45,7 +45,11 @@ def dynamics(
         The initial state contradicts the joints.
     """
     if not isinstance(scene, Scene):
-        return Dynamics(problem_of_system(scene, initial, inputs, reference))
+        problem = problem_of_system(scene, initial, inputs, reference)
+        for port, signal in problem.signals.items():
+            if not signal.constant and str(port) in (inputs or {}):
+                raise OptionError(f"inputs[{str(port)!r}]", "a function", "a number or numbers: dynamics have no time")
+        return Dynamics(problem)
     if given := [name for name, of in (("initial", initial), ("reference", reference)) if of]:
         raise OptionError(given[0], "a value", "none: a scene has its own")
     for name, value in (inputs or {}).items():

@@ -8,15 +8,18 @@ import numpy as np
 from ephs.mechanics.dynamics.links import PlacedLinks
 from ephs.mechanics.dynamics.pressing import PressedSurface
 from ephs.mechanics.dynamics.results import Derivatives
+from ephs.mechanics.scene.build import component_path, wrench_port
+from ephs.mechanics.scene.loads import Load
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.spaces.rotations import hat, quaternion_to_matrix
+from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 
 @final
 class Loading:
-    """The loads of a scene, and the pressures on its shells.
+    """Wrenches on a scene's bodies: its loads, inputs, and the pressures on its shells.
 
     Attributes
     ----------
@@ -27,21 +30,23 @@ class Loading:
     def __init__(self, equations: ReducedEquations, links: PlacedLinks) -> None:
         self.share = 1.0
         self._equations, self._links = equations, links
-        numbers = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
         scene: Scene | None = equations.problem.scene
-        self._loads = [(numbers[load.body], load) for _, load in (() if scene is None else scene.all_loads())]
+        self._loads: dict[str, list[Load]] = {}
+        for _, load in () if scene is None else scene.all_loads():
+            self._loads.setdefault(load.body, []).append(load)
         self._surfaces = [
             PressedSurface(equations, sheet)
             for _, sheet in (() if scene is None else scene.all_shells())
             if sheet.pressure is not None
         ]
-        self._constant = equations.wrench.copy()  # of inputs; loads that turn with their bodies are constant, too
-        steady = (self._constant != 0.0).any(axis=1).astype(float)
-        for link, load in self._loads:
-            self._constant[link] -= steady[link] * load.wrench(np.eye(3))
+        self._constant, signals = equations.wrench.copy(), equations.problem.signals
+        names = {name: i for i, name in enumerate(equations.reduced.bodies) if name is not None}
+        ported = [name for name in names if wrench_port(name) in signals]
+        self._turning = {name: of for name in ported if not (of := signals[wrench_port(name)]).constant}
+        self._pushed = {name: names[name] for name in ported if name in self._turning or name in self._loads}
 
     def __bool__(self) -> bool:
-        return bool(self._loads or self._surfaces)
+        return bool(self._pushed or self._surfaces)
 
     def place(self, q: Array, r: Array) -> None:
         """Write the wrenches at a configuration to the equations' inputs."""
@@ -49,13 +54,13 @@ class Loading:
             return
         self._links.place(q, r)
         self._equations.wrench[:] = self._constant
-        for link, load in self._loads:
-            self._equations.wrench[link] += self.share * load.wrench(self._rotation(link))
+        for name, link in self._pushed.items():
+            self._equations.wrench[link] = self._wrench(name, SE3.identity())
         for surface in self._surfaces:
             surface.add(self.share, self._equations.wrench)
 
     def stiffened(self, found: Derivatives, q: Array, r: Array) -> Derivatives:
-        """Derivatives with those of the loads' directions, which keep to the world while their bodies turn."""
+        """Derivatives with those of forces whose directions keep to the world while their bodies turn."""
         if not self:
             return found
         change = self.slopes(q, r)
@@ -63,21 +68,31 @@ class Loading:
         return replace(found, acceleration_q=by_place, force_q=found.force_q - change)
 
     def slopes(self, q: Array, r: Array) -> Array:
-        """(n, n) derivatives of the loads' forces on the tree's freedoms by their elements, beside those at fixed
+        """(n, n) derivatives of these forces on the tree's freedoms by their elements, beside those at fixed
         wrenches in the links' axes."""
         n = self._equations.n
         change = np.zeros((n, n))
         self.place(q, r)
-        for link, load in self._loads:
-            if not load.follower:
-                jacobian = self._links.jacobian(load.body, None)
-                moment, force = np.split(load.wrench(self._rotation(link)), 2)
-                turning = np.vstack([hat(moment), hat(force)])
-                change += self.share * jacobian.T @ turning @ jacobian[:3]
+        for name in self._pushed:
+            jacobian = self._links.jacobian(name, None)
+            change += jacobian.T @ self._by_turn(name) @ jacobian[:3]
         for surface in self._surfaces:
             change += self.share * surface.slopes()
         return change
 
-    def _rotation(self, link: int) -> Array:
-        """(3, 3) of a link to the world."""
-        return quaternion_to_matrix(self._equations.dense.residual.pose(link)[:4])
+    def _wrench(self, name: str, by: Array) -> Array:
+        """(6,) loads and inputs after ramps on a body that is displaced by a pose (7,) in its frame."""
+        pose, more = SE3.compose(self._equations.dense.residual.pose(self._pushed[name]), by), self.share - 1.0
+        whole = self._constant[self._pushed[name]]
+        if name in self._turning:
+            whole = self._turning[name].at(np.inf, {component_path("bodies", name) / "pe" / "q": pose})
+        turn = quaternion_to_matrix(pose[:4])
+        return whole + sum((more * load.wrench(turn) for load in self._loads.get(name, ())), np.zeros(6))
+
+    def _by_turn(self, name: str) -> Array:
+        """(6, 3) derivatives of a body's wrench by its turns: it is linear in the entries of Rᵀ, so that half the
+        difference of quarter turns is exact, exp(±½π ê) = 1 ± ê + ê².
+        """
+        quarters = [SE3.exp(np.append(turn, np.zeros(3))) for turn in 0.5 * np.pi * np.eye(3)]
+        ends = [(self._wrench(name, by), self._wrench(name, SE3.inverse(by))) for by in quarters]
+        return np.column_stack([0.5 * (one - other) for one, other in ends])
