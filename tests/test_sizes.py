@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 415_200,
+    "ephs/mechanics": 420_700,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
     "ephs/semantics": 193_700,
     "ephs/show": 65_200,
-    "ephs/solve": 124_500,
+    "ephs/solve": 124_800,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 566_300,
+    "tests": 574_500,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
