@@ -14,12 +14,12 @@ CEILINGS = {
     "ephs/mechanics": 420_700,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 193_700,
+    "ephs/semantics": 193_800,
     "ephs/show": 65_200,
-    "ephs/solve": 124_800,
+    "ephs/solve": 125_000,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 574_500,
+    "tests": 574_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

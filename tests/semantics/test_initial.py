@@ -11,6 +11,7 @@ import ephs
 from ephs import AssemblyError, Pattern, System, library
 from ephs import quantity as Q
 from ephs.semantics import Storage
+from ephs.semantics.systems.initial import read_state
 from ephs.semantics.verdicts.checks import random_point
 from ephs.testing import systems
 from tests.semantics.test_documents import MECHANICS, VALID
@@ -61,6 +62,16 @@ def test_documents_keep_them(number):
     assert again == made
     assert_starts(again, made.initial)
     assert values.keys() <= made.initial.keys()
+
+
+@pytest.mark.parametrize("space", ["SE(3)", "SO(3)"])
+def test_a_state_that_was_read_is_read_as_it_is(space):
+    """Dividing a quaternion by its length twice changes last digits; what is far from unit length is divided."""
+    rng, of = np.random.default_rng(0), Q.pose if space == "SE(3)" else Q.relative_pose("spherical")
+    for _ in range(200):
+        once = read_state(ephs.Path.of("q"), of, rng.standard_normal(of.space.size))
+        assert np.array_equal(read_state(ephs.Path.of("q"), of, once), once)
+        assert abs(np.linalg.norm(once[:4]) - 1.0) <= 4e-16
 
 
 def oscillator(**parts):

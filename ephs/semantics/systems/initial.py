@@ -15,6 +15,10 @@ SLIVER = 1e-9
 """Relative difference of times that are the same but for rounding."""
 
 
+ROUNDED = 4.0 * float(np.finfo(float).eps)
+"""Change by which elements that were normalised change when they are again: these are kept, as documents have them."""
+
+
 def started(storage: Storage, values: Mapping[Path, object], at: Path) -> Storage:
     """The storage in the box ``at`` with initial states by port; those of other ports stay.
 
@@ -55,7 +59,8 @@ def read_state(path: Path, quantity: Quantity, value: object) -> Array:
         raise AssemblyError("state", path, found=array.shape, expected=(space.size,), quantity=quantity.kind)
     if not np.all(np.isfinite(array)):
         raise AssemblyError("state-number", path, found=array, quantity=quantity.kind)
-    return manifold(space).normalise(array)
+    found = manifold(space).normalise(array)
+    return found if np.abs(found - array).max(initial=0.0) > ROUNDED else array.copy()
 
 
 def saved_at(times: Array, t: float) -> int | None:

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ephs.operad import Path
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.findings import Audit
@@ -43,6 +44,8 @@ _AT_SPEED = (Outcome.TINY, Outcome.MANY)
 _AT_LENGTH = (Outcome.DIVERGED, Outcome.TURN, Outcome.DOMAIN, Outcome.RANGE, Outcome.SINGULAR)
 MANY_RADIANS = 1e3
 """Angle of the fastest oscillation in a run above which it is why steps are many."""
+HALF_TURN = np.pi - 0.02
+"""Angle in rad of a strained relative pose beyond which steps are held up by the end of its logarithm."""
 _AT_LOOPS = (Outcome.OPEN, Outcome.CONTRADICTION, Outcome.DIVERGED, Outcome.SINGULAR, Outcome.TINY)
 
 
@@ -66,7 +69,7 @@ def failures_of(run: Run) -> Generator[None, None, None]:
         equation = "; ".join(filter(None, told))
         serves = run.bounds.serves if run.bounds is not None else serves_not
         partial = run.solution()
-        fact, hint = _fast(run, outcome, partial)
+        fact, hint = _half_turned(outcome, partial) or _fast(run, outcome, partial)
         told = "; ".join(filter(None, (equation, fact)))
         raise failed(outcome, run.t * run.problem.seconds, error.path, told, partial, serves, hint) from error.cause
     except KeyboardInterrupt as error:
@@ -82,6 +85,24 @@ def _no_motion(problem: Problem) -> str:
     except SemanticsError:
         return ""
     return f"at the start {found.doubt}" if found.empty else ""
+
+
+def _half_turned(outcome: Outcome, partial: Solution) -> tuple[str, str] | None:
+    """The strained relative pose that has turned by half a turn, where its logarithm ends; what to do then."""
+    if not (len(partial) and partial.problem is not None and outcome in (*_AT_SPEED, *_AT_LENGTH)):
+        return None
+    descriptor, state = partial.problem.descriptor, partial.state_at(len(partial) - 1)
+    strained = {slot.path for slot in descriptor.components if slot.primitive.name != "no_potential"}
+    for slot in descriptor.states:
+        path, turns = Path(slot.path[:-1]), slot.quantity.space.size in (4, 7)
+        if slot.quantity.kind == "relative_pose" and turns and path in strained:
+            turned = 2.0 * np.arccos(min(abs(float(state[slot.path][0])), 1.0))
+            if turned > HALF_TURN:
+                return (
+                    f"{path} has turned by half a turn, where its strain ends",
+                    f", or take more elements in place of {path}",
+                )
+    return None
 
 
 def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:
