@@ -11,7 +11,7 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_700,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 420_700,
+    "ephs/mechanics": 420_900,
     "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
     "ephs/semantics": 193_800,
@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 125_000,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 574_700,
+    "tests": 578_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

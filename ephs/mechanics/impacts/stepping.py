@@ -9,7 +9,7 @@ a place; the energy of the end is moved to what is left, as that of all correcte
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ephs.mechanics.impacts.cone import impulses
 from ephs.mechanics.impacts.holding import Holding
 from ephs.mechanics.impacts.islands import Unlawful, islands_of, shared, struck
 from ephs.mechanics.impacts.mobility import answer
+from ephs.mechanics.impacts.parting import closing_part, stopping_parts
 from ephs.mechanics.impacts.touching import Touching
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedState
@@ -42,13 +43,12 @@ QUIET = 1e-6
 PARTS = 1000
 """Largest number of parts of a step."""
 BRIEF = 1e-6
-"""Fraction of a step too short to decide between sticking and slipping."""
+"""Fraction of a step too short to decide between sticking and slipping: what friction stops within it sticks."""
 SLIVER = 1e-12
 """Fraction of a step that counts as zero."""
+NONE: Final[Index] = np.zeros(0, dtype=np.int64)
 DIVISIONS = 60
 ROUNDS = 20
-FLAT = 1e-9
-"""Imaginary part beside 1 of a root that is real."""
 PRESSING = 1e-6
 """Least impulse of an active contact, relative to the largest."""
 SETTLED = 1e-7
@@ -83,7 +83,7 @@ class Impacts(ReducedMethod):
         self._alone = eq.problem.constant and not (eq.drive.any() or eq.wrench.any() or eq.given.supply.any())
         self._alone = self._alone and not eq.driven.size
         self._closed = CLOSED * eq.problem.length
-        self._speed = 0.0
+        self._speed = self._whole = 0.0
         self.counts: dict[str, Any] = inner.counts
         self.counts |= {"parts": 0}
         self._modes = np.zeros(len(self._touching))
@@ -110,6 +110,7 @@ class Impacts(ReducedMethod):
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds, in as many parts as needed."""
         here, left, error = self.equations.accounts.opened(state), h, 0.0
+        self._whole = abs(h)
         self._left[:] = -np.inf
         self._happened, modes = [], state.memory[0] if state.memory else None
         self.name, self.exponent, self.share = self._inner.name, self._inner.exponent, self._inner.share
@@ -236,11 +237,15 @@ class Impacts(ReducedMethod):
         near[(np.abs(after) <= LOCATED * self._closed) & (speed <= 0.0)] = False  # closes at the end
         first = 1.0
         for i in np.flatnonzero(near):
-            first = min(first, _closes(gaps[i], h * rates[i], after[i], h * speed[i], LOCATED * self._closed))
+            first = min(first, closing_part(gaps[i], h * rates[i], after[i], h * speed[i], LOCATED * self._closed))
         return first
 
-    def _smooth(self, state: ReducedState, h: float, held: Index, gaps: Array) -> tuple[ReducedState, float, float]:
-        """The end of h seconds with some contacts closed, its error, and the part of it after which to divide it."""
+    def _smooth(
+        self, state: ReducedState, h: float, held: Index, gaps: Array, stopped: Index = NONE
+    ) -> tuple[ReducedState, float, float]:
+        """The end of h seconds with some contacts closed, its error, and the part of it after which to divide it;
+        ``stopped``: places among the closed ones of those that stick, whatever slip is left.
+        """
         eq, touching = self.equations, self._touching
         self._modes[:] = APART
         if not held.size:
@@ -249,7 +254,9 @@ class Impacts(ReducedMethod):
             return replace(flight.end, memory=()), flight.error, 1.0
         rows0, axes = touching.rows(state.q, state.r, held)
         start = rows0 @ state.r
-        slipping = np.repeat(np.hypot(start[1::3], start[2::3]) > PARTING * self._speed, 3)
+        moving = np.hypot(start[1::3], start[2::3]) > PARTING * self._speed
+        moving[stopped] = False
+        slipping = np.repeat(moving, 3)
         slipping[::3] = False
         before = np.where(slipping, start, 0.0)
         settled = self._settled(state, h, held, axes, rows0, before)
@@ -265,7 +272,10 @@ class Impacts(ReducedMethod):
         if loose.size and touching.gaps(moved.q, moved.r)[loose].min() < -self._closed:  # it opens and closes again
             return end, 0.0, 0.5
         laws = [touching.laws[i].friction for i in held]
-        if (divided := _turning(before, stop, solved, laws, PARTING * self._speed)) < 1.0:
+        shares = stopping_parts(before, stop, solved, laws, PARTING * self._speed)
+        if (brief := np.flatnonzero((shares < 1.0) & (shares * abs(h) <= BRIEF * self._whole))).size:
+            return self._smooth(state, h, held, gaps, np.append(stopped, brief))
+        if (divided := float(shares.min())) < 1.0:
             return end, 0.0, divided
         taken = -0.5 * (solved * (start + stop)).reshape(-1, 3)[:, 1:].sum(axis=1)
         heat = np.zeros(held.size)
@@ -366,33 +376,3 @@ def _named(paths: Sequence[Path]) -> list[str]:
     several = {owner[:-1] for owner in owners if owner[-1] == "point1"}
     single = {owner for owner in owners if owner[-1] == "point0" and owner[:-1] not in several}
     return [".".join(owner[:-1] if owner in single else owner) for owner in owners]
-
-
-def _closes(start: float, slope: float, end: float, slope1: float, closed: float) -> float:
-    """First fraction of a step at which a gap with these values and slopes at both ends closes; 1 if it stays open."""
-    closed += max(-start, 0.0)  # a gap within rounding at the start may remain
-    cubic = np.array([2.0 * (start - end) + slope + slope1, 3.0 * (end - start) - 2.0 * slope - slope1, slope, start])
-    turns = np.roots(np.polyder(cubic))
-    inside = [float(x) for x in turns.real[np.abs(turns.imag) < FLAT] if 0.0 < x < 1.0]
-    if min([end, *(float(np.polyval(cubic, x)) for x in inside)]) >= -closed:
-        return 1.0
-    found = np.roots(cubic)
-    for x in np.sort(found.real[np.abs(found.imag) < FLAT]).tolist():
-        if 0.0 < x < 1.0 and np.polyval(np.polyder(cubic), x) <= 0.0:
-            return x
-    back = [x for x in inside if np.polyval(np.polyder(cubic, 2), x) < 0.0] if start < 0.0 else []
-    return min(back, default=0.5)  # it reverses before it was open
-
-
-def _turning(before: Array, stop: Array, impulse: Array, friction: list[float], still: float) -> float:
-    """Fraction of a step at which the first slipping contact stops; 1 if none does."""
-    first, last, force = (v.reshape(-1, 3)[:, 1:] for v in (before, stop, impulse))
-    share = 1.0
-    for i, coefficient in enumerate(friction):
-        speed, back = float(first[i] @ first[i]), float(first[i] @ last[i])
-        if back >= -still * np.sqrt(speed) or not speed:
-            continue
-        most = coefficient * float(impulse[3 * i])
-        held = float(np.hypot(*force[i])) / most if most > 0.0 else 1.0
-        share = min(share, 0.5 * held if held < 1.0 - FLAT else speed / (speed - back))
-    return share
