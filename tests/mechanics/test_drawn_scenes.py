@@ -96,7 +96,8 @@ def test_as_a_system_made_by_hand(seed):
     assert set(inputs) == set(map(str, system.interface))
     reference = ephs.Reference(temperature=drawn(seed)["world"]["temperature"])
     found = ends(ephs.simulate(system, UNTIL, inputs=inputs, reference=reference, **TIGHT), "joints.")
-    assert_same(found, {name: value for name, value in expected.items() if name in found})
+    halves = {name for name, joint in scene(seed).all_joints() if joint.kind == "universal"}  # two joints of the system
+    assert_same(found, {name: value for name, value in expected.items() if name not in halves})
 
 
 @seeds

@@ -99,9 +99,9 @@ class Scene:
     def system(self) -> "System":
         """The scene as a hierarchical exergetic port-Hamiltonian system, in the scene's initial state.
 
-        What acts from outside does so at its outer ports, and is not in it: ``drives.JOINT``, ``momenta.BODY`` of
-        bodies with loads and of nodes of shells with a pressure, ``voltages.MOTOR`` and so on. Its reference
-        environment is that of `ephs.Reference` unless a run is given another one.
+        Drives, loads, voltages and pressures are inputs at its outer ports: ``drives.JOINT``, ``voltages.MOTOR``,
+        ``momenta.BODY`` of bodies with loads and of nodes of shells with a pressure. The system has no values for them;
+        a run has to give them. Its reference environment is that of `ephs.Reference` unless a run is given another one.
         """
         from ephs.mechanics.scene.build import started_system
 

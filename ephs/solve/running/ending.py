@@ -8,8 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ephs.operad import Path
+from ephs.operad import Quantity
 from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.auditing.passing import TURNED
@@ -91,18 +92,22 @@ def _half_turned(outcome: Outcome, partial: Solution) -> tuple[str, str] | None:
     """The strained relative pose that has turned by half a turn, where its logarithm ends; what to do then."""
     if not (len(partial) and partial.problem is not None and outcome in (*_AT_SPEED, *_AT_LENGTH)):
         return None
-    descriptor, state = partial.problem.descriptor, partial.state_at(len(partial) - 1)
-    strained = {slot.path for slot in descriptor.components if slot.primitive.name != "no_potential"}
-    for slot in descriptor.states:
-        path, turns = Path(slot.path[:-1]), slot.quantity.space.size in (4, 7)
-        if slot.quantity.kind == "relative_pose" and turns and path in strained:
-            turned = 2.0 * np.arccos(min(abs(float(state[slot.path][0])), 1.0))
-            if turned > HALF_TURN:
-                return (
-                    f"{path} has turned by half a turn, where its strain ends",
-                    f", or take more elements in place of {path}",
-                )
+    state = partial.state_at(len(partial) - 1)
+    for slot in partial.problem.descriptor.components:
+        if not isinstance(slot.primitive, Storage):
+            continue
+        point = {port: state[slot.path / port] for port in slot.primitive.bundle.ports}
+        turns = [point[port][0] for port, _, of in slot.primitive.bundle.items() if _is_turn(of)]
+        turned = max((2.0 * np.arccos(min(abs(float(w)), 1.0)) for w in turns), default=0.0)
+        if turned > HALF_TURN and slot.primitive.energy(point) != 0.0:
+            told = f"{slot.path} has turned by half a turn, where its strain ends"
+            return told, f", or take more elements in place of {slot.path}"
     return None
+
+
+def _is_turn(quantity: Quantity) -> bool:
+    """Whether a relative pose has a quaternion, its first numbers."""
+    return quantity.kind == "relative_pose" and quantity.space.size in (4, 7)
 
 
 def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:

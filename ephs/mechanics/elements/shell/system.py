@@ -199,7 +199,7 @@ def shell_element(
 def _parts(
     frames: Array, between: Array, rest: Array, stiffness: Array, damping: float, *, heat: bool
 ) -> Directory[System | Primitive]:
-    """What fills the boxes of an element; its numbers are checked."""
+    """Fillings of the boxes of an element, of numbers that were checked."""
     free, numbers = pair("free"), _numbers(rest, stiffness)
     parts: dict[Path, System | Primitive] = {_BOX["pe"]: _spring(*numbers)}
     for k, place in zip(OTHERS, between, strict=True):
