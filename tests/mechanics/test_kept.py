@@ -9,15 +9,21 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs.mechanics.elements.joints import spring_damper
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
+from ephs.mechanics.scene.build import initial_state, scene_system
+from ephs.mechanics.scene.springs import Spring
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path, Pattern, junction
 from ephs.operad import quantity as Q
 from ephs.solve.equations.model import compile_model
+from tests.mechanics.ball import BALL
+from tests.mechanics.drawn_scenes import drawn, toml
 from tests.mechanics.tree import machines
+from tests.written import scene_of_text
 
 FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 
@@ -86,6 +92,68 @@ def test_a_changed_scene_is_another_one(method):
         assert same(found, ran(ephs.load(FOUR_BAR), method, inputs=inputs))
         assert not same(found, first)
     assert same(ran(scene, method), first)
+
+
+def made_anew(scene):
+    """The same values, without anything that was kept with them."""
+    return replace(scene, parts={name: made_anew(part) for name, part in scene.parts.items()})
+
+
+def later(scene):
+    return scene.at(ephs.simulate(scene, 0.02, audit="off", save_at=np.array([0.02])), 0.02)
+
+
+def parts_of(scene):
+    """Digits of all that a run begins with: states by path, and tables."""
+    return {str(k): v.tobytes() for k, v in initial_state(scene).items()}, digest(
+        ReducedEquations(problem_of_scene(scene), 0.0)
+    )
+
+
+BOUNCING = BALL.format(slip=0.01)
+
+
+@pytest.mark.parametrize("seed", [*range(6), None])
+def test_a_scene_in_another_state_has_the_digits_of_one_made_anew(seed):
+    """Systems are shared by scenes that differ in how bodies and joints move alone; states are not."""
+    scene = scene_of_text(BOUNCING if seed is None else toml(drawn(seed)))
+    moved = later(scene)
+    known = (
+        seed is not None and {"thermal", "shells", "motors", "gears"} & drawn(seed).keys()
+    )  # with states of their own
+    assert known or scene_system(moved) is scene_system(scene)
+    assert parts_of(moved) == parts_of(made_anew(moved))
+    assert parts_of(moved) != parts_of(scene)
+    assert scene_system(made_anew(moved)) is not scene_system(scene)
+
+
+def test_elements_that_read_motions_for_more_than_their_start_are_made_anew(monkeypatch):
+    """The control: read while it is built, the start of a spring is that of the scene for which it was built."""
+    text = (
+        BOUNCING
+        + '[springs.s]\nbodies = ["ground", "ball"]\nat1 = [1.0, 0.0, 1.0]\nat2 = [0.0, 0.0, 0.0]\nstiffness = 20.0\n'
+    )
+    scene = scene_of_text(text)
+    moved = later(scene)
+    assert scene_system(moved) is scene_system(scene)
+    assert not same_start(moved, scene)
+
+    def build(self, site):
+        made = spring_damper(self.at1, self.at2, self.stiffness, self.length, self.damping)
+        site.add(
+            made, {f"p{k}": site.momentum(body) for k, body in enumerate(self.bodies, 1)}, initial=self._start(site)
+        )
+
+    monkeypatch.setattr(Spring, "build", build)
+    scene = scene_of_text(text)
+    moved = later(scene)
+    assert scene_system(moved) is not scene_system(scene)
+    assert not same_start(moved, scene)
+
+
+def same_start(one, other):
+    path = Path.of("springs.s.pe.q_r")
+    return np.array_equal(initial_state(one)[path], initial_state(other)[path])
 
 
 def test_runs_side_by_side_share_what_is_kept():

@@ -73,7 +73,7 @@ def problem_of_scene(
         shaky=lambda: is_shaky(scene),
         length=once(scene, "length", lambda: Snapshot.of(scene).scale(world.gravity).length),
         view=view,
-        names=once(scene, "names", lambda: scene_names(scene)),
+        names=scene_names(scene),
     )
     if initial:
         scale, mass = Snapshot.of(scene).scale(world.gravity), sum(body.mass for _, body in scene.all_bodies())

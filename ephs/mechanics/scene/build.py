@@ -19,7 +19,7 @@ from ephs.mechanics.scene.contacts import contact_points
 from ephs.mechanics.scene.demands import Demands, demands_on_parts
 from ephs.mechanics.scene.made import SystemCache
 from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
-from ephs.mechanics.scene.site import INPUTS, SceneLevel, built
+from ephs.mechanics.scene.site import INPUTS, SceneLevel, built, form_of, started
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.operad import Path, Pattern, Quantity, junction, quantity
 from ephs.semantics.bundles.bundle import Array
@@ -65,11 +65,13 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
     """
     asked, pushed = frozenset(driven), frozenset(wrenches)
 
-    def made() -> System:
-        own = {name for name, j in scene.all_joints() if _is_driven(j)}
-        return _level(scene, Demands(pushed, frozenset(), own | asked), top=True)
+    form = form_of(scene)
 
-    return once(scene, ("system", asked, pushed), made)
+    def made() -> System:
+        own = {name for name, j in form.all_joints() if _is_driven(j)}
+        return _level(form, Demands(pushed, frozenset(), own | asked), top=True)
+
+    return once(form, ("system", asked, pushed), made)
 
 
 def started_system(scene: Scene) -> System:
@@ -109,13 +111,22 @@ def _initial_state(scene: Scene) -> dict[Path, Array]:
     for name, node in scene.all_thermal():
         out |= {component_path("thermal", name) / state: np.zeros(1) for state in ("s", *["e"] * (node.pull > 0.0))}
     for path, level in scene.levels():
-        if (own := built(level)).boxes:
-            system = System.of(Pattern(junctions=own.junctions, boxes=own.boxes), own.fillings)
-            at = Path([word for part in path.split(".")[:-1] for word in ("parts", part)])
-            out |= {Path([*at, *state]): value for state, value in system.state().items()}
+        own, at = built(level), Path([word for part in path.split(".")[:-1] for word in ("parts", part)])
+        states = once(form_of(level), "states of elements", lambda own=own: _element_states(own))
+        out |= {Path([*at, *state]): value for state, value in states.items()}
+        for box, (element, start) in own.starts.items():
+            for name, value in started(level, element, start).items():
+                out[Path([*at, *box, *name.split(".")])] = np.array(value, dtype=float)
     for value in out.values():
         value.flags.writeable = False
     return out
+
+
+def _element_states(level: SceneLevel) -> Mapping[Path, Array]:
+    """States of the boxes of a level's elements, as their fillings have them."""
+    if not level.boxes:
+        return {}
+    return System.of(Pattern(junctions=level.junctions, boxes=level.boxes), level.fillings).state()
 
 
 def scene_inputs(scene: Scene) -> dict[Path, Signal]:
@@ -151,6 +162,11 @@ def element_signals(scene: Scene) -> Mapping[str, Mapping[Path, Signal]]:
 
 def scene_names(scene: Scene) -> dict[Path, str]:
     """Box in the scene's system -> the name of what it stands for: of bodies, joints, springs, contacts."""
+    form = form_of(scene)
+    return once(form, "names", lambda: _scene_names(form))
+
+
+def _scene_names(scene: Scene) -> dict[Path, str]:
     out: dict[Path, str] = {component_path("bodies", name): name for name, _ in scene.all_bodies()}
     out |= {component_path("springs", name): name for name, _ in scene.all_springs()}
     for name, c in scene.all_contacts():

@@ -15,12 +15,13 @@ from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.polytope import MOST_FACES, faces_and_edges
 from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Pair
-from ephs.mechanics.scene.site import SceneLevel, Site, shells_of, surfaces_of
+from ephs.mechanics.scene.site import SceneLevel, Site, form_of, shells_of, surfaces_of
 from ephs.mechanics.scene.surfaces import SOFT, ContactLaw, Surface, TouchingElement
 from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.mechanics.shapes.pairs import PAIRS, touches
 from ephs.operad.disjoint import DisjointSets
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.kept import once
 
 if TYPE_CHECKING:
@@ -167,16 +168,18 @@ class Contact(TouchingElement, section="contacts", said="pairs of surfaces that 
     def build(self, site: Site) -> None:
         points = contact_points(site.scene, self)
         warm = site.heated(self.heat or ENVIRONMENT)
-        start = {
-            f"point{i}.pe.q_r": site.between(point.bodies[0], point.frames[0], point.bodies[1], point.frames[1])
-            for i, point in enumerate(points)
-        }
         own = dict.fromkeys(body for point in points for body in point.bodies)
         port = {body: f"p{i}" for i, body in enumerate(own, 1)}
         touches = [(*point.frames, point.gap) for point in points]
         ends, shares = [(port[one], port[two]) for one, two in (x.bodies for x in points)], [x.share for x in points]
         made = contact(touches, self.law, heat=bool(warm), ends=ends, shares=shares)
-        site.add(made, {port[body]: site.momentum(body) for body in own} | warm, initial=start)
+        site.add(made, {port[body]: site.momentum(body) for body in own} | warm, initial=self._start)
+
+    def _start(self, site: Site) -> Mapping[str, Array]:
+        return {
+            f"point{i}.pe.q_r": site.between(point.bodies[0], point.frames[0], point.bodies[1], point.frames[1])
+            for i, point in enumerate(contact_points(site.scene, self))
+        }
 
     def __str__(self) -> str:
         return " – ".join(self.surfaces)
@@ -184,6 +187,7 @@ class Contact(TouchingElement, section="contacts", said="pairs of surfaces that 
 
 def contact_points(scene: "Scene", of: Contact) -> Points:
     """Points of a contact, as seen from a scene; made once for all its contacts and kept with it."""
+    scene = form_of(scene)
 
     def made() -> dict[tuple[str, ...], Points]:
         surfaces = surfaces_of(scene)

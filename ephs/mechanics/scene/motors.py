@@ -32,8 +32,10 @@ class Motor(Element, section="motors", said="motors with circuit and gear on joi
         numbers, ports = self.number_values(), site.heated(self.heat)
         supply = site.input(quantity.charge, numbers.pop("voltage"), at="voltages")
         made = motor(site.quantity(self.joint), **numbers, heat=bool(ports))
-        spin = {"rotor.p": self.inertia * self.gear * site.rate(self.joint)} if self.inertia else {}
-        site.add(made, {"q": supply, "p_r": site.drive(self.joint)} | ports, initial=spin)
+        site.add(made, {"q": supply, "p_r": site.drive(self.joint)} | ports, initial=self._start)
+
+    def _start(self, site: Site) -> Mapping[str, Array]:
+        return {"rotor.p": self.inertia * self.gear * site.rate(self.joint)} if self.inertia else {}
 
     def continued(self, states: Mapping[str, Array]) -> Self:
         return self.changed(current=float(states["coil.b"][0]) / self.inductance) if self.inductance else self

@@ -1,6 +1,6 @@
 """Site of an element of one's own in a scene: values that it reads there, and boxes that it adds to the system."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, final
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ephs.mechanics.scene.shells import ShellSheet
     from ephs.mechanics.scene.surfaces import Surface
 
+Start = Callable[["Site"], "Mapping[str, ArrayLike]"]
 INPUTS = "inputs"
 """First name of the outer ports of elements."""
 
@@ -36,13 +37,24 @@ INPUTS = "inputs"
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneLevel:
-    """Junctions, boxes and inputs of a level of a scene's system."""
+    """Junctions, boxes and inputs of a level of a scene's system.
+
+    Attributes
+    ----------
+    inputs
+        Outer ports -> the names of their inputs, empty where runs have none, and their values without these.
+    starts
+        Boxes -> their elements, and what makes their states at the start.
+    moving
+        Elements that read the motion of bodies or joints for what is no such state.
+    """
 
     junctions: dict[Path, Any] = field(default_factory=dict)
     boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
     fillings: dict[Path, Filling] = field(default_factory=dict)
     inputs: dict[Path, tuple[str, Signal]] = field(default_factory=dict)
-    """Outer ports -> the names of their inputs, empty where runs have none, and their values without these."""
+    starts: "dict[Path, tuple[Element, Start]]" = field(default_factory=dict)
+    moving: set[str] = field(default_factory=set)
 
 
 @final
@@ -78,14 +90,17 @@ class Site:
         """(7,) of a body, or a node of a shell, in the world at the start; of the ground the identity."""
         if body == GROUND:
             return IDENTITY_POSE
+        self._level.moving.add(self.element.name)
         return found if (found := nodes_of_shells(self.scene).get(body)) is not None else self.scene.body(body).pose
 
     def twist(self, body: str) -> Array:
         """(6,) of a body at the start, in its frame; of the ground 0."""
+        self._level.moving.add(self.element.name)
         return np.zeros(6) if body == GROUND else self.scene.body(body).twist
 
     def rate(self, joint: str) -> Array:
         """(d,) u_r of a joint at the start; rad/s, m/s."""
+        self._level.moving.add(self.element.name)
         return self.scene.joint(joint).rate
 
     def point(self, body: str, at: "ArrayLike") -> Array:
@@ -186,7 +201,7 @@ class Site:
         ports: Mapping[str, str],
         box: str = "",
         *,
-        initial: "Mapping[str, ArrayLike] | None" = None,
+        initial: "Mapping[str, ArrayLike] | Start | None" = None,
     ) -> None:
         """A box ``SECTION.NAME``, or with ``.BOX`` where there are several.
 
@@ -197,9 +212,14 @@ class Site:
         ports
             Its ports -> junctions, as the methods above give them.
         initial
-            States at the start by their paths in the filling: of what it does not carry, and that is not zero.
+            States at the start by their paths in the filling, of what it does not carry and that is not zero; or a
+            function of the site that makes them. With functions, and nothing else that reads how bodies and joints
+            move, a scene in another state has the same system.
         """
         path = self._own(box)
+        if callable(initial):
+            self._level.starts[path] = self.element, initial
+            initial = started(self.scene, self.element, initial)
         if initial and isinstance(filling, System | Storage):
             filling = filling.with_initial({name: np.asarray(value, dtype=float) for name, value in initial.items()})
         self._level.boxes[path], self._level.fillings[path] = dict(ports), filling
@@ -238,8 +258,45 @@ def nodes_of_shells(scene: "Scene") -> "Mapping[str, Array]":
     return once(scene, "nodes of shells", made)
 
 
+def started(scene: "Scene", element: "Element", start: Start) -> "Mapping[str, ArrayLike]":
+    """States of an element's box at the start, by their paths in the filling."""
+    return start(Site(scene, element, SceneLevel()))
+
+
+def moved(scene: "Scene", other: "Scene") -> "Scene":
+    """A scene that differs from another one in the motion of bodies and joints, and perhaps in other elements.
+
+    If it does not in others, it shares what does not depend on motion: see `form_of`.
+    """
+    for (_, level), (_, before) in zip(scene.levels(), other.levels(), strict=True):
+        if level.world is before.world and not level.elements and _same_elements(level, before):
+            once(level, "like", lambda before=before: once(before, "like", lambda: before))
+    return scene
+
+
+def _same_elements(scene: "Scene", other: "Scene") -> bool:
+    """Whether two levels have the same elements but for bodies and joints."""
+    from ephs.mechanics.scene.model import ELEMENTS
+
+    own = [(scene.section(key), other.section(key)) for key in ELEMENTS if key not in ("bodies", "joints")]
+    return all(a.keys() == b.keys() and all(a[name] is b[name] for name in a) for a, b in own)
+
+
+def form_of(scene: "Scene") -> "Scene":
+    """A scene with the same elements and system: it differs in how bodies and joints move at the start, or is it."""
+    like = once(scene, "like", lambda: scene)
+    return scene if like is scene or any(_elements(level).moving for _, level in like.levels()) else like
+
+
 def built(scene: "Scene") -> SceneLevel:
-    """Junctions, boxes and inputs of the elements of a level; made once and kept with the scene."""
+    """Junctions, boxes and inputs of the elements of a level; made once and kept with the scene.
+
+    Values of states at the start may be those of another scene: see `starts`.
+    """
+    return _elements(form_of(scene))
+
+
+def _elements(scene: "Scene") -> SceneLevel:
     from ephs.mechanics.scene.model import elements_of
 
     def made() -> SceneLevel:

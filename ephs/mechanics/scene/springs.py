@@ -11,6 +11,7 @@ from ephs.mechanics.scene.element import ENVIRONMENT
 from ephs.mechanics.scene.rules import rule
 from ephs.mechanics.scene.schema_numbers import NonNegative, Number, Pair, Text, Vector
 from ephs.mechanics.scene.site import Site
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import ASSEMBLY
 
 
@@ -54,7 +55,10 @@ class Spring(Element, section="springs", said="springs and dampers between two p
         (one, other), warm = self.bodies, site.heated(self.heat)
         made = spring_damper(self.at1, self.at2, self.stiffness, self.length, self.damping, heat=bool(warm))
         ports = {"p1": site.momentum(one), "p2": site.momentum(other)} | warm
-        site.add(made, ports, initial={"pe.q_r": site.between(one, self.at1, other, self.at2)})
+        site.add(made, ports, initial=self._start)
+
+    def _start(self, site: Site) -> Mapping[str, Array]:
+        return {"pe.q_r": site.between(self.bodies[0], self.at1, self.bodies[1], self.at2)}
 
     def __str__(self) -> str:
         return f"{' – '.join(self.bodies)}, {self.stiffness:g} N/m"

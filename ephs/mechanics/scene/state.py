@@ -22,6 +22,7 @@ from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen
 from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.shells import ShellSheet
+from ephs.mechanics.scene.site import moved
 from ephs.mechanics.scene.tree import spanning_hops
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
@@ -166,7 +167,7 @@ def adjusted(scene: Scene, asked: Mapping[str, Asked]) -> tuple[Scene, list[Faul
     report = Adjustment(
         gap, slip, tuple(_displacements(now, poses, given, twists)), tuple(_changes(links, xs, twists, scale))
     )
-    return replace(rebuilt(scene, now, poses, twists, xs), adjusted=report), []
+    return moved(replace(rebuilt(scene, now, poses, twists, xs), adjusted=report), scene), []
 
 
 def _asked(link: AssemblyJoint, asked: Asked | None) -> AssemblyJoint:
@@ -225,7 +226,7 @@ def rebuilt(scene: Scene, now: Snapshot, poses: Array, twists: Array, xs: Sequen
         motions = {name: SE3.compose(poses[i], SE3.inverse(now.poses[i])) for name, i in gone.items()}
         return of.carried(motions) if motions else of
 
-    return mapped(scene, {"bodies": body, "joints": joint, "gears": gear, "shells": sheet})
+    return moved(mapped(scene, {"bodies": body, "joints": joint, "gears": gear, "shells": sheet}), scene)
 
 
 def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
@@ -254,7 +255,7 @@ def at_solution(scene: Scene, solution: Any, time: float) -> Scene:
     )
     if faults := list(lost_states(found, states)):
         raise SceneError(scene.name, faults)
-    return found
+    return moved(found, scene)
 
 
 def resumed(scene: Scene, states: Mapping[Path, Array]) -> Scene:

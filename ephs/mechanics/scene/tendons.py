@@ -14,6 +14,7 @@ from ephs.mechanics.scene.rules import Told, rule
 from ephs.mechanics.scene.schema_numbers import Flag, Names, NonNegative, Text, Vector
 from ephs.mechanics.scene.site import Site
 from ephs.operad import quantity
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import ASSEMBLY
 
 _Spot = tuple[str, Vector]
@@ -87,17 +88,20 @@ class Tendon(Element, section="tendons", said="tendons through points of bodies"
             slack=self.slack,
             heat=bool(warm),
         )
-        start = {f"segment{k}.pe.q_r": site.between(*one, *two) for k, (one, two) in enumerate(segments, 1)}
-        if self.stiffness:
-            apart = ([site.in_world(*end) for end in ends] for ends in segments)
-            start["spring.q"] = np.array([sum(float(np.linalg.norm(two - one)) for one, two in apart)])
         ports = {
             f"{side}{k}": site.momentum(body)
             for k, ends in enumerate(segments, 1)
             for side, (body, _) in zip("ab", ends, strict=True)
         }
         pull = site.input(quantity.momentum, at="tensions", effort=False, named=False)
-        site.add(made, ports | {"p": pull} | warm, initial=start)
+        site.add(made, ports | {"p": pull} | warm, initial=self._start)
+
+    def _start(self, site: Site) -> Mapping[str, Array]:
+        out = {f"segment{k}.pe.q_r": site.between(*one, *two) for k, (one, two) in enumerate(self.segments, 1)}
+        if self.stiffness:
+            apart = ([site.in_world(*end) for end in ends] for ends in self.segments)
+            out["spring.q"] = np.array([sum(float(np.linalg.norm(two - one)) for one, two in apart)])
+        return out
 
     @property
     def segments(self) -> list[tuple[_Spot, _Spot]]:
