@@ -8,6 +8,7 @@ import numpy as np
 
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import PAIRS, pair
+from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.posing.problem import NO_STATE
@@ -15,6 +16,7 @@ from ephs.solve.posing.problem import NO_STATE
 if TYPE_CHECKING:
     from ephs.operad import Quantity
     from ephs.semantics.bundles.bundle import Array
+    from ephs.semantics.descriptor.descriptor import Descriptor
     from ephs.solve.posing.problem import Problem, Signal
 
 TURN = 0.1
@@ -39,23 +41,14 @@ def _contact_step(problem: "Problem") -> float:
 
     A step that begins before a thin surface and ends behind it sees no contact; behind a plane it does.
     """
-    gaps = [one.gap for one in problem.descriptor.numbering.primitives if isinstance(one, Storage) and one.gap]
-    if not gaps:
-        return np.inf
-    from ephs.mechanics.shapes.gap import Gap  # most systems have no surfaces
-    from ephs.mechanics.tree.finding.frames import frames_of
-
-    thick = min(gap.thickness for gap in gaps if isinstance(gap, Gap))
+    d = problem.descriptor
+    thick, reach = once(d, "surfaces", lambda: _surfaces(d))
     if thick == np.inf:
         return np.inf
-    found = frames_of(problem.descriptor)
+    from ephs.mechanics.tree.finding.frames import frames_of  # most systems have no surfaces
+
+    found = frames_of(d)
     components = found.wiring.components
-    reach = 0.0
-    for joint in found.joints:
-        stored = components[joint.potential].primitive
-        if isinstance(stored, Storage) and stored.gap:
-            ends = (end.offset[4:] for end in (joint.first, joint.second) if end.link >= 0)
-            reach = max(reach, *(float(np.linalg.norm(at)) for at in ends))
     speeds, pull, places = [0.0], 0.0, [np.zeros(3)]
     for link in found.links:
         if link.momentum is not None and not link.light:
@@ -68,6 +61,27 @@ def _contact_step(problem: "Problem") -> float:
             pull = max(pull, float(np.linalg.norm(np.asarray(weight, dtype=float))) / float(link.inertia[5, 5]))
     fast = sum(sorted(speeds)[-2:]) + np.sqrt(2.0 * pull * _spread(places))
     return float(LEAP * thick / fast) if fast > 0.0 else np.inf
+
+
+def _surfaces(descriptor: "Descriptor") -> tuple[float, float]:
+    """The least thickness of what touches, infinite where nothing thin does, and how far frames are from bodies."""
+    gaps = [one.gap for one in descriptor.numbering.primitives if isinstance(one, Storage) and one.gap]
+    if not gaps:
+        return np.inf, 0.0
+    from ephs.mechanics.shapes.gap import Gap  # most systems have no surfaces
+    from ephs.mechanics.tree.finding.frames import frames_of
+
+    thick = min(gap.thickness for gap in gaps if isinstance(gap, Gap))
+    if thick == np.inf:
+        return np.inf, 0.0
+    found = frames_of(descriptor)
+    reach = 0.0
+    for joint in found.joints:
+        stored = found.wiring.components[joint.potential].primitive
+        if isinstance(stored, Storage) and stored.gap:
+            ends = (end.offset[4:] for end in (joint.first, joint.second) if end.link >= 0)
+            reach = max(reach, *(float(np.linalg.norm(at)) for at in ends))
+    return thick, reach
 
 
 def _spread(places: "Sequence[Array]") -> float:

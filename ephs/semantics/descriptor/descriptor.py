@@ -217,10 +217,7 @@ class Descriptor:
 
     def pack(self, state: Mapping[Path, Array]) -> Array:
         """The state vector (point_size,) from values by path."""
-        out = np.zeros(self.point_size)
-        for slot in self.states:
-            out[slot.point] = state[slot.path]
-        return out
+        return np.concatenate([np.zeros(0), *(state[slot.path] for slot in self.states)])
 
     def unpack(self, x: Array) -> dict[Path, Array]:
         """Values by path from the state vector (…, point_size)."""

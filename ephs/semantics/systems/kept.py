@@ -6,13 +6,13 @@ from typing import Any, TypeVar, cast, final
 
 T = TypeVar("T")
 
-MOST = 16
+MOST = 32
 """Number of results that one value keeps."""
 
 
 @final
 class Kept:
-    """Cache slot of a frozen value; the oldest results are dropped first.
+    """Cache slot of a frozen value; results that were not asked for longest are dropped first.
 
     Results are shared by all threads and never written to. They go with their owner: a value made from another one by
     `dataclasses.replace`, a deep copy, and what comes out of a pickle start with an empty slot.
@@ -26,9 +26,10 @@ class Kept:
 
     def of(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return the result of this key, computed if it is absent; exceptions are not cached."""
-        found = self._found.get(key)
-        if found is not None:
-            return cast("T", found)
+        with self._lock:
+            if key in self._found:
+                self._found[key] = found = self._found.pop(key)
+                return cast("T", found)
         made = make()
         with self._lock:
             kept = self._found.setdefault(key, made)

@@ -5,7 +5,10 @@ from typing import final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Irreversible, Point, Storage
+from ephs.semantics.systems.kept import once
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import Problem
 
@@ -29,14 +32,10 @@ class Production:
     """
 
     def __init__(self, problem: Problem, sign: float = 1.0) -> None:
-        d, n = problem.descriptor, problem.descriptor.numbering
-        makes = [isinstance(one, Irreversible) for one in n.primitives]
-        searched = [isinstance(one, Irreversible) and one.verdict != "proved" for one in n.primitives]
+        d = problem.descriptor
         self._sign = sign
-        self._makers, self._watched = (np.flatnonzero(np.array(each)[n.primitive]) for each in (makes, searched))
+        self._makers, self._watched, self._entropies = once(d, "production", lambda: _watched(d))
         self._paths = [d.components[i].path for i in self._watched.tolist()]
-        hot = [slot.point.start for slot in d.states if slot.quantity.kind == "entropy"]
-        self._entropies = np.array(hot, dtype=int)
         self.active = bool(self._paths)
         self._still = ROUNDING * _capacity(problem) if self.active else 0.0
 
@@ -63,6 +62,15 @@ class Production:
             size = f"{made[worst]:.3g} J/K in the step to t = {t:.9g} s"
             raise SolveError(Outcome.ENTROPY, str(self._paths[worst]), size)
         self._last = (x, energies)
+
+
+def _watched(d: Descriptor) -> tuple[Index, Index, Index]:
+    """Numbers of the irreversible components, of those that are searched, and places of the entropies."""
+    makes = [isinstance(one, Irreversible) for one in d.numbering.primitives]
+    searched = [isinstance(one, Irreversible) and one.verdict != "proved" for one in d.numbering.primitives]
+    makers, watched = (np.flatnonzero(np.array(each)[d.numbering.primitive]) for each in (makes, searched))
+    hot = [slot.point.start for slot in d.states if slot.quantity.kind == "entropy"]
+    return makers, watched, np.array(hot, dtype=np.int64)
 
 
 def _capacity(problem: Problem) -> float:

@@ -105,12 +105,9 @@ class Model:
     def resting(self, chosen: Index) -> Index:
         """(components,) addresses; those of the chosen ones are of relations at rest, without derivatives, where they
         are compiled."""
-        n, found = self.descriptor.numbering, self.tables.address.copy()
-        numbers, places = np.unique(n.primitive[chosen], return_inverse=True)
-        kernels = [n.primitives[number].kernel for number in numbers.tolist()]
-        addresses = [0 if kernel is None else compiled(kernel.relation, rest=True).address for kernel in kernels]
-        has = np.array([kernel is not None for kernel in kernels], dtype=bool)[places]
-        found[chosen[has]] = np.array(addresses, dtype=np.int64)[places[has]]
+        found, d = self.tables.address.copy(), self.descriptor
+        at, addresses = once(d, ("resting", chosen.tobytes()), lambda: _resting(d, chosen))
+        found[at] = addresses
         return found
 
     def path_of(self, component: int) -> Path:
@@ -183,6 +180,16 @@ def compile_model(
     if any(primitive.kernel is None for primitive in descriptor.numbering.primitives):
         return made()  # an exception of a Python component belongs to one run
     return replace(once(descriptor, key, made), inputs=given)
+
+
+def _resting(d: Descriptor, chosen: Index) -> tuple[Index, Index]:
+    """Those of the chosen components whose relations are compiled, and their addresses at rest."""
+    n = d.numbering
+    numbers, places = np.unique(n.primitive[chosen], return_inverse=True)
+    kernels = [n.primitives[number].kernel for number in numbers.tolist()]
+    addresses = [0 if kernel is None else compiled(kernel.relation, rest=True).address for kernel in kernels]
+    has = np.array([kernel is not None for kernel in kernels], dtype=bool)[places]
+    return chosen[has], np.array(addresses, dtype=np.int64)[places[has]]
 
 
 def _compiled(d: Descriptor, reference: Reference, given: Mapping[Path, Input], *, matrix: bool) -> Model:

@@ -11,6 +11,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.descriptor.descriptor import Descriptor, Input
+from ephs.semantics.systems.kept import Kept, once
 from ephs.semantics.systems.system import System
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.motion_law import MotionLaw
@@ -264,6 +265,18 @@ class Problem:
     length: float = 1.0
     names: Mapping[Path, str] = field(default_factory=dict)
     remarks: Mapping[str, Any] = field(default_factory=lambda: {"form": "paper"})
+    _kept: Kept = field(default_factory=Kept, init=False, repr=False)
+
+    @property
+    def point(self) -> Array:
+        """(point_size,) the initial states, made once; not to be written to."""
+
+        def packed() -> Array:
+            out = self.descriptor.pack(self.initial)
+            out.flags.writeable = False
+            return out
+
+        return once(self, "point", packed)
 
     @property
     def mechanical(self) -> bool:

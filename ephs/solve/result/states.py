@@ -8,6 +8,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.pairs import Pair
+from ephs.semantics.systems.kept import once
 
 
 @final
@@ -15,7 +16,7 @@ class RecordedStates(Mapping[Path, Array]):
     """Columns of states x (n, point_size) by path, in `coordinates`."""
 
     def __init__(self, descriptor: Descriptor, x: Array) -> None:
-        self._slots, self.x = {slot.path: slot for slot in descriptor.states}, x
+        self._slots, self.x = once(descriptor, "slots", lambda: {slot.path: slot for slot in descriptor.states}), x
         self._read: dict[Path, Array] = {}
 
     def __getitem__(self, path: Path) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from ephs.operad import Quantity
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.primitives.primitives import Storage
+from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.findings import Audit
 from ephs.solve.auditing.passing import TURNED
@@ -168,8 +169,9 @@ def solution_of(
     """Kept part of a run, as a solution, with what makes its audit."""
     while problem.shown is not None:
         problem, record, stats = problem.shown(record, stats)
-    states = RecordedStates(problem.descriptor, record.x)
-    labels = {slot.path: labels_of(slot.quantity) for slot in problem.descriptor.states}
+    d = problem.descriptor
+    labels = once(d, "labels", lambda: {slot.path: labels_of(slot.quantity) for slot in d.states})
     return Solution(
-        problem.name, record.t, states, lambda: ledgers(problem, record), dict(stats), problem, labels, audited=audited
-    )
+        problem.name, record.t, RecordedStates(d, record.x), lambda: ledgers(problem, record), dict(stats), problem,
+        labels, audited=audited,
+    )  # fmt: skip

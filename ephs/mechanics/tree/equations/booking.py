@@ -12,7 +12,9 @@ from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.linear.sums import grown
+from ephs.semantics.stage import Table
 from ephs.semantics.stage.calling import Bound
+from ephs.semantics.systems.kept import once
 from ephs.solve.equations.model import STORING
 from ephs.solve.equations.sparse import Index
 from ephs.solve.posing.errors import Outcome, SolveError
@@ -28,14 +30,19 @@ class Booking:
 
     def __init__(self, equations: "ReducedEquations", paper: PaperStates) -> None:
         self._equations, self.paper = equations, paper
-        t, m = equations.model.tables, equations.model.memory()
+        m = equations.model.memory()
+        self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
+        self.storages, self._makers = once(equations.reduced, "booked", self._booked)
+
+    def _booked(self) -> tuple[Table[StorageRow], Index]:
+        """The storages, and the numbers of the components that make entropy."""
+        model, components = self._equations.model, self._equations.problem.descriptor.components
+        t = model.tables
         kept = np.flatnonzero(t.kind == STORING)
         places = np.stack([kept, t.parameter_at[kept], t.read_x_at[kept]], axis=1)
-        resting = equations.model.resting(kept)[kept]
-        self.storages = table_of(StorageRow, np.hstack([resting[:, None], t.dims[kept], places]))
-        self._memory = m.x, m.v, m.e, m.lam, m.f, m.c, m.jac, m.work
-        number = {slot.path: i for i, slot in enumerate(equations.problem.descriptor.components)}
-        self._makers = np.array([number[path] for path in equations.reduced.made], dtype=int)
+        rows = np.hstack([model.resting(kept)[kept][:, None], t.dims[kept], places])
+        number = {slot.path: i for i, slot in enumerate(components)}
+        return table_of(StorageRow, rows), np.array([number[path] for path in self._equations.reduced.made], dtype=int)
 
     def step(
         self,

@@ -51,7 +51,7 @@ class Led:
     def holds(self) -> bool:
         """Whether no degree of freedom is left."""
         d = self._problem.descriptor
-        return self._moved and not mobility(d, d.pack(self._problem.initial), self._problem.prescribed).mobility
+        return self._moved and not mobility(d, self._problem.point, self._problem.prescribed).mobility
 
     @property
     def counting(self) -> bool:

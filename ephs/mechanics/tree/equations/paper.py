@@ -14,7 +14,9 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3, manifold
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigen
+from ephs.semantics.stage import Table
 from ephs.semantics.stage.calling import Bound
+from ephs.semantics.systems.kept import once
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import Problem
 
@@ -37,15 +39,22 @@ class PaperStates:
         self._inertias = network.inertias
         self._turning = reduced.attaching.ports[[one.rate for one in network.inertias]]
         self._momentum = np.array([one.inertia * one.ratio for one in network.inertias])
-        slots = {slot.path: slot for slot in problem.descriptor.states}
-        self._paths: list[Path] = []
-        t, plan = reduced.tables, []
+        self._paths, plan, self._tables = once(reduced, "states", self._found)
+        self._plan = plan.copy()
+        self._memory = np.zeros((reduced.links + 1, 7)), np.zeros((reduced.links + 1, 6))
+        self._known = False
+        self.rest = problem.point
+
+    def _found(self) -> tuple[list[Path], NDArray[np.int64], tuple[Table[Walked], Table[Ends]]]:
+        """Paths and sources of the states, and the tables that these are made from."""
+        slots = {slot.path: slot for slot in self.problem.descriptor.states}
+        paths: list[Path] = []
+        reduced, t, plan = self.reduced, self.reduced.tables, []
         for path, source, number in self._sources():
             if path in slots:
-                self._paths.append(path)
+                paths.append(path)
                 start = int(t.q_at[number]) if source == ELEMENT else number
                 plan.append([source, start, slots[path].at, slots[path].quantity.space.size, 0])
-        self._plan = np.array(plan, dtype=np.int64).reshape(-1, Source.integer_width)
         walked, springs = slice(0, reduced.links), np.flatnonzero(t.kind == SPRING)
         joints = np.stack(
             [t.parent, *(column[walked] for column in (t.forward, t.code, t.dim, t.q_at, t.r_at))], axis=1
@@ -54,10 +63,8 @@ class PaperStates:
         bodies = np.hstack([*(column[walked] for column in frames), t.inertia.reshape(-1, 36)])
         ends = np.stack([t.first[springs], t.second[springs]], axis=1)
         offsets = np.hstack([t.offset1[springs], t.offset2[springs]])
-        self._tables = table_of(Walked, joints, bodies), table_of(Ends, ends, offsets)
-        self._memory = np.zeros((reduced.links + 1, 7)), np.zeros((reduced.links + 1, 6))
-        self._known = False
-        self.rest = problem.descriptor.pack(problem.initial)
+        sources = np.array(plan, dtype=np.int64).reshape(-1, Source.integer_width)
+        return paths, sources, (table_of(Walked, joints, bodies), table_of(Ends, ends, offsets))
 
     def _sources(self) -> Iterator[tuple[Path, int, int]]:
         """(path, where it comes from, number of the link, edge or entropy) of the states."""
@@ -98,10 +105,10 @@ class PaperStates:
         if not self._known and q.shape[0]:
             self._known = True
             first = self.rows(q[:1], r[:1], s[:1])[0]
-            for row in self._plan:
-                source, _, at, *_ = row.tolist()
-                # a pose has two quaternions: that one which is continuous with the initial one
-                row[-1] = source in (POSE, RELATIVE) and float(first[at : at + 4] @ self.rest[at : at + 4]) < 0.0
+            # a pose has two quaternions: that one which is continuous with the initial one
+            posed = np.isin(self._plan[:, 0], (POSE, RELATIVE))
+            at = self._plan[posed, 2, None] + np.arange(4)
+            self._plan[posed, -1] = (first[at] * self.rest[at]).sum(axis=1) < 0.0
         self.walked(q, r, self.stored(r, s), out)()
         return out
 

@@ -14,6 +14,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import listed
+from ephs.semantics.systems.kept import once
 from ephs.solve.equations.heats import PLAIN
 from ephs.solve.equations.sparse import Index
 from ephs.solve.posing.errors import OptionError
@@ -61,7 +62,11 @@ class Layout:
 
     @staticmethod
     def of(reduced: Reduced) -> "Layout":
-        """The layout of a system in joint coordinates."""
+        """The layout of a system in joint coordinates, made once."""
+        return once(reduced, "layout", lambda: Layout._made(reduced))
+
+    @staticmethod
+    def _made(reduced: Reduced) -> "Layout":
         t = reduced.tables
         taken = {edge.name for edge in reduced.edges if edge.name}
         edges: dict[str, list[tuple[int, Edge]]] = {}

@@ -43,12 +43,12 @@ def counted(reduced: Reduced, entry: int) -> tuple[str, str]:
 
 def tolerances(reduced: Reduced, tolerance: Tolerance, heat: float) -> Array:
     """A tolerance of what counts in errors: increments and rates of the tree, heats, in ``heat`` J per J/K, states."""
-    of_joints: list[Array] = []
+    of_joints: list[float] = []
     for edge in reduced.edges[: reduced.links]:
         path, kind = edge.state or Path(), "pose" if edge.path is None else "relative_pose"
-        of_joints.append(np.full(edge.pair.dim, tolerance.at(path, kind)))
+        of_joints += [tolerance.at(path, kind)] * edge.pair.dim
     states = reduced.attaching.network.states
     booked = reduced.entropies[: len(reduced.entropies) - len(states)]
     heats = [heat * tolerance.at(path, "entropy") for path in booked]
     plain = [tolerance.at(state.path, state.quantity.kind) for state in states]
-    return np.concatenate([*of_joints, *of_joints, np.array([*heats, *plain])])
+    return np.array([*of_joints, *of_joints, *heats, *plain])

@@ -17,6 +17,8 @@ from ephs.mechanics.tree.finding.roles import Role
 from ephs.mechanics.tree.finding.spanning import Edge, islands
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Irreversible, Primitive, Storage
 from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.systems.kept import once
@@ -24,6 +26,8 @@ from ephs.solve.posing.motion_law import MotionLaw, PolynomialMotion
 from ephs.solve.posing.problem import Problem, Signal
 
 FREE = pair("free")
+MOVING = ("momentum", "entropy")
+"""Kinds of states that parts do not depend on."""
 OF_COORDINATES = ("no_potential", "pair_spring", "beam_spring")
 """Energies of a free joint that may lead to a body; with others it is a force between two frames."""
 
@@ -90,9 +94,16 @@ def parts_of(problem: Problem) -> Parts:
 
 
 def determined_by(problem: Problem) -> Hashable:
-    """Key of the parts of a system: initial states, prescribed motions and names."""
+    """Key of the parts of a system: the initial configuration, prescribed motions and names."""
+    d = problem.descriptor
     motions = tuple((path, one.effort, _prescribed(one)) for path, one in problem.signals.items())
-    return problem.descriptor.pack(problem.initial).tobytes(), motions, tuple(problem.names.items())
+    return problem.point[once(d, "placed", lambda: _placed(d))].tobytes(), motions, tuple(problem.names.items())
+
+
+def _placed(descriptor: Descriptor) -> Index:
+    """Places of all states but those of `MOVING`."""
+    placed = [np.arange(s.point.start, s.point.stop) for s in descriptor.states if s.quantity.kind not in MOVING]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *placed])
 
 
 def _prescribed(signal: Signal) -> MotionLaw | bytes | None:
