@@ -12,7 +12,7 @@ derivatives; all else of a run is its start.
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -61,22 +61,28 @@ COLUMNS = {
 
 def report() -> Report:
     """Run every model by `ephs`, by MuJoCo, and scenes of contact by Drake where it is installed."""
-    found = find_spec("gymnasium")
-    if found is None or not found.submodule_search_locations:
-        return Report("gymnasium is not installed", [])
-    folder = Path(found.submodule_search_locations[0]) / "envs" / "mujoco" / "assets"
     rows: list[dict[str, Any]] = []
-    for name in MODELS:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            scene = ephs.load(folder / f"{name}.xml", contact=True)
-        rows += _beside(name, scene, (folder / f"{name}.xml").read_text(encoding="utf-8"), UNTIL)
+    for file, scene in robots(MODELS):
+        rows += _beside(file.stem, scene, file.read_text(encoding="utf-8"), UNTIL)
+    if not rows:
+        return Report("gymnasium is not installed", [])
     with tempfile.TemporaryDirectory() as here:
         for made in SCENES:
             given, file = made(), Path(here) / "scene.toml"
             file.write_text(given.scene, encoding="utf-8")
             rows += _beside(given.name, ephs.load(file), given.mjcf, given.until)
     return Report(table_of(rows, COLUMNS), rows)
+
+
+def robots(names: Sequence[str]) -> Iterator[tuple[Path, Any]]:
+    """Files and scenes, with contacts, of gymnasium's robots; none where it is not installed."""
+    found = find_spec("gymnasium")
+    folder = next(iter((found and found.submodule_search_locations) or ()), None)
+    for name in names if folder is not None else ():
+        file = Path(folder or "") / "envs" / "mujoco" / "assets" / f"{name}.xml"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield file, ephs.load(file, contact=True)
 
 
 def _beside(name: str, scene: Any, mjcf: str, until: float) -> list[dict[str, Any]]:

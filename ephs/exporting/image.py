@@ -21,6 +21,7 @@ from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces import codes
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
 from ephs.semantics.systems.system import System
@@ -31,8 +32,10 @@ from ephs.solve.running.control import ATOL, RTOL, first_step
 from ephs.solve.running.stepping import Span
 
 METHODS = ("rk54", "rk87")
-MEMORY = ("poses", "twists", "s", "stored", "out", "drive", "wrench")
-"""Arrays that evaluations or callers write."""
+POSE = tuple(f"quaternion.{part}" for part in "wxyz") + tuple(f"position.{part}" for part in "xyz")
+"""Names of the numbers of a pose, those of a rotation first."""
+MEMORY = ("poses", "twists", "s", "stored", "out")
+"""Arrays that evaluations write."""
 
 
 @final
@@ -136,13 +139,8 @@ def image_of(
     if method not in METHODS:
         raise ExportError("method", found=method, expected=" or ".join(METHODS))
 
-    def changed(values: Mapping[str, float]) -> Scene | System:
-        if isinstance(model, System):
-            return varied(model, values, strict=False)
-        return varied(model, values, strict=False)
-
     def made(values: Mapping[str, float]) -> Image:
-        return _started(changed(values), inputs, method, (rtol, atol, step), until)
+        return _started(varied(model, values, strict=False), inputs, method, (rtol, atol, step), until)
 
     found = _started(model, inputs, method, (rtol, atol, step), until)
     for path in parameters:
@@ -153,8 +151,19 @@ def image_of(
         return found
     start = {path: read(model, path) for path in parameters}
     dependences = dependence(start, lambda values: made(values).numbers)
+    for each in dependences:
+        _keep_apart(found, each, parameters)
     variables = tuple(ImageNumber(path, "", k, value) for k, (path, value) in enumerate(start.items()))
     return replace(found, parameters=variables, dependences=tuple(dependences))
+
+
+def _keep_apart(image: Image, number: ParameterPolynomial, parameters: Sequence[str]) -> None:
+    """Refuse a parameter that moves what an input sets."""
+    arrays = {id(image.drive): False, id(image.supply): True}
+    supplied, moved = arrays.get(id(image.numbers[number.array])), {i for key in number.terms for i in key}
+    for each in image.inputs:
+        if moved and (supplied, number.entry) in {(share.supplied, share.place) for share in each.shares}:
+            raise ExportError("input parameter", found=parameters[min(moved)], where=each.name)
 
 
 def _started(
@@ -264,23 +273,22 @@ def _control(eq: ReducedEquations, name: str, of: Actuator, driven: Callable[[st
 def _outputs(eq: ReducedEquations, values: Array) -> list[ImageNumber]:
     t, names = eq.reduced.tables, [""] * values.size
 
-    def add_outputs(first: int, size: int, name: str) -> None:
-        for k in range(size):
-            names[first + k] = name if size == 1 else f"{name}.{k}"
+    def add_outputs(first: int, path: object, parts: Sequence[str]) -> None:
+        names[first : first + len(parts)] = [f"{path}.{part}" for part in parts]
+
+    def counted(name: str, size: int) -> list[str]:
+        return [name if size == 1 else f"{name}.{k}" for k in range(size)]
 
     for i, edge in enumerate(eq.reduced.edges):
-        path = edge.path or edge.state or edge.name
-        if t.kind[i] != SPRING:
-            add_outputs(int(t.q_at[i]), int(t.q_size[i]), f"{path}.coordinate")
+        path, size = edge.path or edge.state or edge.name, edge.pair.size
+        if t.kind[i] != SPRING:  # elements that are rotations are no coordinates
+            turns = edge.pair.code in (codes.SO3, codes.SE3, codes.SO3xR3)
+            add_outputs(int(t.q_at[i]), path, POSE[:size] if turns else counted("coordinate", size))
         if i < eq.reduced.links:
-            add_outputs(eq.reduced.coordinates + int(t.r_at[i]), int(t.dim[i]), f"{path}.rate")
+            add_outputs(eq.reduced.coordinates + int(t.r_at[i]), path, counted("rate", edge.pair.dim))
     first = eq.reduced.coordinates + eq.n
     for i in range(eq.reduced.links):
-        body = eq.reduced.places[i].path
-        for k, part in enumerate(("w", "x", "y", "z")):
-            names[first + 7 * i + k] = f"{body}.quaternion.{part}"
-        for k, part in enumerate("xyz"):
-            names[first + 7 * i + 4 + k] = f"{body}.position.{part}"
+        add_outputs(first + 7 * i, eq.reduced.places[i].path, POSE)
     names[-1] = "energy"
     return [
         ImageNumber(name, "J" if name == "energy" else "m" if ".position." in name else "", k, float(values[k]))

@@ -12,8 +12,9 @@ import wasmtime
 import ephs
 from ephs.exporting.image import image_of
 from ephs.exporting.module import exported
-from ephs.mechanics.scene.parameters import varied
+from ephs.mechanics.scene.parameters import names, read, varied
 from tests.exporting.runs import Run
+from tests.mechanics.drawn_scenes import drawn, toml
 from tests.written import scene_of_text
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,12 +36,84 @@ int main(void) {{
 
 
 def wanted(solution, name):
-    """The number of a solution's last instant that an output names."""
-    kind, of, what, *part = name.split(".")
-    if kind == "joints":
-        values = np.atleast_1d(getattr(solution.joint(of), what)[-1])
-        return values[int(part[0]) if part else 0]
-    return getattr(solution.body(of), what)[-1][("wxyz" if what == "quaternion" else "xyz").index(part[0])]
+    """The number of a solution's last instant that an output names; rotations of joints as a quaternion."""
+    kind, of, what, *part = name.replace(".pe.q.", ".").split(".")
+    if kind == "bodies":
+        return getattr(solution.body(of), what)[-1][("wxyz" if what == "quaternion" else "xyz").index(part[0])]
+    joint = solution.joint(of)
+    if what == "position":
+        return joint.coordinate[-1][3 + "xyz".index(part[0])]
+    if what == "quaternion":
+        turn = joint.coordinate[-1][:3]
+        half = 0.5 * np.linalg.norm(turn)
+        return np.array([np.cos(half), *(0.5 * np.sinc(half / np.pi) * turn)])["wxyz".index(part[0])]
+    return np.atleast_1d(getattr(joint, what)[-1])[int(part[0]) if part else 0]
+
+
+def assert_named(outputs, solution, within):
+    """All outputs are what their names say; rotations up to the sign of their quaternions."""
+    for name, value in outputs.items():
+        if name.split(".")[0] not in ("bodies", "joints"):
+            continue
+        expected = wanted(solution, name)
+        if ".quaternion." in name:
+            value, expected = abs(value), abs(expected)
+        assert value == pytest.approx(expected, abs=within * (1.0 + abs(expected))), name
+
+
+def drawn_scene(seed):
+    tables = drawn(seed)
+    tables.pop("loads", None)
+    return scene_of_text(toml(tables))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_outputs_are_at_the_start_what_their_names_say(seed):
+    model = drawn_scene(seed)
+    outputs = {each.name: each.start for each in image_of(model).outputs}
+    assert {name.split(".")[0] for name in outputs} >= {"bodies", "joints"}
+    solution = ephs.simulate(model, 1e-9, save_at=[0.0], audit="off")
+    assert_named(outputs, solution, 1e-12)
+    with pytest.raises(AssertionError):  # the control
+        assert_named(outputs, ephs.simulate(model, 0.1, audit="off"), 1e-12)
+
+
+PUSHED = """
+[motors.winding]
+joint = "bearing"
+constant = 0.5
+resistance = 1.0
+voltage = 0.2
+"""
+
+
+@pytest.mark.parametrize("path", ["joints.bearing.drive", "motors.winding.voltage"])
+def test_parameters_of_what_drives_are_in_the_program(path):
+    """And nothing that an input sets is one."""
+    model = scene_of_text((ROOT / "scenes/slider-crank.toml").read_text() + PUSHED)
+    (number,) = image_of(model, parameters=[path]).dependences
+    assert number.constant == pytest.approx(read(model, path), rel=1e-12)
+    if path.startswith("joints"):
+        with pytest.raises(ephs.ExportError, match=r"joints\.bearing\.drive' belongs to the input 'joints\.bearing'"):
+            image_of(model, parameters=[path], inputs=["joints.bearing"])
+    else:
+        assert image_of(model, parameters=[path], inputs=["joints.bearing"]).dependences
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 2, 7])
+def test_drawn_scenes_are_exported(seed):
+    """With two of their numbers changed."""
+    model, run = drawn_scene(seed), {"method": "rk87", "rtol": 1e-9, "atol": 1e-11}
+    kinds = {path.split(".")[-1].partition("[")[0]: path for path in names(model) if read(model, path) > 0.0}
+    taken = [kinds[kind] for kind in ("drive", "voltage", "mass", "stiffness", "inertia") if kind in kinds]
+    values = {path: 1.03 * read(model, path) for path in taken[:2]}
+    made = Run(exported(image_of(model, **run, until=0.2, parameters=list(values)), "changed"))
+    made.call("parameters", None, np.array(list(values.values())))
+    assert made.call("advance", ctypes.c_int64, 0.2) == 0
+    assert_named(made.outputs(), ephs.simulate(varied(model, values), 0.2, **run), 1e-6)
+    with pytest.raises(AssertionError):  # the control
+        assert_named(made.outputs(), ephs.simulate(model, 0.2, **run), 1e-6)
 
 
 @pytest.mark.parametrize("scene", ["slider-crank", "heavy-top", "four-bar", "chain", "mbs", "motor-four-bar"])

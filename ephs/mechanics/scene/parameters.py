@@ -26,7 +26,7 @@ from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
 from ephs.semantics.systems.system import Filling, System
 
-Model = TypeVar("Model", Scene, System)
+Model = TypeVar("Model", bound=Scene | System)
 _INDEX = re.compile(r"((?:\[\d+\])*)$")
 _TABLE = re.compile(r"(\[\d+\])\.(\w+)$")
 """Number of a table in a list, and its key."""

@@ -213,8 +213,7 @@ class Site:
             Its ports -> junctions, as the methods above give them.
         initial
             States at the start by their paths in the filling, of what it does not carry and that is not zero; or a
-            function of the site that makes them. With functions, and nothing else that reads how bodies and joints
-            move, a scene in another state has the same system.
+            function of the site that makes them, with which scenes in other states may have the same system.
         """
         path = self._own(box)
         if callable(initial):

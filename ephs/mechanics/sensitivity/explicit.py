@@ -194,15 +194,14 @@ class ExplicitTangent:
         Raises
         ------
         OptionError
-            One reads the state.
+            One reads the state, as loads do that keep their direction while bodies turn.
         """
         try:
             self.equations.given.place(t, _Unread())
-        except SolveError as error:
-            if isinstance(error.__cause__, _StateReadSignal):
-                raise OptionError(
-                    "inputs", "a function that reads the state", "functions of time, or constants"
-                ) from error
+        except (SolveError, _StateReadSignal) as error:
+            if isinstance(error, _StateReadSignal) or isinstance(error.__cause__, _StateReadSignal):
+                known = "functions of time, or constants; loads in world axes and pressures read it"
+                raise OptionError("inputs", "a function that reads the state", known) from error
             raise
 
     def _put(self, tangent: StepTangent, point: StatePoint, which: slice, elements: str, others: str) -> None:

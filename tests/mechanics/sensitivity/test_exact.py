@@ -15,6 +15,7 @@ from ephs.mechanics.sensitivity.family import ParameterFamily, relation_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
+from tests.mechanics.ball import BALL
 from tests.mechanics.tree.engine.test_engine import moved
 from tests.written import scene_of_text
 
@@ -137,3 +138,12 @@ def test_inputs_of_time_are_taken_stage_by_stage():
         ephs.sensitivity(
             scene, ["bodies.coupler.mass"], 0.1, inputs={"joints.main": lambda t, s: -s.joints.main.rate}, method="rk54"
         )
+
+
+def test_loads_in_world_axes_are_refused():
+    """They read how bodies turn."""
+    load = '\n[loads.push]\nbody = "ball"\nforce = [1.0, 0.0, 0.0]\n'
+    scene = scene_of_text(BALL.format(slip=0.01) + load)
+    with pytest.raises(ephs.OptionError, match="loads in world axes"):
+        ephs.sensitivity(scene, ["bodies.ball.mass"], 0.01, method="rk54")
+    assert ephs.sensitivity(scene_of_text(BALL.format(slip=0.01)), ["bodies.ball.mass"], 0.01, method="rk54")
