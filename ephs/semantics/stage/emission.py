@@ -52,9 +52,9 @@ class FunctionWriter:
         """The type of a real number."""
         return self.typed("double")
 
-    def typed(self, scalar: str) -> str:
-        """Return the type of so many numbers of a scalar type as there are members."""
-        return scalar if self.width == 1 else f"<{self.width} x {scalar}>"
+    def typed(self, scalar: str, wide: bool = True) -> str:
+        """Return the type of so many numbers of a scalar type as there are members; of one where it is not wide."""
+        return f"<{self.width} x {scalar}>" if wide and self.width > 1 else scalar
 
     def fresh(self) -> str:
         """Return a name that was not used yet."""
@@ -191,19 +191,14 @@ class WholeSymbol(Count):
     name: str
     wide: bool = False
 
-    def _wide(self, left: Integer, right: Integer) -> bool:
-        return any(isinstance(side, WholeSymbol) and side.wide for side in (left, right))
-
     def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
-        to, wide = self.writer, self._wide(left, right)
-        kind = to.typed("i64") if wide else "i64"
-        a, b = to.of_integer(left, wide), to.of_integer(right, wide)
+        to, kind, a, b, wide = operands(self.writer, left, right)
         if operation in _WHOLE:
             return WholeSymbol(to, to.let(f"{_WHOLE[operation]} {kind} {a}, {b}"), wide)
         # The machine rounds towards zero: one less where the remainder's sign is not the divisor's.
         rest = to.let(f"srem {kind} {a}, {b}")
         zero = to.of_integer(0, wide)
-        truth = f"<{to.width} x i1>" if wide else "i1"
+        truth = to.typed("i1", wide)
         some = to.let(f"icmp ne {kind} {rest}, {zero}")
         mixed = to.let(f"icmp slt {kind} {to.let(f'xor {kind} {rest}, {b}')}, {zero}")
         less = to.let(f"and {truth} {some}, {mixed}")
@@ -215,10 +210,16 @@ class WholeSymbol(Count):
         return WholeSymbol(to, to.let(f"add {kind} {quotient}, {to.let(f'sext {truth} {less} to {kind}')}"), wide)
 
     def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
-        to, wide = self.writer, self._wide(left, right)
-        kind = to.typed("i64") if wide else "i64"
-        a, b = to.of_integer(left, wide), to.of_integer(right, wide)
+        to, kind, a, b, wide = operands(self.writer, left, right)
         return TruthSymbol(to, to.let(f"icmp s{_ORDER[order]} {kind} {a}, {b}"), wide)
+
+
+def operands(
+    to: FunctionWriter, left: Integer, right: Integer, wide: bool = False
+) -> tuple[FunctionWriter, str, str, str, bool]:
+    """The writer, the type and the operands of two integers, and whether there is one of each for each member."""
+    wide = wide or any(isinstance(side, WholeSymbol) and side.wide for side in (left, right))
+    return to, to.typed("i64", wide), to.of_integer(left, wide), to.of_integer(right, wide), wide
 
 
 @final

@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function
+from ephs.semantics.stage.layered import Based
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Count, Integer, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Part, Reached
@@ -43,7 +44,7 @@ class Local(Cells[Any]):
 
 
 @final
-class Unrolled(Evaluator):
+class Unrolled(Based):
     """Evaluation over another evaluator, with known loops unrolled.
 
     Parameters
@@ -208,23 +209,11 @@ class Unrolled(Evaluator):
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
         return self.base._constants(values, whole)
 
-    def _rehearse(self, body: Callable[[], None]) -> None:
-        self.base._rehearse(body)
-
     def _function(self, name: Function, *arguments: Real) -> Real:
         return self.base._function(name, *arguments)
 
     def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         return self.base.select(truth, one, other)
-
-    def _both(self, one: Truth, other: Truth) -> Truth:
-        return self.base.both(one, other)
-
-    def _negate(self, truth: StagedCondition) -> Truth:
-        return self.base.negate(truth)
-
-    def _same(self, one: Integer, other: Integer) -> Truth:
-        return self.base.same(one, other)
 
     def real(self, integer: Integer) -> Real:
         return self.base.real(integer)
