@@ -12,6 +12,7 @@ from gymnasium.vector.utils import batch_space
 from ephs.exporting.errors import ExportError
 from ephs.exporting.image import image_of
 from ephs.exporting.module import Exported, exported
+from ephs.exporting.outputs import within
 from ephs.exporting.running import Instances
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
@@ -74,9 +75,9 @@ class EnvironmentTask:
             until=period * horizon,
         )  # fmt: skip
         self.made: Exported = exported(image, "task")
-        seen = [each for each in self.made.outputs if any(_within(each.name, name) for name in outputs)]
+        seen = [each for each in self.made.outputs if any(within(each.name, name) for name in outputs)]
         for name in outputs:
-            if not any(_within(each.name, name) for each in self.made.outputs):
+            if not any(within(each.name, name) for each in self.made.outputs):
                 raise ExportError("output", found=name, expected=", ".join(each.name for each in self.made.outputs))
         self.names = tuple(each.name for each in seen)
         self.places = np.array([each.place for each in seen], dtype=int)
@@ -92,10 +93,6 @@ class EnvironmentTask:
     def drawn(self, rng: np.random.Generator) -> Array | None:
         """Parameters of an episode."""
         return rng.uniform(self.ranges[:, 0], self.ranges[:, 1]) if len(self.ranges) else None
-
-
-def _within(name: str, beginning: str) -> bool:
-    return name == beginning or name.startswith(f"{beginning}.")
 
 
 @final

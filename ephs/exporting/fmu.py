@@ -15,6 +15,7 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import tool
 from ephs.exporting.module import Exported, exported
+from ephs.exporting.outputs import within
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.objects import emitted
 from ephs.semantics.systems.system import System
@@ -75,9 +76,9 @@ def export_fmu(
         model, inputs=inputs, parameters=parameters, method=method, rtol=rtol, atol=atol, step=step, until=until
     )
     made = exported(image, path.stem.replace("-", "_"))
-    shown = [each for each in made.outputs if not outputs or any(_within(each.name, name) for name in outputs)]
+    shown = [each for each in made.outputs if not outputs or any(within(each.name, name) for name in outputs)]
     for name in outputs:
-        if not any(_within(each.name, name) for each in made.outputs):
+        if not any(within(each.name, name) for each in made.outputs):
             raise ExportError("output", found=name, expected=", ".join(each.name for each in made.outputs))
     token = f"{{{hashlib.sha256(made.text.encode()).hexdigest()[:32]}}}"
     description = _description(made, shown, token, (until, rtol))
@@ -94,10 +95,6 @@ def _file(name: str) -> ZipInfo:
     found = ZipInfo(name, _EPOCH)
     found.compress_type = ZIP_DEFLATED
     return found
-
-
-def _within(name: str, beginning: str) -> bool:
-    return name == beginning or name.startswith(f"{beginning}.")
 
 
 def _description(made: Exported, shown: Sequence[ImageNumber], token: str, experiment: tuple[float, float]) -> bytes:

@@ -2,7 +2,6 @@
 
 import html
 import re
-from importlib.resources import files
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -13,10 +12,12 @@ from ephs.show.motions.player import player
 from ephs.show.motions.sheets import sheets_of
 from ephs.show.motions.stage import stage_of
 from ephs.show.motions.still import still_svg
+from ephs.show.notebook import first_pose
 from ephs.show.plots.balances import balances
 from ephs.show.plots.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
 from ephs.show.plots.signals import PanelGroup, packed
 from ephs.show.plots.touching import contact_panels, contact_table
+from ephs.show.shared.page import asset
 
 ZERO = 1e-12
 """SI number below which a report writes 0."""
@@ -77,7 +78,7 @@ def write_report(sol: Any, directory: str | FilePath) -> FilePath:
             "<!DOCTYPE html>",
             '<html lang="en">',
             f'<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{name}</title>',
-            f'<link rel="icon" href="data:,"><style>{_asset("report.css")}{_asset("uplot.css")}</style></head>',
+            f'<link rel="icon" href="data:,"><style>{asset("report.css")}{asset("uplot.css")}</style></head>',
             f'<body><h1>{name}</h1><p class="lead">{_lead(sol, summary)}</p>',
             *[section for section in sections if section],
             "</body></html>",
@@ -169,13 +170,8 @@ def _final(summary: dict[str, Any]) -> str:
 def _schematic(sol: Any) -> str:
     if sol.outline is None or not len(sol.t):
         return ""
-    poses = {name: _pose(sol.body(name)) for name, _ in sol.outline.all_bodies()}
+    poses = {name: first_pose(sol.body(name)) for name, _ in sol.outline.all_bodies()}
     return f"<h2>Schematic</h2><figure>{still_svg(sol.outline, poses)}</figure>" if poses else ""
-
-
-def _pose(body: Any) -> Any:
-    """(7,) at the first instant."""
-    return np.concatenate([np.asarray(body.quaternion)[0], np.asarray(body.position)[0]])
 
 
 def _pattern(sol: Any) -> str:
@@ -209,12 +205,8 @@ def _plots(sol: Any) -> str:
         '<div id="signals-box"><nav id="picker"><input type="search" id="find" placeholder="find a signal"></nav>'
         '<div id="plots"></div></div>'
         f'<script type="application/json" id="signals">{data}</script>'
-        f"<script>{_asset('uplot.js')}</script><script>{_asset('plots.js')}</script><script>{_asset('report.js')}</script>"
+        f"<script>{asset('uplot.js')}</script><script>{asset('plots.js')}</script><script>{asset('report.js')}</script>"
     )
-
-
-def _asset(name: str) -> str:
-    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def _inline(picture: str) -> str:

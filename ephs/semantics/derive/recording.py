@@ -252,11 +252,11 @@ def _recordable(function: Callable[..., Any], depth: int = 0) -> Callable[..., A
     names = {n: function.__globals__[n] for n in function.__code__.co_names if n in function.__globals__}
     used = {n: new for n, old in names.items() if (new := _replaced(old, depth)) is not old}
     cells = function.__closure__ or ()
-    closed = [_replaced(cell.cell_contents, depth) if _filled(cell) else None for cell in cells]
-    same = all(not _filled(cell) or new is cell.cell_contents for cell, new in zip(cells, closed, strict=True))
+    closed = [_replaced(cell.cell_contents, depth) if filled(cell) else None for cell in cells]
+    same = all(not filled(cell) or new is cell.cell_contents for cell, new in zip(cells, closed, strict=True))
     if not used and same:
         return function
-    closure = tuple(types.CellType(new) if _filled(cell) else cell for cell, new in zip(cells, closed, strict=True))
+    closure = tuple(types.CellType(new) if filled(cell) else cell for cell, new in zip(cells, closed, strict=True))
     namespace = {**function.__globals__, **used}
     copy = types.FunctionType(function.__code__, namespace, function.__name__, function.__defaults__, closure)
     copy.__kwdefaults__ = function.__kwdefaults__
@@ -271,7 +271,8 @@ def _replaced(value: Any, depth: int) -> Any:
     return _recordable(value, depth + 1) if isinstance(value, types.FunctionType) else value
 
 
-def _filled(cell: Any) -> bool:
+def filled(cell: types.CellType) -> bool:
+    """Whether a variable that a function closes over has its value yet."""
     try:
         _ = cell.cell_contents
     except ValueError:

@@ -257,7 +257,7 @@ def _with_label(wire: Wire, port: str, sheet: Sheet) -> Wire:
     if not port:
         return wire
     text = sheet.write((port, ""), PORT_TYPE, beside(wire.points, (port, ""), PORT_TYPE))
-    return Wire(wire.title, wire.ends, wire.role, wire.power, wire.points, text)
+    return replace(wire, label=text)
 
 
 def _moved(point: Point, shift: Point) -> Point:
@@ -265,19 +265,12 @@ def _moved(point: Point, shift: Point) -> Point:
 
 
 def _shifted(text: Lettering, shift: Point) -> Lettering:
-    return Lettering(text.base, text.sub, _moved(text.at, shift), text.size, text.width)
+    return replace(text, at=_moved(text.at, shift))
 
 
 def _moved_wire(wire: Wire, shift: Point) -> Wire:
     label = _shifted(wire.label, shift) if wire.label is not None else None
-    return Wire(
-        wire.title,
-        wire.ends,
-        wire.role,
-        wire.power,
-        tuple(_moved(point, shift) for point in wire.points),
-        label,
-    )
+    return replace(wire, points=tuple(_moved(point, shift) for point in wire.points), label=label)
 
 
 def _box(disc: Disc, centre: Point) -> PlacedBox:

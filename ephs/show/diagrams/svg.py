@@ -51,7 +51,7 @@ def to_svg(placement: Placement) -> str:
             line.args["stroke-dasharray"] = "1.5 3" if wire.role == "link" else "4 3"
         line.append_title(wire.title)
         drawing.append(line)
-    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
+    for box in placement.drawn:
         group = svg.Group(class_=f"box {box.kind}" if box.path else f"legend {box.kind}")
         if box.path:
             group.append_title(title(box.path, box.kind))

@@ -57,7 +57,7 @@ def to_tikz(placement: Placement) -> str:
         body.append(
             rf"\draw{dash} {' -- '.join(_coordinates(point) for point in wire.points)}; % {_comment(wire.title)}"
         )
-    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
+    for box in placement.drawn:
         style = f"fill=ephs{box.kind},draw=ephs{box.kind}rim"
         what = box.path or f"legend: {box.kind}"
         body.append(rf"\filldraw[{style}] {_coordinates(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(what)}")
@@ -72,8 +72,7 @@ def to_tikz(placement: Placement) -> str:
             rf"\fill {_coordinates(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}"
         )
         body.append(_node(junction.label, ""))
-    body += [_node(wire.label, "text=gray,") for wire in placement.wires if wire.label is not None]
-    body += [_node(word, "text=gray,") for _, word in placement.legend]
+    body += [_node(text, "text=gray,") for text in placement.notes]
     body.append(r"\end{tikzpicture}")
     lines = [*head, r"\begin{document}", r"\hbox{%", *body, "}", r"\end{document}"]
     return "\n".join(lines) + "\n"

@@ -2,6 +2,7 @@
 
 import html
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path as FilePath
 from typing import final
 
@@ -40,3 +41,8 @@ class Page:
 
     def __repr__(self) -> str:
         return f"<Page {self.title!r}, {len(self.html) / 1e6:.1f} MB; save(path) writes it>"
+
+
+def asset(name: str) -> str:
+    """The text of a script or a style that comes with the package."""
+    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")
