@@ -9,10 +9,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ephs.exporting.errors import ExportError
 from ephs.exporting.image import image_of
 from ephs.exporting.module import Exported, exported
-from ephs.exporting.outputs import within
 from ephs.exporting.running import Instances
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.bundles.bundle import Array
@@ -75,10 +73,7 @@ class EnvironmentTask:
             until=period * horizon,
         )  # fmt: skip
         self.made: Exported = exported(image, "task")
-        seen = [each for each in self.made.outputs if any(within(each.name, name) for name in outputs)]
-        for name in outputs:
-            if not any(within(each.name, name) for each in self.made.outputs):
-                raise ExportError("output", found=name, expected=", ".join(each.name for each in self.made.outputs))
+        seen = self.made.chosen(outputs)
         self.names = tuple(each.name for each in seen)
         self.places = np.array([each.place for each in seen], dtype=int)
         if limits is None:

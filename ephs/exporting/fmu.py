@@ -15,7 +15,6 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.image import ImageNumber, image_of
 from ephs.exporting.linking import tool
 from ephs.exporting.module import Exported, exported
-from ephs.exporting.outputs import within
 from ephs.mechanics.scene.model import Scene
 from ephs.semantics.stage.objects import emitted
 from ephs.semantics.systems.system import System
@@ -76,10 +75,7 @@ def export_fmu(
         model, inputs=inputs, parameters=parameters, method=method, rtol=rtol, atol=atol, step=step, until=until
     )
     made = exported(image, path.stem.replace("-", "_"))
-    shown = [each for each in made.outputs if not outputs or any(within(each.name, name) for name in outputs)]
-    for name in outputs:
-        if not any(within(each.name, name) for each in made.outputs):
-            raise ExportError("output", found=name, expected=", ".join(each.name for each in made.outputs))
+    shown = made.chosen(outputs) if outputs else made.outputs
     token = f"{{{hashlib.sha256(made.text.encode()).hexdigest()[:32]}}}"
     description = _description(made, shown, token, (until, rtol))
     libraries = {platform: _library(made, token, *PLATFORMS[platform]) for platform in platforms}

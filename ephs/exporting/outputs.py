@@ -71,8 +71,3 @@ def _read(
 def outputs_program() -> Program:
     """Return the program."""
     return Program("outputs", read=Entry(_read))
-
-
-def within(name: str, beginning: str) -> bool:
-    """Whether an output's name is this one, or begins with its words."""
-    return name == beginning or name.startswith(f"{beginning}.")

@@ -13,11 +13,11 @@ from ephs.show.motions.sheets import sheets_of
 from ephs.show.motions.stage import stage_of
 from ephs.show.motions.still import still_svg
 from ephs.show.notebook import first_pose
-from ephs.show.plots.balances import balances
+from ephs.show.plots.balances import balances, number
 from ephs.show.plots.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
 from ephs.show.plots.signals import PanelGroup, packed
 from ephs.show.plots.touching import contact_panels, contact_table
-from ephs.show.shared.page import asset
+from ephs.show.shared.page import asset, wide_table
 
 ZERO = 1e-12
 """SI number below which a report writes 0."""
@@ -104,8 +104,7 @@ def _number(value: Any) -> str:
         return ", ".join(_number(each) for each in value)
     if isinstance(value, int):
         return str(value)
-    # Four figures are for reading; the whole numbers are in summary.json.
-    return f"{float(value):.4g}".replace("e-0", "e-").replace("-", "−")
+    return number(float(value))  # the whole numbers are in summary.json
 
 
 def _settled(value: Any) -> Any:
@@ -132,16 +131,10 @@ def _audit(summary: dict[str, Any]) -> str:
     findings: list[dict[str, Any]] = summary.get("audit", {}).get("findings", [])
     if not findings:
         return ""
-    rows = "".join(
-        f"<tr><th>{html.escape(found['law'])}</th><td>{_number(found['size'])}</td><td>{_number(found['allowed'])}</td>"
-        f"<td>{_number(found['at'])}</td><td>{html.escape(found['path'])}</td><td>{html.escape(found['advice'])}</td></tr>"
-        for found in findings
-    )
-    head = "".join(f"<th>{words}</th>" for words in ("law", "found", "allowed", "at [s]", "where", "what to do"))
-    return (
-        "<h2>The result does not pass its audit</h2>"
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-    )
+    keys = ("law", "size", "allowed", "at", "path", "advice")
+    rows = ([_number(found[key]) for key in keys] for found in findings)
+    head = ("law", "found", "allowed", "at [s]", "where", "what to do")
+    return f"<h2>The result does not pass its audit</h2>{wide_table(head, rows)}"
 
 
 def _final(summary: dict[str, Any]) -> str:
@@ -151,19 +144,11 @@ def _final(summary: dict[str, Any]) -> str:
         if not entries:
             continue
         fields = [(key, words) for kind, key, words in _FINAL if kind == group]
-        head = "".join(f"<th>{words}</th>" for _, words in fields)
-        rows = "".join(
-            "<tr><th>"
-            + html.escape(name)
-            + "</th>"
-            + "".join(f"<td>{_number(_settled(entry.get(key)))}</td>" for key, _ in fields)
-            + "</tr>"
+        rows = (
+            (html.escape(name), *(_number(_settled(entry.get(key))) for key, _ in fields))
             for name, entry in entries.items()
         )
-        tables.append(
-            f'<div class="wide"><table><thead><tr><th>{group}</th>{head}</tr></thead>'
-            f"<tbody>{rows}</tbody></table></div>"
-        )
+        tables.append(wide_table((group, *(words for _, words in fields)), rows))
     return f"<h2>At the end</h2>{'<p></p>'.join(tables)}" if tables else ""
 
 

@@ -115,11 +115,11 @@ class FunctionWriter:
         if isinstance(value, Symbol):
             self.own(value.writer)
             return value.name
-        return self.constant(_hexadecimal(_plain(value)), "double")
+        return self.constant(hexadecimal(_plain(value)), "double")
 
     def of_constant(self, value: float, whole: bool) -> str:
         """Return the operand of one known number, whatever the number of members."""
-        return str(_whole(int(value))) if whole else _hexadecimal(float(value))
+        return str(_whole(int(value))) if whole else hexadecimal(float(value))
 
     def of_integer(self, value: Integer, wide: bool = False) -> str:
         """Return the operand of an integer, one for each member where `wide`."""
@@ -155,7 +155,8 @@ def _whole(value: Integer) -> int:
     return int(value)
 
 
-def _hexadecimal(value: float) -> str:
+def hexadecimal(value: float) -> str:
+    """Return the operand of a known real number."""
     return "0x" + struct.pack(">d", value).hex().upper()
 
 

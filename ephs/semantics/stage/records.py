@@ -216,16 +216,13 @@ class Record:
 
     @final
     def __setattr__(self, name: str, value: object) -> None:
-        field = getattr(type(self), name, None)
-        if not isinstance(field, _RecordField):
-            fields = [key for key, field in vars(type(self)).items() if isinstance(field, _RecordField)]
-            raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
+        if not isinstance(getattr(type(self), name, None), _RecordField):
+            raise _no_field(type(self), name)
         object.__setattr__(self, name, value)
 
     @final
     def __getattr__(self, name: str) -> Any:
-        fields = [key for key, field in vars(type(self)).items() if isinstance(field, _RecordField)]
-        raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
+        raise _no_field(type(self), name)
 
     @final
     @classmethod
@@ -237,6 +234,11 @@ class Record:
             ArrayReals(np.zeros((size * cls.real_width, *([] if members is None else [members])))),
             size,
         )
+
+
+def _no_field(cls: type[Record], name: str) -> StageError:
+    fields = [key for key, field in vars(cls).items() if isinstance(field, _RecordField)]
+    return StageError("field", record=cls.__name__, found=name, expected=", ".join(fields))
 
 
 Row = TypeVar("Row", bound=Record)

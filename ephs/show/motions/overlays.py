@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.show.motions.motion import Array, Film, between_instants, nearest, point_of, rotate
-from ephs.show.motions.sheets import sheets_of
+from ephs.show.motions.sheets import normals, sheets_of
 from ephs.show.motions.symbols import METAL, Colour
 from ephs.show.shared.errors import ShowError
 
@@ -233,8 +233,7 @@ def _stresses(sol: Any, frames: Film, colour: str) -> tuple[Shades, ...]:
     for name in sheets_of(sol.outline):
         motion = sol.shell(name)
         if colour == "energy":
-            corner = motion.position[0][motion.cells]
-            across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+            across = normals(motion.position[0][motion.cells])
             values = motion.energy / (0.5 * np.linalg.norm(across, axis=1))
         else:
             given = getattr(motion, colour)
