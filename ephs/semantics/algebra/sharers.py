@@ -199,7 +199,7 @@ def _tangent(element: Sharer) -> Sharer:
             for state, n in element.states.items()
             for value in (values[state],)
         }
-        found = {state: tuple(map(Dual.of, rate)) for state, rate in element.rates(dual).items()}
+        found = {state: tuple(map(Dual.constant, rate)) for state, rate in element.rates(dual).items()}
         return {state: (*(d.value for d in rate), *(d.slope for d in rate)) for state, rate in found.items()}
 
     return Sharer(element.interface, {state: 2 * n for state, n in element.states.items()}, element.shows, rates)

@@ -64,10 +64,10 @@ class FunctionWriter:
     def let(self, text: str) -> str:
         """Write an instruction and return the name of its result."""
         name = self.fresh()
-        self.do(f"{name} = {text}")
+        self.write(f"{name} = {text}")
         return name
 
-    def do(self, text: str) -> None:
+    def write(self, text: str) -> None:
         """Write an instruction."""
         if len(self.lines) >= LIMIT:
             raise StageError("endless", limit=LIMIT)
@@ -83,13 +83,13 @@ class FunctionWriter:
         """Return a name for a block."""
         return self.fresh()[1:]
 
-    def go(self, label: str) -> None:
+    def jump(self, label: str) -> None:
         """Branch to a block."""
-        self.do(f"br label %{label}")
+        self.write(f"br label %{label}")
 
     def fork(self, condition: str, yes: str, no: str) -> None:
         """Branch to one of two blocks."""
-        self.do(f"br i1 {condition}, label %{yes}, label %{no}")
+        self.write(f"br i1 {condition}, label %{yes}, label %{no}")
 
     def begin(self, label: str) -> None:
         """Begin a block."""
@@ -242,14 +242,14 @@ class RealPointer(RealCells):
     name: str
     shared: bool = False
 
-    def _at(self, kind: str, index: Integer) -> str:
+    def _address(self, kind: str, index: Integer) -> str:
         to = self.writer
         return to.let(f"getelementptr inbounds {kind}, ptr {self.name}, i64 {to.of_integer(index)}")
 
     def load(self, index: Integer) -> Real:
         """Return the number at an index."""
         to, kind = self.writer, "double" if self.shared else self.writer.real
-        found = to.let(f"load {kind}, ptr {self._at(kind, index)}, align 8")
+        found = to.let(f"load {kind}, ptr {self._address(kind, index)}, align 8")
         return Symbol(to, to.spread(found, "double") if self.shared else found)
 
     def store(self, index: Integer, value: Real) -> None:
@@ -258,7 +258,7 @@ class RealPointer(RealCells):
         if self.shared and to.width > 1:
             raise StageError("shared")
         operand = to.of_real(value)
-        to.do(f"store {to.real} {operand}, ptr {self._at(to.real, index)}, align 8")
+        to.write(f"store {to.real} {operand}, ptr {self._address(to.real, index)}, align 8")
 
 
 @final
@@ -269,15 +269,15 @@ class IntegerPointer(IntegerCells):
     writer: FunctionWriter
     name: str
 
-    def _at(self, index: Integer) -> str:
+    def _address(self, index: Integer) -> str:
         to = self.writer
         return to.let(f"getelementptr inbounds i64, ptr {self.name}, i64 {to.of_integer(index)}")
 
     def load(self, index: Integer) -> Integer:
         to = self.writer
-        return WholeSymbol(to, to.let(f"load i64, ptr {self._at(index)}, align 8"))
+        return WholeSymbol(to, to.let(f"load i64, ptr {self._address(index)}, align 8"))
 
     def store(self, index: Integer, value: Integer) -> None:
         to = self.writer
         operand = to.of_integer(value)
-        to.do(f"store i64 {operand}, ptr {self._at(index)}, align 8")
+        to.write(f"store i64 {operand}, ptr {self._address(index)}, align 8")

@@ -98,7 +98,7 @@ class Machine(Evaluator):
                 for place, (kind, operand) in enumerate(leaves):
                     value = to.let(f"insertvalue {returns} {value}, {kind} {operand}, {place}")
                 last = f"ret {returns} {value}"
-            to.do(last)
+            to.write(last)
             head = f"define {linkage}{returns} @{name}({', '.join(parameters)}) {{\nentry:"
             self._functions.append("\n".join([head, *to.slots, *to.lines, "}"]))
         return returns, form
@@ -203,10 +203,10 @@ class Machine(Evaluator):
         first, last = to.of_integer(start), to.of_integer(count)
         head, inner, out = to.label(), to.label(), to.label()
         before = to.block
-        to.go(head)
+        to.jump(head)
         to.begin(head)
         index, following = to.fresh(), to.fresh()
-        to.do("")
+        to.write("")
         place = len(to.lines) - 1
         to.fork(to.let(f"icmp slt i64 {index}, {last}"), inner, out)
         to.begin(inner)
@@ -216,9 +216,9 @@ class Machine(Evaluator):
             body(WholeSymbol(to, to.let(f"sub i64 {to.let(f'sub i64 {ends}, 1')}, {index}")))
         else:
             body(WholeSymbol(to, index))
-        to.do(f"{following} = add nsw i64 {index}, 1")
+        to.write(f"{following} = add nsw i64 {index}, 1")
         to.lines[place] = f"  {index} = phi i64 [ {first}, %{before} ], [ {following}, %{to.block} ]"
-        to.go(head)
+        to.jump(head)
         to.begin(out)
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
@@ -233,17 +233,17 @@ class Machine(Evaluator):
         to.fork(self._single(truth, "on.when"), one, out if no is None else other)
         to.begin(one)
         yes()
-        to.go(out)
+        to.jump(out)
         if no is not None:
             to.begin(other)
             no()
-            to.go(out)
+            to.jump(out)
         to.begin(out)
 
     def repeat(self, body: Callable[[], Truth]) -> None:
         to = self.to
         inner, out = to.label(), to.label()
-        to.go(inner)
+        to.jump(inner)
         to.begin(inner)
         truth = body()
         to.fork(self._single(truth, "on.repeat"), out, inner)
@@ -286,7 +286,7 @@ class Machine(Evaluator):
         operands = ", ".join(f"{kind} {operand}" for kind, operand in passed)
         call = f"call fastcc {emitted.returns} @{emitted.name}({operands})"
         if emitted.returns == "void":
-            to.do(call)
+            to.write(call)
             return _shaped(to, emitted.form, iter(()))
         value = to.let(call)
         if not emitted.returns.startswith("{"):
@@ -312,7 +312,7 @@ class Machine(Evaluator):
         pointer = to.let(f"inttoptr i64 {to.of_integer(function.address)} to ptr")
         if function.signature.returns:
             return WholeSymbol(to, to.let(f"call i64 {pointer}({', '.join(operands)})"))
-        to.do(f"call void {pointer}({', '.join(operands)})")
+        to.write(f"call void {pointer}({', '.join(operands)})")
         return 0
 
     def _emit(self, on: Evaluator, function: Callable[..., Any], form: Any, kinds: list[str]) -> _Emitted:

@@ -58,7 +58,7 @@ class Unrolled(Based):
         self._journals: list[dict[Place, Any]] = []
         self._births = 0
 
-    def held(self, part: Any) -> Any:
+    def as_cells(self, part: Any) -> Any:
         """Return an array as cells that start with its numbers, or a number as it is; division by zero follows IEEE."""
         if not isinstance(part, np.ndarray):
             return part
@@ -93,7 +93,7 @@ class Unrolled(Based):
         places = self._changed(lambda: self.base.loop(count, body, start, down))
         slots = self._slots(places)
         self.base.loop(count, lambda index: self._through(slots, lambda: body(index)), start, down)
-        self._settle(slots)
+        self._fetch(slots)
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
         if not isinstance(truth, StagedCondition):
@@ -112,7 +112,7 @@ class Unrolled(Based):
             if isinstance(found[0], StagedCondition):
                 slots = self._slots(places)
                 self.base.repeat(lambda slots=slots: self._through(slots, body))
-                self._settle(slots)
+                self._fetch(slots)
                 return
             if body():
                 return
@@ -135,7 +135,7 @@ class Unrolled(Based):
                 slots[place].store(0, old)
 
         self.base.when(truth, inside, outside)
-        self._settle(slots)
+        self._fetch(slots)
 
     def _run(self, body: Callable[[], Any]) -> dict[Place, Any]:
         """Run a body and return the places that it changed, with their former numbers."""
@@ -194,7 +194,7 @@ class Unrolled(Based):
             cells.entries[index] = old
         return results[0]
 
-    def _settle(self, slots: dict[Place, Cells[Any]]) -> None:
+    def _fetch(self, slots: dict[Place, Cells[Any]]) -> None:
         for (cells, index), slot in slots.items():
             cells.store(index, slot.load(0))
 

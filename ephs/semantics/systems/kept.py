@@ -24,7 +24,7 @@ class Kept:
         self._found: dict[Hashable, Any] = {}
         self._lock = Lock()
 
-    def of(self, key: Hashable, make: Callable[[], T]) -> T:
+    def result(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return the result of this key, computed if it is absent; exceptions are not cached."""
         found = self._found.get(key)
         if found is not None:
@@ -42,4 +42,4 @@ class Kept:
 
 def once(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
     """Return the result for a frozen value with a slot ``_kept`` and a key, computed once."""
-    return cast("Kept", owner._kept).of(key, make)
+    return cast("Kept", owner._kept).result(key, make)
