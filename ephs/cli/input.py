@@ -141,7 +141,7 @@ class Stepping:
 AS_CHOSEN = Stepping()
 
 
-def require_ending(file: Path, endings: Sequence[str]) -> None:
+def require_ending(file: Path, endings: Sequence[str], hint: str = "") -> None:
     """Refuse a file to write with another ending than these.
 
     Raises
@@ -151,7 +151,7 @@ def require_ending(file: Path, endings: Sequence[str]) -> None:
     """
     if file.suffix not in endings:
         found = TEXTS["suffix"].format(found=file, ending=file.suffix or "none", expected=", ".join(endings))
-        raise BadInput(found)
+        raise BadInput(found + hint)
 
 
 def load_drawable(scene: str, loading: LoadOptions = AS_GIVEN) -> "Scene | System | Pattern":

@@ -292,14 +292,7 @@ def irreversible(
         return defined(name, "the matrix M", recorded(x, e, reference), given)
 
     return Irreversible(
-        name,
-        interface,
-        evaluate,
-        reads,
-        kernel=kernel,
-        formula=formula,
-        domain=bounds,
-        one_sided=one_sided,
+        name, interface, evaluate, reads, kernel=kernel, formula=formula, domain=bounds, one_sided=one_sided
     )
 
 

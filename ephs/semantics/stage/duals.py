@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.evaluator import Evaluator, Function
-from ephs.semantics.stage.layered import Layered
+from ephs.semantics.stage.evaluator import Evaluator, Function, Layered
 from ephs.semantics.stage.memory import Cells, RealCells
 from ephs.semantics.stage.numbers import ORDERS, Integer, Number, Operation, Order, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Part

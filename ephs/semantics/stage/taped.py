@@ -12,8 +12,7 @@ from typing import Any, Final, TypeAlias, cast, final
 
 from ephs.semantics.stage.duals import RULES
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.evaluator import Evaluator, Function
-from ephs.semantics.stage.layered import Layered
+from ephs.semantics.stage.evaluator import Evaluator, Function, Layered
 from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells, Variable, Vector
 from ephs.semantics.stage.numbers import ORDERS, Integer, Number, Operation, Order, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Part

@@ -11,8 +11,7 @@ from typing import Any, Final, TypeAlias, cast, final
 import numpy as np
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.evaluator import Evaluator, Function
-from ephs.semantics.stage.layered import Based
+from ephs.semantics.stage.evaluator import Based, Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Count, Integer, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Part, Reached

@@ -132,21 +132,21 @@ class Placement:
         bottom = max([top + height, *(box.at[1] + box.radius for box, _ in self.legend)])
         return (right + left, bottom + top)
 
-    @property
-    def drawn(self) -> tuple[PlacedBox, ...]:
-        """All boxes, those of the legend last."""
-        return (*self.boxes, *(box for box, _ in self.legend))
-
-    @property
-    def notes(self) -> tuple[Lettering, ...]:
-        """Names of ports on wires, and words of the legend."""
-        names = (wire.label for wire in self.wires if wire.label is not None)
-        return (*names, *(word for _, word in self.legend))
-
     def nodes(self) -> dict[str, tuple[Point, float]]:
         """Centre and radius of every box and junction, by path."""
         boxes = {box.path: (box.at, box.radius) for box in self.boxes}
         return boxes | {junction.path: (junction.at, junction.radius) for junction in self.junctions}
+
+
+def all_boxes(placement: Placement) -> tuple[PlacedBox, ...]:
+    """The boxes of a picture, those of its legend last."""
+    return (*placement.boxes, *(box for box, _ in placement.legend))
+
+
+def notes_of(placement: Placement) -> tuple[Lettering, ...]:
+    """Names of ports on wires, and words of the legend."""
+    names = (wire.label for wire in placement.wires if wire.label is not None)
+    return (*names, *(word for _, word in placement.legend))
 
 
 def distances(point: Points, starts: Points, ends: Points) -> Points:

@@ -30,7 +30,7 @@ from ephs.show.diagrams.geometry import (
     faults,
     hatching,
 )
-from ephs.show.diagrams.graph import DOT, TYPE, Disc, Graph, UnplacedWire, read, width_of
+from ephs.show.diagrams.graph import DOT, TYPE, Disc, Graph, UnplacedWire, places_of, read, width_of
 from ephs.show.diagrams.legend import legend
 from ephs.show.diagrams.lettering import Sheet, around, beside
 from ephs.show.diagrams.routing import bulged, route, straight, trimmed
@@ -114,7 +114,7 @@ def _roomy(page: _DrawnGraph, points: Points, first: Placement | None = None) ->
 
 def _picture(page: _DrawnGraph, points: Points, room: float = 1.0) -> Placement:
     graph, radii = page.graph, page.graph.radii()
-    at = {path: (float(x), float(y)) for path, (x, y) in zip(radii, points, strict=True)}
+    at = places_of(radii, points)
     regions = opening.regions(page.members, at, radii)
     field = _PlacedNodes(at, radii, regions)
     wires = [_wire(edge, line, None) for edge, line in _inner_lines(graph, field, 16.0 * room)]

@@ -92,7 +92,7 @@ def test_power_is_the_same_on_both_sides_of_a_map(seed):
     assert [block.sort for block in maps.blocks] == ["frame", "any", "same", "any"]
     rows = maps.rows(numbers)
     for block, matrix, found in zip(maps.blocks, matrices, rows, strict=True):
-        assert np.array_equal(np.array(found).reshape(matrix.shape), matrix) and block == Block.of(matrix)
+        assert np.array_equal(np.array(found).reshape(matrix.shape), matrix) and block == Block.of_matrix(matrix)
     e, f = rng.standard_normal(maps.outside), rng.standard_normal(maps.inside)
     inward, outward = np.array(maps.inward(rows, e.tolist())), np.array(maps.outward(rows, f.tolist()))
     terms = np.abs(f) @ np.abs(inward) + np.abs(outward) @ np.abs(e)
