@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ephs.cli.input import TEXTS, BadInput, addressed, solution_of
+from ephs.cli.input import BadInput, addressed, require_ending, solution_of
 
 Flag = Annotated[bool, Parameter(negative=())]
 
@@ -44,9 +44,7 @@ def animate(
     from ephs.show import write_video
     from ephs.show.motions.video import VIDEOS
 
-    if output.suffix not in (".html", *VIDEOS):
-        expected = ", ".join((".html", *VIDEOS))
-        raise BadInput(TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=expected))
+    require_ending(output, (".html", *VIDEOS))
     if output.suffix in VIDEOS and wrenches:
         raise BadInput(f"--wrenches: found a video, {output}, expected a page, FILE.html; leave the option out")
     sol = solution_of(folder)

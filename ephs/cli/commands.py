@@ -28,6 +28,7 @@ from ephs.cli.input import (
     load_drawable,
     load_model,
     noted,
+    require_ending,
 )
 from ephs.cli.linear import linearizing
 from ephs.cli.nearest import did_you_mean
@@ -182,11 +183,7 @@ def draw(
     """
     import ephs
 
-    if output.suffix not in _PICTURES:
-        hint = did_you_mean(output.suffix, _PICTURES)
-        raise BadInput(
-            TEXTS["suffix"].format(found=output, ending=output.suffix or "none", expected=", ".join(_PICTURES)) + hint
-        )
+    require_ending(output, _PICTURES, did_you_mean(output.suffix, _PICTURES))
     model = load_drawable(scene, loading)
     if flat and isinstance(model, ephs.Pattern):
         raise BadInput(TEXTS["no-parts"].format(found=scene))

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
-from ephs.cli.input import AS_GIVEN, BadInput, LoadOptions, addressed, load_model, naming, say
+from ephs.cli.input import AS_GIVEN, LoadOptions, addressed, load_model, say
 
 exports = App(name="export", help="Write a mechanism as a program without Python: C, object code, WebAssembly.")
 units = App(name="fmu", help="Write a mechanism as a unit of FMI 3.0 for co-simulation.")
@@ -126,17 +126,12 @@ def _written(
     options: tuple[str, str, float | None, float | None],
 ) -> int:  # fmt: skip
     """Write a model, and print its variables."""
-    import ephs
-
     model = load_model(scene, loading)
     inputs, parameters, rtol, atol = options
     given = {"inputs": _listed(inputs), "parameters": _listed(parameters)}
     tolerances = {key: x for key, x in (("rtol", rtol), ("atol", atol)) if x is not None}
-    try:
-        with addressed(scene, out):
-            made = write(model, {**given, **tolerances})
-    except ephs.ExportError as error:
-        raise BadInput(naming(scene, str(error))) from error
+    with addressed(scene, out):
+        made = write(model, {**given, **tolerances})
     for kind, variables in (("input", made.inputs), ("parameter", made.parameters), ("output", made.outputs)):
         for place, variable in enumerate(variables):
             say(f"{kind:9} {place:4} {variable.name:40} {variable.start:>14.6g} {variable.unit}".rstrip())

@@ -141,6 +141,19 @@ class Stepping:
 AS_CHOSEN = Stepping()
 
 
+def require_ending(file: Path, endings: Sequence[str], hint: str = "") -> None:
+    """Refuse a file to write with another ending than these.
+
+    Raises
+    ------
+    BadInput
+        It says which endings there are.
+    """
+    if file.suffix not in endings:
+        found = TEXTS["suffix"].format(found=file, ending=file.suffix or "none", expected=", ".join(endings))
+        raise BadInput(found + hint)
+
+
 def load_drawable(scene: str, loading: LoadOptions = AS_GIVEN) -> "Scene | System | Pattern":
     """As `load_model`; NAME may be that of a Pattern, too."""
     from ephs import Pattern

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ephs.cli.input import TEXTS, BadInput, addressed, say, solution_of
+from ephs.cli.input import addressed, require_ending, say, solution_of
 
 _FIGURES = (".svg", ".png", ".pdf")
 
@@ -31,10 +31,7 @@ def plot(
     from ephs.show.plots.chosen import plot_signals, signal_names
 
     target = output or (folder.parent if folder.suffix == ".nc" else folder) / "signals.svg"
-    if target.suffix not in _FIGURES:
-        raise BadInput(
-            TEXTS["suffix"].format(found=target, ending=target.suffix or "none", expected=", ".join(_FIGURES))
-        )
+    require_ending(target, _FIGURES)
     sol = solution_of(folder)
     if not signals:
         say(*_listing(dict.fromkeys(signal_names(sol))))

@@ -166,11 +166,8 @@ def _write_live(model: Any, scene: str, page: Path, until: float) -> None:
     """Write a page that simulates."""
     import ephs
 
-    try:
-        with addressed(scene, page):
-            ephs.live_page(model, until=until).save(page)
-    except ephs.ExportError as error:
-        raise BadInput(naming(scene, str(error))) from error
+    with addressed(scene, page):
+        ephs.live_page(model, until=until).save(page)
     say(f"live: {page}")
 
 

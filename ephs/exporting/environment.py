@@ -9,7 +9,6 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ephs.exporting.errors import ExportError
 from ephs.exporting.image import image_of
 from ephs.exporting.module import Exported, exported
 from ephs.exporting.running import Instances
@@ -74,10 +73,7 @@ class EnvironmentTask:
             until=period * horizon,
         )  # fmt: skip
         self.made: Exported = exported(image, "task")
-        seen = [each for each in self.made.outputs if any(_within(each.name, name) for name in outputs)]
-        for name in outputs:
-            if not any(_within(each.name, name) for each in self.made.outputs):
-                raise ExportError("output", found=name, expected=", ".join(each.name for each in self.made.outputs))
+        seen = self.made.chosen(outputs)
         self.names = tuple(each.name for each in seen)
         self.places = np.array([each.place for each in seen], dtype=int)
         if limits is None:
@@ -92,10 +88,6 @@ class EnvironmentTask:
     def drawn(self, rng: np.random.Generator) -> Array | None:
         """Parameters of an episode."""
         return rng.uniform(self.ranges[:, 0], self.ranges[:, 1]) if len(self.ranges) else None
-
-
-def _within(name: str, beginning: str) -> bool:
-    return name == beginning or name.startswith(f"{beginning}.")
 
 
 @final

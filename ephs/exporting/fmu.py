@@ -75,10 +75,7 @@ def export_fmu(
         model, inputs=inputs, parameters=parameters, method=method, rtol=rtol, atol=atol, step=step, until=until
     )
     made = exported(image, path.stem.replace("-", "_"))
-    shown = [each for each in made.outputs if not outputs or any(_within(each.name, name) for name in outputs)]
-    for name in outputs:
-        if not any(_within(each.name, name) for each in made.outputs):
-            raise ExportError("output", found=name, expected=", ".join(each.name for each in made.outputs))
+    shown = made.chosen(outputs) if outputs else made.outputs
     token = f"{{{hashlib.sha256(made.text.encode()).hexdigest()[:32]}}}"
     description = _description(made, shown, token, (until, rtol))
     libraries = {platform: _library(made, token, *PLATFORMS[platform]) for platform in platforms}
@@ -94,10 +91,6 @@ def _file(name: str) -> ZipInfo:
     found = ZipInfo(name, _EPOCH)
     found.compress_type = ZIP_DEFLATED
     return found
-
-
-def _within(name: str, beginning: str) -> bool:
-    return name == beginning or name.startswith(f"{beginning}.")
 
 
 def _description(made: Exported, shown: Sequence[ImageNumber], token: str, experiment: tuple[float, float]) -> bytes:

@@ -5,7 +5,7 @@ The memory of one instance is one block: real numbers first, then integers. Four
 
 import math
 import re
-import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, final
 
@@ -15,6 +15,7 @@ from ephs.exporting.errors import ExportError
 from ephs.exporting.image import Image, ImageNumber
 from ephs.semantics.stage import Program
 from ephs.semantics.stage.calling import Bound
+from ephs.semantics.stage.emission import hexadecimal
 from ephs.semantics.stage.programs import located
 from ephs.solve.march import Ending, MarchControl
 
@@ -48,6 +49,19 @@ class Exported:
     accelerations: int
     functions: tuple[int, ...]
 
+    def chosen(self, names: Sequence[str]) -> list[ImageNumber]:
+        """The outputs of these names, or whose names begin so.
+
+        Raises
+        ------
+        ExportError
+            There is none of some name.
+        """
+        for name in names:
+            if not any(_within(each.name, name) for each in self.outputs):
+                raise ExportError("output", found=name, expected=", ".join(each.name for each in self.outputs))
+        return [each for each in self.outputs if any(_within(each.name, name) for name in names)]
+
     def header(self) -> str:
         """Return declarations in C."""
 
@@ -64,6 +78,10 @@ class Exported:
             inputs=table("Inputs", self.inputs), outputs=table("Outputs", self.outputs), paused=int(Ending.PAUSED),
             careful=int(Ending.CAREFUL), short=int(Ending.SHORT), refused=int(Ending.REFUSED),
         )  # fmt: skip
+
+
+def _within(name: str, beginning: str) -> bool:
+    return name == beginning or name.startswith(f"{beginning}.")
 
 
 def exported(image: Image, name: str) -> Exported:
@@ -143,7 +161,7 @@ class _ModuleText:
             if isinstance(part, np.ndarray):
                 found.append(f"ptr {own.get(id(part)) or self.pointer(*self.place(part), lines)}")
             elif isinstance(part, float):
-                found.append(f"double {_hexadecimal(part)}")
+                found.append(f"double {hexadecimal(part)}")
             else:
                 found.append(f"i64 {int(part)}")
         if last is not None:
@@ -185,7 +203,7 @@ class _ModuleText:
         integers = np.concatenate([np.zeros(0, dtype=np.int64), *(each.ravel() for each in self.integers)])
         for kind, at, _ in self.functions:
             (reals if kind == "double" else integers)[at] = 0
-        real = ", ".join(f"double {_hexadecimal(value)}" for value in reals.tolist())
+        real = ", ".join(f"double {hexadecimal(value)}" for value in reals.tolist())
         whole = ", ".join(f"i64 {value}" for value in integers.tolist())
         return [
             f"@reals = internal constant [{reals.size} x double] [{real}]",
@@ -209,6 +227,11 @@ class _ModuleText:
             *lines, "  ret void", "}",
         ])  # fmt: skip
 
+    def _keep(self, array: np.ndarray[Any, Any], entry: int, value: str, lines: list[str]) -> None:
+        """Write that a number of an array gets a value."""
+        kind, first = self.place(array)
+        lines.append(f"  store double {value}, ptr {self.pointer(kind, first + entry, lines)}")
+
     def _field(self, name: str, array: np.ndarray[Any, Any], lines: list[str]) -> str:
         kind, first = self.place(array)
         return self.pointer(kind, first + getattr(MarchControl, name).offset, lines)
@@ -231,12 +254,10 @@ class _ModuleText:
         lines: list[str] = []
         sums: dict[tuple[bool, int], list[tuple[str, float]]] = {}
         for k, each in enumerate(image.inputs):
-            lines.append(f"  %i{k} = getelementptr double, ptr %values, i64 {k}")
-            lines.append(f"  %x{k} = load double, ptr %i{k}")
-            name = f"%x{k}"
+            name = _read(k, lines)
             for word, limit in zip(("ogt", "olt"), each.limits, strict=True):
                 if math.isfinite(limit):
-                    bound = _hexadecimal(limit)
+                    bound = hexadecimal(limit)
                     lines.append(f"  {name}{word} = fcmp {word} double {name}, {bound}")
                     lines.append(f"  {name}.{word} = select i1 {name}{word}, double {name}, double {bound}")
                     name = f"{name}.{word}"
@@ -248,39 +269,33 @@ class _ModuleText:
             base = float(array[place]) - sum(
                 s.ratio * value for value, s in at if (s.supplied, s.place) == (supplied, place)
             )
-            total = _hexadecimal(base)
+            total = hexadecimal(base)
             for name, ratio in terms:
                 count = len(lines)
-                lines.append(f"  %m{count} = fmul double {name}, {_hexadecimal(ratio)}")
+                lines.append(f"  %m{count} = fmul double {name}, {hexadecimal(ratio)}")
                 lines.append(f"  %s{count} = fadd double {total}, %m{count}")
                 total = f"%s{count}"
-            kind, first = self.place(array)
-            where = self.pointer(kind, first + place, lines)
-            lines.append(f"  store double {total}, ptr {where}")
+            self._keep(array, place, total, lines)
         return _function("void", f"{self.name}_inputs", "ptr %memory, ptr %values", [*lines, "  ret void"])
 
     def _parameters(self, image: Image) -> str:
         """Write the numbers that depend on parameters, by their polynomials in the changes %d0, %d1, …"""
         lines: list[str] = []
         for k, each in enumerate(image.parameters):
-            lines.append(f"  %i{k} = getelementptr double, ptr %values, i64 {k}")
-            lines.append(f"  %x{k} = load double, ptr %i{k}")
-            lines.append(f"  %d{k} = fsub double %x{k}, {_hexadecimal(each.start)}")
+            lines.append(f"  %d{k} = fsub double {_read(k, lines)}, {hexadecimal(each.start)}")
         for each in image.dependences:
-            total = _hexadecimal(each.constant)
+            total = hexadecimal(each.constant)
             for key, coefficient in each.terms.items():
-                term = _hexadecimal(coefficient)
+                term = hexadecimal(coefficient)
                 for k in key:
                     lines.append(f"  %m{len(lines)} = fmul double {term}, %d{k}")
                     term = f"%m{len(lines) - 1}"
                 lines.append(f"  %a{len(lines)} = fadd double {total}, {term}")
                 total = f"%a{len(lines) - 1}"
             if each.reciprocal:
-                lines.append(f"  %a{len(lines)} = fdiv double {_hexadecimal(1.0)}, {total}")
+                lines.append(f"  %a{len(lines)} = fdiv double {hexadecimal(1.0)}, {total}")
                 total = f"%a{len(lines) - 1}"
-            kind, first = self.place(image.numbers[each.array])
-            where = self.pointer(kind, first + each.entry, lines)
-            lines.append(f"  store double {total}, ptr {where}")
+            self._keep(image.numbers[each.array], each.entry, total, lines)
         return _function("void", f"{self.name}_parameters", "ptr %memory, ptr %values", [*lines, "  ret void"])
 
     def _accelerations(self, image: Image) -> str:
@@ -304,12 +319,15 @@ class _ModuleText:
         )
 
 
+def _read(place: int, lines: list[str]) -> str:
+    """Write that one of the given values is read; return its name."""
+    lines.append(f"  %i{place} = getelementptr double, ptr %values, i64 {place}")
+    lines.append(f"  %x{place} = load double, ptr %i{place}")
+    return f"%x{place}"
+
+
 def _function(result: str, name: str, arguments: str, lines: list[str]) -> str:
     return "\n".join([f"define {result} @{name}({arguments}) {{", *lines, "}"])
-
-
-def _hexadecimal(value: float) -> str:
-    return "0x" + struct.pack(">d", value).hex().upper()
 
 
 _HEADER: Final = """\

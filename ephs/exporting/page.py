@@ -20,7 +20,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.parameters import names, read
 from ephs.show.motions.player import player
 from ephs.show.motions.stage import stage_of
-from ephs.show.shared.page import Page
+from ephs.show.shared.page import Page, asset
 from ephs.show.shared.palette import CYCLE
 
 KEYS: Final = ("mass", "friction", "stiffness", "damping", "gravity[2]")
@@ -88,12 +88,12 @@ def live_page(
         "\n".join([
             "<!DOCTYPE html>", '<html lang="en">',
             f'<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>',
-            f'<link rel="icon" href="data:,"><style>{_shown("report.css")}{_shown("uplot.css")}{_own("live.css")}',
+            f'<link rel="icon" href="data:,"><style>{asset("report.css")}{asset("uplot.css")}{_own("live.css")}',
             f"</style></head><body><h1>{title}</h1>",
             '<p class="lead">Move a slider: this page computes the new motion.</p>',
             player(stage, scene.name), '<p id="said"></p><div id="sliders"></div><div id="live-plots"></div>',
             f'<script type="application/json" id="live">{data}</script>',
-            f"<script>{_shown('uplot.js')}</script><script>{_shown('plots.js')}</script>",
+            f"<script>{asset('uplot.js')}</script><script>{asset('plots.js')}</script>",
             f"<script>{_own('live.js')}</script></body></html>", "",
         ]),
         scene.name,
@@ -124,10 +124,6 @@ def _slider(variable: ImageNumber, span: float) -> dict[str, Any]:
     start = variable.start
     high = 3.0 * start if start > 0.0 and variable.unit == "" and span < start else start + span
     return {"name": variable.name, "unit": variable.unit, "low": start - span, "high": high, "start": start}
-
-
-def _shown(name: str) -> str:
-    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def _own(name: str) -> str:

@@ -18,7 +18,7 @@ from ephs.semantics import library
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.primitives.constructors import irreversible
 from ephs.semantics.primitives.primitives import Primitive, Reversible, power_ports
-from ephs.semantics.primitives.structures import constant_structure, quadratic
+from ephs.semantics.primitives.structures import constant_structure, onsager, quadratic
 from ephs.semantics.systems.system import System
 
 
@@ -195,16 +195,11 @@ def _loss(ports: Mapping[str, Quantity], heat: str, temperature: Symbol, matrix:
     entries: Callable[..., Any] = sp.lambdify(temperature, matrix.tolist(), modules=np)
     names = list(ports)
 
-    def onsager(**given: Any) -> Any:
-        theta, efforts = given[heat], [given[name] for name in names]
-        s = entries(theta)
-        drag = [sum((a * e for a, e in zip(row, efforts, strict=True)), 0.0) for row in s]
-        rows = [[theta * entry for entry in row] + [-pull] for row, pull in zip(s, drag, strict=True)]
-        last = sum((pull * e for pull, e in zip(drag, efforts, strict=True)), 0.0) / theta
-        return [*rows, [*(-pull for pull in drag), last]]
+    def written(**given: Any) -> Any:
+        return onsager(entries(given[heat]), [given[name] for name in names], given[heat])
 
     warm = {heat: _range(matrix, temperature, start)} if matrix.free_symbols else None
-    return irreversible({**ports, heat: quantity.entropy}, onsager, domain=warm, name="loss")
+    return irreversible({**ports, heat: quantity.entropy}, written, domain=warm, name="loss")
 
 
 def _range(matrix: Matrix, temperature: Symbol, start: float) -> tuple[float, float]:

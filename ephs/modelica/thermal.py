@@ -11,6 +11,7 @@ from ephs.modelica.flat import Connector, Flat, ZeroResidual
 from ephs.modelica.relation import PortRelation
 from ephs.operad import quantity
 from ephs.semantics import library
+from ephs.semantics.library.formulas import heat_transfer
 from ephs.semantics.primitives.constructors import irreversible
 from ephs.semantics.primitives.primitives import Primitive, power_ports
 from ephs.semantics.primitives.structures import constant_structure
@@ -151,8 +152,7 @@ def _conductor(flat: Flat, flows: dict[Connector, Expr]) -> tuple[Primitive, dic
     value: Callable[..., Any] = sp.lambdify((one, two), h, modules=np)
 
     def matrix(s1: Any, s2: Any) -> Any:
-        of = value(s1, s2)
-        return [[of * s2 / s1, -of], [-of, of * s1 / s2]]
+        return heat_transfer(s1, s2, value(s1, s2))
 
     ports = {"s1": quantity.entropy, "s2": quantity.entropy}
     return irreversible(ports, matrix, name="heat_transfer"), names, {}

@@ -8,7 +8,7 @@ from ephs.show.diagrams.layout import place
 from ephs.show.diagrams.png import draw_placement
 from ephs.show.motions.motion import best_side, between_instants, film
 from ephs.show.motions.still import draw_still
-from ephs.show.plots.curves import STYLE
+from ephs.show.plots.curves import styled
 from ephs.show.shared.errors import ShowError
 from ephs.show.shared.figures import new_figure
 
@@ -36,8 +36,6 @@ def plot_mechanism(sol: Any, at: float | None = None, *, opened: bool = False) -
     ShowError
         If there is no scene, or the time is outside of the solution.
     """
-    from matplotlib import rc_context
-
     scene = sol if callable(getattr(sol, "all_bodies", None)) else sol.outline
     if scene is None:
         raise ShowError("nothing", path=str(sol.name), found="mechanism", expected="a solution with bodies")
@@ -50,8 +48,7 @@ def plot_mechanism(sol: Any, at: float | None = None, *, opened: bool = False) -
     placement = place(system, opened=opened)
     wide, high = (side / 72.0 for side in placement.size)
     scale = min(1.0, 0.52 * WIDTH / wide, 4.4 / high)
-    style: Any = STYLE
-    with rc_context(style):
+    with styled():
         height = max(2.4, scale * high)
         figure = new_figure(WIDTH, height)
         figure.set_layout_engine("none")

@@ -22,7 +22,7 @@ def solution_html(solution: Any) -> str:
     scene = solution.outline
     if scene is None or not len(solution):
         return solution_table(solution)
-    poses = {name: _first(solution.body(name)) for name, _ in _few(scene)}
+    poses = {name: first_pose(solution.body(name)) for name, _ in _few(scene)}
     return _beside(_schematic(scene, poses), solution_table(solution))
 
 
@@ -110,7 +110,8 @@ def _schematic(scene: Any, poses: dict[str, Any]) -> str:
     return still_svg(scene, poses) if poses else ""
 
 
-def _first(body: Any) -> Any:
+def first_pose(body: Any) -> Any:
+    """(7,) at the first instant."""
     return np.concatenate([np.asarray(body.quaternion)[0], np.asarray(body.position)[0]])
 
 

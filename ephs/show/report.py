@@ -2,7 +2,6 @@
 
 import html
 import re
-from importlib.resources import files
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -13,10 +12,12 @@ from ephs.show.motions.player import player
 from ephs.show.motions.sheets import sheets_of
 from ephs.show.motions.stage import stage_of
 from ephs.show.motions.still import still_svg
-from ephs.show.plots.balances import balances
+from ephs.show.notebook import first_pose
+from ephs.show.plots.balances import balances, number
 from ephs.show.plots.panels import constraint_panels, energy_panels, entropy_panels, exergy_panels, motion_panels
 from ephs.show.plots.signals import PanelGroup, packed
 from ephs.show.plots.touching import contact_panels, contact_table
+from ephs.show.shared.page import asset, wide_table
 
 ZERO = 1e-12
 """SI number below which a report writes 0."""
@@ -77,7 +78,7 @@ def write_report(sol: Any, directory: str | FilePath) -> FilePath:
             "<!DOCTYPE html>",
             '<html lang="en">',
             f'<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{name}</title>',
-            f'<link rel="icon" href="data:,"><style>{_asset("report.css")}{_asset("uplot.css")}</style></head>',
+            f'<link rel="icon" href="data:,"><style>{asset("report.css")}{asset("uplot.css")}</style></head>',
             f'<body><h1>{name}</h1><p class="lead">{_lead(sol, summary)}</p>',
             *[section for section in sections if section],
             "</body></html>",
@@ -103,8 +104,7 @@ def _number(value: Any) -> str:
         return ", ".join(_number(each) for each in value)
     if isinstance(value, int):
         return str(value)
-    # Four figures are for reading; the whole numbers are in summary.json.
-    return f"{float(value):.4g}".replace("e-0", "e-").replace("-", "−")
+    return number(float(value))  # the whole numbers are in summary.json
 
 
 def _settled(value: Any) -> Any:
@@ -131,16 +131,10 @@ def _audit(summary: dict[str, Any]) -> str:
     findings: list[dict[str, Any]] = summary.get("audit", {}).get("findings", [])
     if not findings:
         return ""
-    rows = "".join(
-        f"<tr><th>{html.escape(found['law'])}</th><td>{_number(found['size'])}</td><td>{_number(found['allowed'])}</td>"
-        f"<td>{_number(found['at'])}</td><td>{html.escape(found['path'])}</td><td>{html.escape(found['advice'])}</td></tr>"
-        for found in findings
-    )
-    head = "".join(f"<th>{words}</th>" for words in ("law", "found", "allowed", "at [s]", "where", "what to do"))
-    return (
-        "<h2>The result does not pass its audit</h2>"
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-    )
+    keys = ("law", "size", "allowed", "at", "path", "advice")
+    rows = ([_number(found[key]) for key in keys] for found in findings)
+    head = ("law", "found", "allowed", "at [s]", "where", "what to do")
+    return f"<h2>The result does not pass its audit</h2>{wide_table(head, rows)}"
 
 
 def _final(summary: dict[str, Any]) -> str:
@@ -150,32 +144,19 @@ def _final(summary: dict[str, Any]) -> str:
         if not entries:
             continue
         fields = [(key, words) for kind, key, words in _FINAL if kind == group]
-        head = "".join(f"<th>{words}</th>" for _, words in fields)
-        rows = "".join(
-            "<tr><th>"
-            + html.escape(name)
-            + "</th>"
-            + "".join(f"<td>{_number(_settled(entry.get(key)))}</td>" for key, _ in fields)
-            + "</tr>"
+        rows = (
+            (html.escape(name), *(_number(_settled(entry.get(key))) for key, _ in fields))
             for name, entry in entries.items()
         )
-        tables.append(
-            f'<div class="wide"><table><thead><tr><th>{group}</th>{head}</tr></thead>'
-            f"<tbody>{rows}</tbody></table></div>"
-        )
+        tables.append(wide_table((group, *(words for _, words in fields)), rows))
     return f"<h2>At the end</h2>{'<p></p>'.join(tables)}" if tables else ""
 
 
 def _schematic(sol: Any) -> str:
     if sol.outline is None or not len(sol.t):
         return ""
-    poses = {name: _pose(sol.body(name)) for name, _ in sol.outline.all_bodies()}
+    poses = {name: first_pose(sol.body(name)) for name, _ in sol.outline.all_bodies()}
     return f"<h2>Schematic</h2><figure>{still_svg(sol.outline, poses)}</figure>" if poses else ""
-
-
-def _pose(body: Any) -> Any:
-    """(7,) at the first instant."""
-    return np.concatenate([np.asarray(body.quaternion)[0], np.asarray(body.position)[0]])
 
 
 def _pattern(sol: Any) -> str:
@@ -209,12 +190,8 @@ def _plots(sol: Any) -> str:
         '<div id="signals-box"><nav id="picker"><input type="search" id="find" placeholder="find a signal"></nav>'
         '<div id="plots"></div></div>'
         f'<script type="application/json" id="signals">{data}</script>'
-        f"<script>{_asset('uplot.js')}</script><script>{_asset('plots.js')}</script><script>{_asset('report.js')}</script>"
+        f"<script>{asset('uplot.js')}</script><script>{asset('plots.js')}</script><script>{asset('report.js')}</script>"
     )
-
-
-def _asset(name: str) -> str:
-    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def _inline(picture: str) -> str:

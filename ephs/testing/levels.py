@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from ephs.operad import ROOT, Directory, Interface, Junction, Pattern, PortType, Quantity
 from ephs.semantics import System
+from ephs.semantics.primitives.primitives import state_ports
 from ephs.semantics.systems.system import Filling
 from ephs.testing.patterns import CHAIN
 from ephs.testing.primitives import irreversibles, reversibles, storages
@@ -206,7 +207,7 @@ class _Level:
     def process(self, ports: Mapping[str, Outer]) -> st.SearchStrategy[Filling]:
         """A component with these ports, or a further level."""
         interface: Interface = Directory({name: PortType(port.quantity, port.power) for name, port in ports.items()})
-        reads = tuple(name for name, port_type in interface.items() if not port_type.power)
+        reads = state_ports(interface)
         choices: list[st.SearchStrategy[Any]] = [
             # velocities only: a constraint on temperatures that an environment gives leaves its flow undetermined
             reversibles(interface, reads=reads, constrained=(-1,)),

@@ -7,6 +7,7 @@ from hypothesis.errors import InvalidArgument
 
 from ephs.operad import Interface, Nesting, Path, Quantity, Space, quantity
 from ephs.semantics import Irreversible, Reference, Reversible, Storage, System
+from ephs.semantics.primitives.primitives import state_ports
 from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.systems.laws import Probe, random_probe, system_law
 from ephs.semantics.systems.system import Filling
@@ -85,7 +86,7 @@ def fillings(draw: st.DrawFn, nesting: Nesting) -> System:
     leaves: dict[Path, Storage | Reversible | Irreversible] = {}
     for box, content in nesting.top_down().boxes.items():
         interface = content.interface
-        reads = tuple(port for port, port_type in interface.items() if not port_type.power)
+        reads = state_ports(interface)
         if _storable(interface) and draw(st.sampled_from((False, True, True))):
             leaves[box] = draw(storages(interface))
         else:

@@ -20,19 +20,19 @@ PATTERN, MASS = Pattern.from_text("p: momentum; mass(p)"), library.point_mass(m=
 def test_a_result_is_the_same_until_others_took_its_place(keys: list[int]) -> None:
     kept, order = Kept(), list[int]()
     for key in keys:
-        made = kept.of(key, lambda: object())
+        made = kept.result(key, lambda: object())
         if key in order:
-            assert made is kept.of(key, lambda: object())
+            assert made is kept.result(key, lambda: object())
         else:
             order = [*order, key][-MOST:]
-        assert all(kept.of(other, pytest.fail) is not None for other in order)
+        assert all(kept.result(other, pytest.fail) is not None for other in order)
 
 
 def test_what_raises_is_not_kept() -> None:
     kept = Kept()
     with pytest.raises(ZeroDivisionError):
-        kept.of("key", lambda: 1 / 0)
-    assert kept.of("key", lambda: 2) == 2
+        kept.result("key", lambda: 1 / 0)
+    assert kept.result("key", lambda: 2) == 2
 
 
 def test_threads_share_one_result() -> None:
@@ -41,7 +41,7 @@ def test_threads_share_one_result() -> None:
 
     def asked(_: int) -> object:
         barrier.wait()
-        return kept.of("key", lambda: object())
+        return kept.result("key", lambda: object())
 
     with ThreadPoolExecutor(threads) as pool:
         assert len({id(found) for found in pool.map(asked, range(threads))}) == 1
@@ -50,9 +50,9 @@ def test_threads_share_one_result() -> None:
 @pytest.mark.parametrize("made", [copy.deepcopy, lambda of: pickle.loads(pickle.dumps(of))])
 def test_copies_start_with_nothing(made: Callable[[Kept], Kept]) -> None:
     kept = Kept()
-    kept.of("key", lambda: 1)
-    assert made(kept).of("key", lambda: 2) == 2
-    assert kept.of("key", lambda: 3) == 1
+    kept.result("key", lambda: 1)
+    assert made(kept).result("key", lambda: 2) == 2
+    assert kept.result("key", lambda: 3) == 1
 
 
 def test_a_system_keeps_its_descriptor_form_and_is_equal_without() -> None:

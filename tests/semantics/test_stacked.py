@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from ephs.operad import Directory, PortType
 from ephs.semantics import Irreversible, Reference
 from ephs.semantics.bundles.bundle import Bundle
-from ephs.semantics.spaces.rank import APART, PROJECTOR
 from ephs.semantics.verdicts.checks import random_point
 from ephs.testing import fillings, nestings, systems
 from tests.broken import put_in_place
@@ -16,6 +15,10 @@ from tests.semantics.stacked import components_of, equations_of, path_of, stacke
 from tests.semantics.subspace import Subspace
 
 REFERENCE = Reference(293.15, 300.0)
+PROJECTOR = 1e-13
+"""Difference of the projectors on two subspaces that are one, times the condition of what computed them."""
+APART = 1e-6
+"""The same at most, whatever the condition: subspaces of other relations differ by a tenth and more."""
 patient = settings(suppress_health_check=list(HealthCheck), max_examples=30)
 DRAWN = {
     "systems": systems(),

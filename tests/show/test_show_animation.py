@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ephs.semantics.spaces.rotations import matrix_to_quaternion
 from ephs.show import ShowError, animate
 from ephs.show.motions.motion import (
     between,
     equivalent_box,
     film,
     frame_all,
-    matrix_to_quaternion,
     point_of,
     rotate,
 )

@@ -6,6 +6,7 @@ from typing import final
 
 from ephs.operad import Algebra, AlgebraMap, Interface, Path, Pattern
 from ephs.semantics.algebra.free import meaning
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.systems.system import Filling
 
@@ -42,10 +43,6 @@ class Cost:
         return Cost(primitive.interface, frozenset(primitive.bundle.ports), 1, rates, 0)
 
 
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Cost) else None
-
-
 def _compose(pattern: Pattern, parts: Mapping[Path, Cost]) -> Cost:
     carried = {pattern.boxes[box].ports[port].junction for box, part in parts.items() for port in part.carried}
     outer = {path for path, of in pattern.interface.items() if of.power}
@@ -60,7 +57,7 @@ def _compose(pattern: Pattern, parts: Mapping[Path, Cost]) -> Cost:
     )
 
 
-cost: Algebra[Cost] = Algebra("cost", _interface, _compose)
+cost: Algebra[Cost] = Algebra("cost", interface_of(Cost), _compose)
 """Counts of components, rates and balances."""
 
 counting: AlgebraMap[Filling, Cost] = meaning(cost, lambda _path, primitive: Cost.of(primitive), "counting")

@@ -11,6 +11,7 @@ from typing import TypeAlias, final
 from ephs.operad import ROOT, Algebra, Interface, Path, Pattern, Quantity
 from ephs.operad.names import PathLike
 from ephs.operad.units import dimension
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning import LinearRelation, glued
 from ephs.semantics.meaning.fields import Rational
@@ -127,14 +128,10 @@ def _text(unit: Mapping[str, Fraction]) -> str:
     return " ".join(words) or "1"
 
 
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Units) else None
-
-
 def _compose(pattern: Pattern, parts: Mapping[Path, Units]) -> Units:
     relations = {box: LinearRelation.among(RATIONAL, map(dict, part.equations)) for box, part in parts.items()}
     return _made(pattern.interface, glued(RATIONAL, pattern, relations, SAME))
 
 
-units: Algebra[Units] = Algebra("units", _interface, _compose)
+units: Algebra[Units] = Algebra("units", interface_of(Units), _compose)
 """Interfaces with units: ports that meet have one; what follows for the outer ports is found by elimination over ℚ."""

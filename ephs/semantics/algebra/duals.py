@@ -13,20 +13,20 @@ class Dual:
     slope: Any = 0
 
     @staticmethod
-    def of(number: Any) -> "Dual":
+    def constant(number: Any) -> "Dual":
         """A number, as a constant where it is none already."""
         return number if isinstance(number, Dual) else Dual(number)
 
     def __add__(self, other: Any) -> "Dual":
-        right = Dual.of(other)
+        right = Dual.constant(other)
         return Dual(self.value + right.value, self.slope + right.slope)
 
     def __mul__(self, other: Any) -> "Dual":
-        right = Dual.of(other)
+        right = Dual.constant(other)
         return Dual(self.value * right.value, self.value * right.slope + self.slope * right.value)
 
     def __truediv__(self, other: Any) -> "Dual":
-        right = Dual.of(other)
+        right = Dual.constant(other)
         quotient = self.value / right.value
         return Dual(quotient, (self.slope - quotient * right.slope) / right.value)
 
@@ -34,13 +34,13 @@ class Dual:
         return Dual(-self.value, -self.slope)
 
     def __sub__(self, other: Any) -> "Dual":
-        return self + -Dual.of(other)
+        return self + -Dual.constant(other)
 
     def __rsub__(self, other: Any) -> "Dual":
-        return Dual.of(other) - self
+        return Dual.constant(other) - self
 
     def __rtruediv__(self, other: Any) -> "Dual":
-        return Dual.of(other) / self
+        return Dual.constant(other) / self
 
     __radd__ = __add__
     __rmul__ = __mul__

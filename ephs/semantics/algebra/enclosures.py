@@ -12,6 +12,7 @@ from typing import TypeAlias, final
 
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Lax, Path, Pattern
 from ephs.operad.names import PathLike
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.algebra.rational import Coordinate, ExactRelation, exact_relations
 from ephs.semantics.bundles.errors import SemanticsError
 
@@ -108,10 +109,6 @@ def _without(edges: Edges, node: Node) -> Edges:
     return out
 
 
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Conductors) else None
-
-
 def _compose(pattern: Pattern, parts: Mapping[Path, Conductors]) -> Conductors:
     edges: Edges = {}
     for box, part in parts.items():
@@ -146,7 +143,7 @@ def _points(element: Conductors) -> tuple[Conductors, ...]:
     return tuple(map(chosen, ((zero,), (one,), (zero, one), (one, one / 3, zero))))
 
 
-intervals: Algebra[Conductors] = Algebra("intervals", _interface, _compose, lax=Lax(_below, _points))
+intervals: Algebra[Conductors] = Algebra("intervals", interface_of(Conductors), _compose, lax=Lax(_below, _points))
 """Bounds of conductances; a lax algebra, whose laws are inclusions."""
 
 
@@ -167,7 +164,7 @@ def _conduction(element: Conductors) -> ExactRelation:
     return ExactRelation.of(element.interface, rows.values())
 
 
-exact_intervals: Algebra[Conductors] = Algebra("exact intervals", _interface, _compose)
+exact_intervals: Algebra[Conductors] = Algebra("exact intervals", interface_of(Conductors), _compose)
 """Intervals whose bounds agree: exact conductances, for which the laws are equations."""
 
 conduction: AlgebraMap[Conductors, ExactRelation] = AlgebraMap(

@@ -6,9 +6,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern, PortType
+from ephs.operad import Algebra, AlgebraMap, Directory, Path, Pattern, PortType
 from ephs.operad.matching import interfaces_match
 from ephs.semantics.algebra.free import systems
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.bundles.bundle import Array, Bundle, Reference
 from ephs.semantics.meaning import Relation, relation_of
 from ephs.semantics.meaning.relation import Renamed
@@ -21,10 +22,6 @@ Meaning: TypeAlias = Relation | Filling
 Values: TypeAlias = dict[Path, Array]
 SAMPLES = 3
 """Points of the base at which two relations are compared."""
-
-
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Meaning) else None
 
 
 def relation_for(element: Meaning) -> Relation:
@@ -83,7 +80,7 @@ def _rename(element: Meaning, names: Mapping[Path, Path]) -> Meaning:
     return replace(relation, classes=tuple(sorted(classes, key=lambda each: each.name)), fibre=fibre)
 
 
-relations: Algebra[Meaning] = Algebra("relations", _interface, _compose, _equal, _rename)
+relations: Algebra[Meaning] = Algebra("relations", interface_of(Meaning), _compose, _equal, _rename)
 """Relations over their base; equal if their bases agree, and their fibres at sampled points."""
 
 

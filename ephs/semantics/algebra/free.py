@@ -3,15 +3,12 @@
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
+from ephs.operad import Algebra, AlgebraMap, Directory, Path, Pattern
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.primitives.primitives import Primitive
 from ephs.semantics.systems.system import Filling, System, as_system
 
 T = TypeVar("T")
-
-
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Filling) else None
 
 
 def _fill(pattern: Pattern, parts: Mapping[Path, Filling]) -> Filling:
@@ -48,7 +45,7 @@ def _rename(element: Filling, names: Mapping[Path, Path]) -> Filling:
     return System(pattern, Directory([(box.moved(names), filling) for box, filling in flat.fillings.items()]))
 
 
-systems: Algebra[Filling] = Algebra("systems", _interface, _fill, _equal, _rename)
+systems: Algebra[Filling] = Algebra("systems", interface_of(Filling), _fill, _equal, _rename)
 """Systems and primitives, equal if they are after flattening, up to names of junctions inside.
 
 A primitive is the one box of an identity.
@@ -57,7 +54,10 @@ A primitive is the one box of an identity.
 flattening: AlgebraMap[Filling, Filling] = AlgebraMap(
     systems,
     Algebra(
-        "flat systems", _interface, lambda pattern, parts: as_system(_fill(pattern, parts)).flatten(), rename=_rename
+        "flat systems",
+        interface_of(Filling),
+        lambda pattern, parts: as_system(_fill(pattern, parts)).flatten(),
+        rename=_rename,
     ),
     lambda element: as_system(element).flatten(),
     "flattening",

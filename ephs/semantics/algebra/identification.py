@@ -8,6 +8,7 @@ from ephs.operad import Algebra, AlgebraMap, Interface, Path, Pattern
 from ephs.operad.links import closure
 from ephs.operad.names import PathLike
 from ephs.semantics.algebra.fibres import Meaning, relation_for, relations
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning.partition import pushout
 
@@ -51,10 +52,6 @@ class Corelation:
         return "; ".join(sorted(" ~ ".join(sorted(map(str, group))) for group in self.classes)) or "(no port)"
 
 
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Corelation) else None
-
-
 def _compose(pattern: Pattern, parts: Mapping[Path, Corelation]) -> Corelation:
     """A part that joins two of its ports joins the junctions that they are on."""
     shown = {box: [(group, None) for group in part.classes] for box, part in parts.items()}
@@ -62,7 +59,7 @@ def _compose(pattern: Pattern, parts: Mapping[Path, Corelation]) -> Corelation:
     return Corelation(pattern.interface, frozenset(classes))
 
 
-corelations: Algebra[Corelation] = Algebra("corelations", _interface, _compose)
+corelations: Algebra[Corelation] = Algebra("corelations", interface_of(Corelation), _compose)
 """Partitions of the ports; they compose by pushouts."""
 
 

@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Literal, TypeAlias, final
 
 from ephs.operad import ROOT, Algebra, AlgebraMap, Interface, Path, Pattern
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.meaning import LinearRelation, glued, variables
 from ephs.semantics.meaning.fields import Rational
 from ephs.semantics.meaning.variables import RelationVariable, own
@@ -96,10 +97,6 @@ def _text(row: tuple[tuple[Coordinate, Fraction], ...]) -> str:
     return " ".join(words).removeprefix("+ ") + " = 0"
 
 
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, ExactRelation) else None
-
-
 def _named(element: ExactRelation, name: Callable[[Path], Path]) -> tuple[dict[Path, int], LinearRelation]:
     """The states inside under other names, and the relation with them."""
     relation = element.relation.renamed(lambda v: v._replace(port=name(v.port)) if v.role == "own" else v)
@@ -119,7 +116,9 @@ def _rename(element: ExactRelation, names: Mapping[Path, Path]) -> ExactRelation
     return _made(element.interface, *_named(element, lambda path: path.moved(names)))
 
 
-exact_relations: Algebra[ExactRelation] = Algebra("exact relations", _interface, _compose, rename=_rename)
+exact_relations: Algebra[ExactRelation] = Algebra(
+    "exact relations", interface_of(ExactRelation), _compose, rename=_rename
+)
 """Affine relations over ℚ; equal if they are equal data."""
 
 

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, final
 
 from ephs.operad import Algebra, AlgebraMap, Directory, Interface, Path, Pattern
 from ephs.semantics.algebra.duals import Dual
+from ephs.semantics.algebra.interfaces import interface_of
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.meaning.partition import pushout
 
@@ -89,10 +90,6 @@ class Sharer:
         return Sharer(interface, {single[name]: dim for name, dim in names.items()}, shown, changed)
 
 
-def _interface(element: object) -> Interface | None:
-    return element.interface if isinstance(element, Sharer) else None
-
-
 def _compose(pattern: Pattern, parts: Mapping[Path, Sharer]) -> Sharer:
     """The pushforward of states: those on one junction, or on linked ones, become one, and rates add."""
     shown = {
@@ -150,7 +147,7 @@ def _rename(element: Sharer, names: Mapping[Path, Path]) -> Sharer:
     return Sharer(element.interface, states, element.shows.map(lambda state: new[state]), rates)
 
 
-resource_sharers: Algebra[Sharer] = Algebra("resource sharers", _interface, _compose, _equal, _rename)
+resource_sharers: Algebra[Sharer] = Algebra("resource sharers", interface_of(Sharer), _compose, _equal, _rename)
 """Open differential equations, equal if their states are the same and their vector fields agree at sampled points.
 
 A vector field is also the increment of a discrete system, x ↦ x + Δ(x): increments add like rates.
@@ -202,7 +199,7 @@ def _tangent(element: Sharer) -> Sharer:
             for state, n in element.states.items()
             for value in (values[state],)
         }
-        found = {state: tuple(map(Dual.of, rate)) for state, rate in element.rates(dual).items()}
+        found = {state: tuple(map(Dual.constant, rate)) for state, rate in element.rates(dual).items()}
         return {state: (*(d.value for d in rate), *(d.slope for d in rate)) for state, rate in found.items()}
 
     return Sharer(element.interface, {state: 2 * n for state, n in element.states.items()}, element.shows, rates)

@@ -62,7 +62,7 @@ class Closing:
             velocities.append(scale(rate, apply(own[0], v[6 * number : 6 * number + 6])) if own else [0.0] * 6)
             number += there
         mobility, inside = table(72 * posed, d, d), range(6)
-        over = Passage.of(on, self.code, self.basis, x, step, h, velocities[0], velocities[1], scale(rate, step))
+        over = Passage.over_step(on, self.code, self.basis, x, step, h, velocities[0], velocities[1], scale(rate, step))
         columns: Rows = [list(column) for column in self.basis]
         force, turns = over.pulled(lam)
 

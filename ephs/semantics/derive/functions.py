@@ -17,8 +17,6 @@ from ephs.semantics.stage.numbers import Real
 
 NEAR: Final = 0.5
 """Up to this size of the argument series serve."""
-LARGE: Final = 709.0
-"""Beyond this the exponential overflows."""
 Value = Callable[[Evaluator, Real], Real]
 
 

@@ -85,7 +85,7 @@ class Holonomic:
         x, step, outer = [a.x0[i] for i in range(size)], [a.v[i] for i in range(d)], [a.e[i] for i in range(n)]
         h, force = a.scal[0], [a.lam[i] for i in range(6)]
         effort = maps.inward(through, outer)
-        over = Passage.of(on, self.code, self.basis, x, step, h, effort[:6], effort[6:12], effort[12:])
+        over = Passage.over_step(on, self.code, self.basis, x, step, h, effort[:6], effort[6:12], effort[12:])
         rate, whole, turned = over.rate, over.whole, over.turned
         residual, slopes, reads = (over.residual, over.slopes, over.reads) if self.on_group else (rate, whole, turned)
 
@@ -162,7 +162,7 @@ class Passage:
     far: Truth
 
     @staticmethod
-    def of(
+    def over_step(
         on: Evaluator, code: int, basis: tuple[tuple[float, ...], ...], x: Entries, step: Entries, h: Real,
         one: Entries, two: Entries, along: Entries,
     ) -> "Passage":  # fmt: skip

@@ -74,7 +74,7 @@ class IrreversibleStep:
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
         """Write flows and, unless bare, their derivatives by efforts and increments."""
         n, partials = len(self.reference), Duals(on, 0 if bare else sum(self.dimensions[:3]))
-        there = self._at(partials, a)
+        there = self._at_middle(partials, a)
         if len(self.hot) == n:
             flows = [conducted(there.rows[i * n : i * n + n], there.energy, i) for i in range(n)]
         else:
@@ -86,7 +86,7 @@ class IrreversibleStep:
     def onsager(self, on: Evaluator, a: Arguments) -> Integer:
         """Write M/θ₀ (n, n), seen through the maps, in place of derivatives."""
         n, outside, plain = len(self.reference), self.dimensions[0], Duals(on, 0)
-        there, theta = self._at(plain, a), plain.dual(a.scal[1])
+        there, theta = self._at_middle(plain, a), plain.dual(a.scal[1])
         good = there.inside
         for j in range(outside):
             unit = there.through.inward([plain.dual(float(i == j)) for i in range(outside)])
@@ -96,7 +96,7 @@ class IrreversibleStep:
                 good = on.both(good, on.absolute(value) <= HUGE)
         return on.select(there.cold, TEMPERATURE, on.select(good, OK, DOMAIN))
 
-    def _at(self, on: Duals, a: Arguments) -> "_OnsagerPoint":
+    def _at_middle(self, on: Duals, a: Arguments) -> "_OnsagerPoint":
         """M at the middle of the step."""
         p, x, e, _ = given(on, self, a)
         through = Through(self.maps, p[self._own :])

@@ -32,7 +32,7 @@ class Block:
     sort: Sort
 
     @staticmethod
-    def of(matrix: Array) -> "Block":
+    def of_matrix(matrix: Array) -> "Block":
         """The block of a matrix (inside, outside)."""
         inside, outside = matrix.shape
         if inside == outside and np.array_equal(matrix, np.eye(inside)):
@@ -63,9 +63,9 @@ class Maps:
     blocks: tuple[Block, ...]
 
     @staticmethod
-    def of(matrices: Sequence[Array]) -> "tuple[Maps, tuple[float, ...]]":
+    def of_matrices(matrices: Sequence[Array]) -> "tuple[Maps, tuple[float, ...]]":
         """The maps with these matrices, and their numbers."""
-        blocks = tuple(map(Block.of, matrices))
+        blocks = tuple(map(Block.of_matrix, matrices))
         numbers: list[float] = []
         for block, matrix in zip(blocks, matrices, strict=True):
             if block.sort == "frame":

@@ -124,14 +124,14 @@ def _operation(name: str, *, swapped: bool = False) -> Any:
         if isinstance(other, np.ndarray):
             return NotImplemented  # the array takes its entries one by one
         there = _place(other, self.recorder)
-        return self.of(name, *((there, self.place) if swapped else (self.place, there)))
+        return self.applied(name, *((there, self.place) if swapped else (self.place, there)))
 
     return method
 
 
 def _function(name: str) -> Any:
     def method(self: "Recorded") -> "Recorded":
-        return self.of(name, self.place)
+        return self.applied(name, self.place)
 
     return method
 
@@ -145,7 +145,7 @@ class Recorded:
     def __init__(self, place: int, recorder: Recorder) -> None:
         self.place, self.recorder = place, recorder
 
-    def of(self, name: str, *places: int, number: Any = 0.0) -> "Recorded":
+    def applied(self, name: str, *places: int, number: Any = 0.0) -> "Recorded":
         """The result of an operation."""
         return Recorded(self.recorder.place(name, places, number), self.recorder)
 
@@ -161,11 +161,11 @@ class Recorded:
     def __pow__(self, other: Any) -> "Recorded":
         exponent = quarter(other)
         if exponent is not None:
-            return self.of("power", self.place, number=exponent)
-        return self.of("exponential", self.place, _place(other, self.recorder))
+            return self.applied("power", self.place, number=exponent)
+        return self.applied("exponential", self.place, _place(other, self.recorder))
 
     def __rpow__(self, other: Any) -> "Recorded":
-        return self.of("exponential", _place(other, self.recorder), self.place)
+        return self.applied("exponential", _place(other, self.recorder), self.place)
 
     def __pos__(self) -> "Recorded":
         return self
@@ -184,7 +184,7 @@ class Recorded:
 
     def square(self) -> "Recorded":
         """The square, as NumPy's function of this name."""
-        return self.of("power", self.place, number=2.0)
+        return self.applied("power", self.place, number=2.0)
 
     def conjugate(self) -> "Recorded":
         """The value itself, which is real."""
@@ -192,15 +192,15 @@ class Recorded:
 
     def arctan2(self, other: Any) -> "Recorded":
         """The angle of a point, as NumPy's function of this name."""
-        return self.of("atan2", self.place, _place(other, self.recorder))
+        return self.applied("atan2", self.place, _place(other, self.recorder))
 
     def choose(self, one: Any, other: Any) -> "Recorded":
         """The first where this is positive, else the other."""
-        return self.of("choose", self.place, _place(one, self.recorder), _place(other, self.recorder))
+        return self.applied("choose", self.place, _place(one, self.recorder), _place(other, self.recorder))
 
     def squared_turn(self, x: Any, y: Any, z: Any) -> "Recorded":
         """The squared angle of the rotation with this quaternion."""
-        return self.of("squared turn", self.place, *(_place(each, self.recorder) for each in (x, y, z)))
+        return self.applied("squared turn", self.place, *(_place(each, self.recorder) for each in (x, y, z)))
 
     def root(self, function: Callable[..., Any], low: Any, high: Any, given: Sequence[Any]) -> "Recorded":
         """The root of an increasing function between two ends; the function takes the unknown and the given numbers."""
@@ -210,13 +210,13 @@ class Recorded:
 
         found = record(called, {"x": None, "more": len(given)})
         numbers = (low, high, *given, *found.parameters)
-        return self.of("root", *(_place(each, self.recorder) for each in numbers), number=found.tape)
+        return self.applied("root", *(_place(each, self.recorder) for each in numbers), number=found.tape)
 
     def hypot(self, other: Any) -> "Recorded":
         """The length of a vector, as NumPy's function of this name."""
         there = self.recorder.place("power", (_place(other, self.recorder),), 2.0)
         total = self.recorder.place("+", (self.square().place, there))
-        return self.of("sqrt", total)
+        return self.applied("sqrt", total)
 
     def _refuse(self, *_: Any) -> Any:
         raise Untraceable("the function needs the value of an argument")
@@ -252,11 +252,11 @@ def _recordable(function: Callable[..., Any], depth: int = 0) -> Callable[..., A
     names = {n: function.__globals__[n] for n in function.__code__.co_names if n in function.__globals__}
     used = {n: new for n, old in names.items() if (new := _replaced(old, depth)) is not old}
     cells = function.__closure__ or ()
-    closed = [_replaced(cell.cell_contents, depth) if _filled(cell) else None for cell in cells]
-    same = all(not _filled(cell) or new is cell.cell_contents for cell, new in zip(cells, closed, strict=True))
+    closed = [_replaced(cell.cell_contents, depth) if filled(cell) else None for cell in cells]
+    same = all(not filled(cell) or new is cell.cell_contents for cell, new in zip(cells, closed, strict=True))
     if not used and same:
         return function
-    closure = tuple(types.CellType(new) if _filled(cell) else cell for cell, new in zip(cells, closed, strict=True))
+    closure = tuple(types.CellType(new) if filled(cell) else cell for cell, new in zip(cells, closed, strict=True))
     namespace = {**function.__globals__, **used}
     copy = types.FunctionType(function.__code__, namespace, function.__name__, function.__defaults__, closure)
     copy.__kwdefaults__ = function.__kwdefaults__
@@ -271,7 +271,8 @@ def _replaced(value: Any, depth: int) -> Any:
     return _recordable(value, depth + 1) if isinstance(value, types.FunctionType) else value
 
 
-def _filled(cell: Any) -> bool:
+def filled(cell: types.CellType) -> bool:
+    """Whether a variable that a function closes over has its value yet."""
     try:
         _ = cell.cell_contents
     except ValueError:

@@ -1,6 +1,6 @@
 """What relations have in common: ports, efforts and flows seen through maps, derivatives, bounds."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol, TypeAlias, final
 
@@ -38,6 +38,14 @@ class StatePort:
     size: int
     dim: int
     positive: bool = False
+
+
+def spans_of(ports: Sequence[StatePort]) -> Iterator[tuple[StatePort, slice, slice]]:
+    """Each port with the places of its numbers among those of all points, and among increments."""
+    at = first = 0
+    for port in ports:
+        yield port, slice(at, at + port.size), slice(first, first + port.dim)
+        at, first = at + port.size, first + port.dim
 
 
 class Related(Protocol):
@@ -83,10 +91,8 @@ def given(on: Duals, relation: Related, a: Arguments) -> tuple[list[Real], list[
     half: list[Real] = [on.along(0.5 * a.v[i], n + k + i, 0.5) for i in range(m)]
     start: list[Real] = [on.dual(a.x0[i]) for i in range(size)]
     x: list[Real] = []
-    at = first = 0
-    for port in relation.ports:
-        x += moved(on, port.code, start[at : at + port.size], half[first : first + port.dim])
-        at, first = at + port.size, first + port.dim
+    for port, own, by in spans_of(relation.ports):
+        x += moved(on, port.code, start[own], half[by])
     return [on.dual(a.p[i]) for i in range(relation.numbers)], x, e, lam
 
 

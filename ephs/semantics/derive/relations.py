@@ -30,6 +30,7 @@ from ephs.semantics.derive.relating import (
     finite,
     given,
     inside,
+    spans_of,
     written,
 )
 from ephs.semantics.derive.slopes import Slopes, lifted
@@ -83,13 +84,11 @@ class StorageStep:
     def slopes(self, on: Evaluator, x: Numbers, v: Numbers, parameters: Numbers) -> tuple[list[Real], Real, list[Real]]:
         """∇̄E (n,), the energy at the end, and the states there, from the parameters of the energy."""
         states: list[Real] = []
-        at = first = 0
-        for port in self.ports:
-            states += over(on, port.code, x[at : at + port.size], v[first : first + port.dim], first)
-            at, first = at + port.size, first + port.dim
+        for port, own, by in spans_of(self.ports):
+            states += over(on, port.code, x[own], v[by], by.start)
         given = [lifted(each) for each in parameters]
         found = over_step(Slopes(on), self.energy, states, given)
-        return [found.slopes.get(i, 0.0) for i in range(first)], found.end, [lifted(each).end for each in states]
+        return [found.slopes.get(i, 0.0) for i in range(len(v))], found.end, [lifted(each).end for each in states]
 
     def stage(self, on: Evaluator, a: Arguments, *, bare: bool) -> Integer:
         """Write efforts, their derivatives by the step, and the energy; no derivatives where it is bare."""
@@ -118,13 +117,11 @@ class StorageStep:
             good = on.both(good, finite(on, [value]))
         a.c[0] = duals.dual(energy).value
         empty: Truth = False
-        at = first = 0
-        for port in self.ports:
+        for port, own, by in spans_of(self.ports):
             if port.positive:
                 for i in range(port.dim):
-                    ends = on.minimum(x[at + i], x[at + i] + a.v[first + i])
+                    ends = on.minimum(x[own][i], x[own][i] + a.v[by.start + i])
                     empty = on.either(empty, ends <= 0.0)
-            at, first = at + port.size, first + port.dim
         return on.select(empty, EXTENT, on.select(cold, TEMPERATURE, on.select(good, OK, DOMAIN)))
 
 

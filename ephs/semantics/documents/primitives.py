@@ -22,7 +22,15 @@ from ephs.semantics.documents.catalogue import find_part, part_of
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.primitives import constructors, structures
 from ephs.semantics.primitives.forms import stacked
-from ephs.semantics.primitives.primitives import Formula, Irreversible, Point, Primitive, Reversible, Storage
+from ephs.semantics.primitives.primitives import (
+    Formula,
+    Irreversible,
+    Point,
+    Primitive,
+    Reversible,
+    Storage,
+    state_ports,
+)
 from ephs.semantics.symbols.terms import (
     StructureFunction,
     Term,
@@ -190,7 +198,7 @@ def _storage(reader: Reader, where: str, name: str, ports: Interface, found: Ent
 
 
 def _reversible(reader: Reader, where: str, name: str, ports: Interface, found: Entry, domain: Bounds) -> Make:
-    n, reads = Bundle.of(ports).size, _reads(ports)
+    n, reads = Bundle.of(ports).size, state_ports(ports)
     names = {str(port): ports[port].quantity.space.size for port in reads}
     skew, constraint = (
         _matrix(reader, f"{where}.{key}", found[key], names, n) if key in found else None for key in ("L", "C")
@@ -236,10 +244,6 @@ def _matrix(reader: Reader, where: str, value: object, names: Mapping[str, int],
             reader.refuse(f"{where}[{i}]", f"{len(entries)} entries", f"{columns}")
         rows.append(tuple(term_from(reader, f"{where}[{i}][{j}]", each, names) for j, each in enumerate(entries)))
     return TermMatrix(tuple(rows))
-
-
-def _reads(ports: Interface) -> tuple[Path, ...]:
-    return tuple(port for port, kind in ports.items() if not kind.power)
 
 
 def _named(ports: Interface) -> dict[str, Any]:

@@ -261,17 +261,22 @@ def piston(*, a: float) -> Reversible:
 # ---- irreversible ----------------------------------------------------------------------------------------------
 
 
+def _resistive(name: str, port: str, of: Quantity, matrix: Callable[..., Any], **parameters: float) -> Irreversible:
+    """Linear friction at a port, its heat at s."""
+    non_negative(name, **parameters)
+    ((_, coefficient),) = parameters.items()
+    ports, formula = power_ports(**{port: of, "s": quantity.entropy}), Formula(matrix, tuple(parameters))
+    return dissipation(
+        name, ports, np.array([[coefficient]]), parameters=tuple(parameters.items()), formula=formula, trusted=True
+    )
+
+
 def friction(*, d: float) -> Irreversible:
     """Linear friction of d in N s/m; ports p, s: p.f = d·p.e, s.f = −d·p.e²/θ, θ = θ₀ + s.e.
 
     M = [[d*s, -d*p], [-d*p, d*p**2/s]], of the energy efforts: p the velocity, s the temperature.
     """
-    non_negative("friction", d=d)
-    ports = power_ports(p=quantity.momentum, s=quantity.entropy)
-    return dissipation(
-        "friction", ports, np.array([[d]]), parameters=(("d", d),), formula=Formula(formulas.friction, ("d",)),
-        trusted=True,
-    )  # fmt: skip
+    return _resistive("friction", "p", quantity.momentum, formulas.friction, d=d)
 
 
 def rotational_friction(*, d: float) -> Irreversible:
@@ -279,16 +284,7 @@ def rotational_friction(*, d: float) -> Irreversible:
 
     M = [[d*s, -d*p], [-d*p, d*p**2/s]], of the energy efforts: p the angular velocity, s the temperature.
     """
-    non_negative("rotational_friction", d=d)
-    ports = power_ports(p=quantity.angular_momentum, s=quantity.entropy)
-    return dissipation(
-        "rotational_friction",
-        ports,
-        np.array([[d]]),
-        parameters=(("d", d),),
-        formula=Formula(formulas.friction, ("d",)),
-        trusted=True,
-    )
+    return _resistive("rotational_friction", "p", quantity.angular_momentum, formulas.friction, d=d)
 
 
 def resistor(*, r: float) -> Irreversible:
@@ -296,12 +292,7 @@ def resistor(*, r: float) -> Irreversible:
 
     M = [[r*s, -b*r], [-b*r, b**2*r/s]], of the energy efforts: b the current, s the temperature.
     """
-    non_negative("resistor", r=r)
-    ports = power_ports(b=quantity.flux_linkage, s=quantity.entropy)
-    return dissipation(
-        "resistor", ports, np.array([[r]]), parameters=(("r", r),), formula=Formula(formulas.resistor, ("r",)),
-        trusted=True,
-    )  # fmt: skip
+    return _resistive("resistor", "b", quantity.flux_linkage, formulas.resistor, r=r)
 
 
 def heat_transfer(*, h: float) -> Irreversible:

@@ -21,17 +21,17 @@ def point_mass(p: Any, m: Any) -> Any:
 
 def rotor(p: Any, j: Any) -> Any:
     """E = p²/(2j)."""
-    return p**2 / (2 * j)
+    return point_mass(p, j)
 
 
 def capacitor(q: Any, c: Any) -> Any:
     """E = q²/(2c)."""
-    return q**2 / (2 * c)
+    return point_mass(q, c)
 
 
 def inductor(b: Any, l: Any) -> Any:  # noqa: E741 - the field's symbol
     """E = b²/(2l)."""
-    return b**2 / (2 * l)
+    return point_mass(b, l)
 
 
 def thermal_capacity(s: Any, c1: Any, c2: Any) -> Any:
@@ -107,7 +107,7 @@ def friction(p: Any, s: Any, d: Any) -> Any:
 
 def resistor(b: Any, s: Any, r: Any) -> Any:
     """b.f = r b.e, s.f = −r b.e²/θ."""
-    return [[r * s, -r * b], [-r * b, r * b**2 / s]]
+    return friction(b, s, r)
 
 
 def heat_transfer(s1: Any, s2: Any, h: Any) -> Any:

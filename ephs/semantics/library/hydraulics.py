@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ephs.operad import quantity
+from ephs.semantics.library import formulas
 from ephs.semantics.library.made import non_negative, positive
 from ephs.semantics.primitives.forms import dissipated, stored
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage, power_ports
@@ -25,7 +26,7 @@ def _tank(v: Any, area: Any, density: Any, gravity: Any) -> Any:
 
 
 def _inertance(g: Any, i: Any) -> Any:
-    return g**2 / (2 * i)
+    return formulas.point_mass(g, i)
 
 
 def _exchange(v1: Any, v2: Any, s: Any, conductance: Any) -> Any:
@@ -43,8 +44,7 @@ def _orifice(v1: Any, v2: Any, s: Any, c: Any, transition: Any) -> Any:
 
 
 def _pipe_loss(g: Any, s: Any, r: Any, k: Any) -> Any:
-    drag = r + k * abs(g)
-    return [[drag * s, -drag * g], [-drag * g, drag * g**2 / s]]
+    return formulas.friction(g, s, r + k * abs(g))
 
 
 def tank(*, area: float, density: float, gravity: float = GRAVITY) -> Storage:

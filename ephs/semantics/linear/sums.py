@@ -3,7 +3,7 @@
 Knuth, *The Art of Computer Programming* 2, 4.2.2, theorem B. Numbers are floats, arrays, or abstract ones.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,15 +18,6 @@ def grown(total: Any, carry: Any, change: Any) -> tuple[Any, Any]:
     found = total + wanted
     taken = found - total
     return found, (total - (found - taken)) + (wanted - taken)
-
-
-def summed(shape: tuple[int, int], terms: Iterable[tuple[Sequence[int], Sequence[int], NDArray[Any]]]) -> NDArray[Any]:
-    """Matrix of all terms (rows, columns, entries); what rounding leaves where entries cancel is no entry."""
-    total, gross = np.zeros(shape), np.zeros(shape)
-    for rows, columns, entries in terms:
-        np.add.at(total, np.ix_(rows, columns), entries)
-        np.add.at(gross, np.ix_(rows, columns), np.abs(entries))
-    return np.where(np.abs(total) > ROUNDED * gross, total, 0.0)
 
 
 def uncancelled(matrix: NDArray[Any], columns: Sequence[int]) -> NDArray[Any]:

@@ -39,10 +39,20 @@ WORDS: Mapping[str, str] = {
 }
 
 
-class _PosedFibre(Protocol):
-    def leaves(self) -> Iterator[tuple[Path, Primitive]]: ...
-    def at(self, path: Path, point: BasePoint) -> LinearRelation: ...
-    def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]: ...
+class Fibre(Protocol):
+    """Linear relation over a point of the base."""
+
+    def leaves(self) -> Iterator[tuple[Path, Primitive]]:
+        """The primitives with their full paths."""
+        ...
+
+    def at(self, path: Path, point: BasePoint) -> LinearRelation:
+        """The relation over a point, for the part at this path of the point's system."""
+        ...
+
+    def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]:
+        """The equations that are joined, each with what it is of; nothing is forgotten."""
+        ...
 
 
 @final
@@ -60,7 +70,7 @@ class Answer:
         return ("yes" if self.holds else "no") + "".join(f"; {reason}" for reason in self.because)
 
 
-def possible(fibre: _PosedFibre, point: BasePoint) -> Answer:
+def possible(fibre: Fibre, point: BasePoint) -> Answer:
     """Whether the relation over a point is empty, with the equations whose weighted sum is 1 = 0."""
     free = replace(point, processes=False)
     if not fibre.at(Path(), free).empty:
@@ -68,7 +78,7 @@ def possible(fibre: _PosedFibre, point: BasePoint) -> Answer:
     return Answer(True, _certificate(fibre, free))
 
 
-def _certificate(fibre: _PosedFibre, point: BasePoint) -> tuple[str, ...]:
+def _certificate(fibre: Fibre, point: BasePoint) -> tuple[str, ...]:
     """Labels of equations that add up to 1 = 0, each with its weight; each equation has a variable for its label."""
     field, labels = point.field, dict[RelationVariable, str]()
     rows: list[Row[Any]] = []
@@ -88,13 +98,13 @@ def _certificate(fibre: _PosedFibre, point: BasePoint) -> tuple[str, ...]:
     return tuple(f"{words} × {weight:.6g}" for words, weight in sorted(weights.items()))
 
 
-def hidden(fibre: _PosedFibre, point: BasePoint) -> LinearRelation:
+def hidden(fibre: Fibre, point: BasePoint) -> LinearRelation:
     """What every motion satisfies: equations between the efforts of storages alone."""
     found = fibre.at(Path(), replace(point, storages=False, processes=False))
     return found.onto(v for v in found.variables if v.role == "own" and v.kind == "effort")
 
 
-def determined(fibre: _PosedFibre, point: BasePoint) -> Answer:
+def determined(fibre: Fibre, point: BasePoint) -> Answer:
     """Whether outer flows, or outer efforts, determine all rates: two motions of the same ones differ by nothing.
 
     Differences satisfy the equations without their constants, and H″ of them those of the hidden equations, which last.
@@ -103,7 +113,7 @@ def determined(fibre: _PosedFibre, point: BasePoint) -> Answer:
     return flows if flows or not _determined(fibre, point, "effort") else Answer(True)
 
 
-def _determined(fibre: _PosedFibre, point: BasePoint, given: str) -> Answer:
+def _determined(fibre: Fibre, point: BasePoint, given: str) -> Answer:
     """The same where one kind of variables is given at all outer ports."""
     found = fibre.at(Path(), replace(point, storages=False))
     zero = {v for v in found.variables if (v.kind, v.role) in (("effort", "own"), (given, "outer"))}
@@ -119,7 +129,7 @@ def _determined(fibre: _PosedFibre, point: BasePoint, given: str) -> Answer:
     return Answer(False, tuple(reasons))
 
 
-def _lasting(fibre: _PosedFibre, point: BasePoint) -> LinearRelation:
+def _lasting(fibre: Fibre, point: BasePoint) -> LinearRelation:
     """Hidden equations a·e = 0 last: two rates that both keep them differ by v with a·H″ v = 0."""
     equations = hidden(fibre, point).equations
     asked = {effort for equation in equations for effort in equation}

@@ -11,7 +11,7 @@ level of the flattened system.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from ephs.semantics.meaning.components import at_instant, at_ports, efforts_of
 from ephs.semantics.meaning.fields import ROUNDED, Field, Rational, Rounded
 from ephs.semantics.meaning.functor import glued, relation_of_pattern
 from ephs.semantics.meaning.linear import LinearRelation
-from ephs.semantics.meaning.posed import Answer, Labelled, determined, possible
+from ephs.semantics.meaning.posed import Answer, Fibre, Labelled, determined, possible
 from ephs.semantics.meaning.variables import ONE, RelationVariable, into, own
 from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.systems.fitting import require_fillings
@@ -33,22 +33,6 @@ Route: TypeAlias = Literal["flat", "nested"]
 Numbers: TypeAlias = Literal["float", "rational"]
 Sizes: TypeAlias = "tuple[tuple[Path, int], ...]"
 FIELDS: Mapping[str, Any] = {"float": Rounded, "rational": Rational}
-
-
-class Fibre(Protocol):
-    """Linear relation over a point of the base."""
-
-    def leaves(self) -> Iterator[tuple[Path, Primitive]]:
-        """The primitives with their full paths."""
-        ...
-
-    def at(self, path: Path, point: BasePoint) -> LinearRelation:
-        """The relation over a point, for the part at this path of the point's system."""
-        ...
-
-    def labelled(self, path: Path, point: BasePoint) -> Iterator[Labelled]:
-        """The equations that are joined, each with what it is of; nothing is forgotten."""
-        ...
 
 
 @final

@@ -236,7 +236,7 @@ class Tangents:
             self._parts.append((part, rows, [column[v] for v in part.arguments]))
         self._slopes: list[Array] = []
 
-    def at(self, guess: Array, *, fresh: bool) -> Array:
+    def equations(self, guess: Array, *, fresh: bool) -> Array:
         """Their coefficients (m, n), and constants in the last column, at a guess (n,); rows are of length one.
 
         Parameters
@@ -300,7 +300,7 @@ def _halved(tangents: Tangents, guess: Array, target: Array, best: float) -> tup
 def _error(tangents: Tangents, guess: Array, *, fresh: bool) -> tuple[Array, float]:
     """The equations at a guess, and their largest remainder there, infinite outside the domain of a component."""
     try:
-        found = tangents.at(guess, fresh=fresh)
+        found = tangents.equations(guess, fresh=fresh)
     except SemanticsError:
         return np.zeros((0, guess.size + 1)), np.inf
     return found, float(np.abs(found[:, :-1] @ guess + found[:, -1]).max(initial=0.0))

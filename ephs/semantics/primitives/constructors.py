@@ -13,14 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ephs.operad import Directory, Interface, Path, PortType, Quantity
+from ephs.operad import Directory, Interface, PortType, Quantity
 from ephs.semantics.bundles.bundle import Array, Bundle, Reference
 from ephs.semantics.bundles.domains import Bounds, bounded, domain_of, within_domain
 from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.bundles.given import defined, finite_matrix, flat_vector, real_number, require_arguments, value_of
 from ephs.semantics.derive.recording import Untraceable
 from ephs.semantics.primitives import forms, structures
-from ephs.semantics.primitives.primitives import Domain, Formula, Irreversible, Kernel, Point, Reversible, Storage
+from ephs.semantics.primitives.primitives import (
+    Domain,
+    Formula,
+    Irreversible,
+    Kernel,
+    Point,
+    Reversible,
+    Storage,
+    state_ports,
+)
 from ephs.semantics.verdicts.checks import random_point
 
 Ports = Mapping[str, Quantity]
@@ -69,7 +78,7 @@ def storage(
     """
     interface = _interface(name, ports)
     n = Bundle.of(interface).size
-    for port in _reads(interface):
+    for port in state_ports(interface):
         raise StructureError("storage-ports", name, found=str(port))
     require_arguments(name, "energy", energy, tuple(interface))
     if gradient is not None:
@@ -270,7 +279,7 @@ def irreversible(
     require_arguments(name, "matrix", matrix, tuple(interface))
     bounds, n = domain_of(name, interface, domain), bundle.size
 
-    formula, reads = Formula(matrix), _reads(interface)
+    formula, reads = Formula(matrix), state_ports(interface)
     kernel = _kernel(interface, formula, None, bounds)
     recorded = None if kernel is None else forms.recorded_matrix(kernel, bundle, reads)
 
@@ -283,14 +292,7 @@ def irreversible(
         return defined(name, "the matrix M", recorded(x, e, reference), given)
 
     return Irreversible(
-        name,
-        interface,
-        evaluate,
-        reads,
-        kernel=kernel,
-        formula=formula,
-        domain=bounds,
-        one_sided=one_sided,
+        name, interface, evaluate, reads, kernel=kernel, formula=formula, domain=bounds, one_sided=one_sided
     )
 
 
@@ -307,9 +309,9 @@ def reversible(
 
     Its states may have a domain.
     """
-    bounds = domain_of(name, Interface({port: interface[port] for port in _reads(interface)}), domain)
+    bounds = domain_of(name, Interface({port: interface[port] for port in state_ports(interface)}), domain)
     n, kernel = Bundle.of(interface).size, _kernel(interface, formula, multipliers, bounds)
-    recorded = None if kernel is None else forms.recorded_structure(kernel, n, _reads(interface))
+    recorded = None if kernel is None else forms.recorded_structure(kernel, n, state_ports(interface))
 
     def structure(x: Point) -> tuple[Array, Array]:
         if recorded is None:
@@ -322,7 +324,7 @@ def reversible(
         name,
         interface,
         bounded(structure, bounds, nothing) if bounds else structure,
-        reads=_reads(interface),
+        reads=state_ports(interface),
         multipliers=multipliers,
         kernel=kernel,
         formula=formula,
@@ -342,7 +344,7 @@ def _both(skew: Callable[..., Any] | None, constraint: Callable[..., Any] | None
 
 def _kernel(interface: Interface, formula: Formula, multipliers: int | None, bounds: Domain) -> Kernel | None:
     """The kernel of a reversible structure with so many multipliers, or of an irreversible one; None if untraced."""
-    reads = _reads(interface)
+    reads = state_ports(interface)
     try:
         if multipliers is None:
             return forms.irreversible_kernel(interface, reads, formula, bounds)
@@ -365,10 +367,6 @@ def _interface(name: str, ports: Ports) -> Interface:
     return Directory(found)
 
 
-def _reads(interface: Interface) -> tuple[Path, ...]:
-    return tuple(port for port, port_type in interface.items() if not port_type.power)
-
-
 def _reader(
     name: str, interface: Interface, matrix: Matrix, rows: int | None, columns: int
 ) -> tuple[Callable[..., Any], Callable[[Point], ArrayLike]]:
@@ -378,7 +376,7 @@ def _reader(
         return matrix
 
     given = matrix if callable(matrix) else constant
-    require_arguments(name, "matrix", given, _reads(interface))
+    require_arguments(name, "matrix", given, state_ports(interface))
 
     def shaped(**x: Any) -> Any:
         found = np.asarray(given(**x), dtype=object)
@@ -391,7 +389,7 @@ def _reader(
 
 
 def _rows(interface: Interface, read: Callable[[Point], ArrayLike]) -> int:
-    x = random_point(Bundle.of(interface), _reads(interface), np.random.default_rng(24))
+    x = random_point(Bundle.of(interface), state_ports(interface), np.random.default_rng(24))
     return len(np.atleast_2d(np.asarray(read(x), dtype=float)))
 
 

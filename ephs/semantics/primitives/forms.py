@@ -22,6 +22,7 @@ from ephs.semantics.primitives.primitives import (
     Primitive,
     Reversible,
     Storage,
+    state_ports,
 )
 from ephs.semantics.spaces import manifold
 from ephs.semantics.stage.plain import PLAIN
@@ -101,7 +102,7 @@ def dissipated(
 ) -> Irreversible:
     """Process of one M, a function of energy efforts, states that are read, and the numbers, by name; as `stored`."""
     bundle = Bundle.of(interface)
-    reads = tuple(port for port, port_type in interface.items() if not port_type.power)
+    reads = state_ports(interface)
 
     def whole(**values: Any) -> Any:
         return matrix(**values, **numbers)
@@ -137,7 +138,7 @@ def coupled(
     reads
         Where not the state ports are read.
     """
-    reads = reads or tuple(port for port, port_type in interface.items() if not port_type.power)
+    reads = reads or state_ports(interface)
     formula = Formula(structure)
     kernel = reversible_kernel(interface, reads, formula, multipliers, label=label or name)
     evaluate = recorded_structure(kernel, Bundle.of(interface).size, reads)

@@ -193,9 +193,8 @@ class Storage(_Structure):
     def __post_init__(self) -> None:
         if self.trusted:
             return
-        for port, port_type in self.interface.items():
-            if not port_type.power:
-                raise StructureError("storage-ports", self.name, found=str(port))
+        for port in state_ports(self.interface):
+            raise StructureError("storage-ports", self.name, found=str(port))
         _ = self.verdict
 
     @property
@@ -380,6 +379,11 @@ Primitive = Storage | Reversible | Irreversible
 def power_ports(**ports: Quantity) -> Interface:
     """An interface of power ports only."""
     return Directory({name: PortType(quantity, True) for name, quantity in ports.items()})
+
+
+def state_ports(interface: Interface) -> tuple[Path, ...]:
+    """The ports without power, whose states are read."""
+    return tuple(port for port, port_type in interface.items() if not port_type.power)
 
 
 def midpoint(primitive: Primitive, x0: Point, v: Point) -> dict[Path, Array]:

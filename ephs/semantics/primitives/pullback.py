@@ -165,7 +165,7 @@ def _kernel(process: Reversible | Irreversible, maps: Mapping[Path, Map]) -> Ker
     for dim, matrix in before:
         port = next(ports) if dim else None
         matrices.append(matrix @ maps[port].matrix if port is not None and port in maps else matrix)
-    made, numbers = Maps.of(matrices)
+    made, numbers = Maps.of_matrices(matrices)
     old = kernel.relation.maps
     own = kernel.parameters[: len(kernel.parameters) - (0 if old is None else old.numbers)]
     return replace(kernel, relation=replace(kernel.relation, maps=made), parameters=(*own, *numbers))

@@ -167,13 +167,27 @@ def _planar_blocks(corner: float, column: Array, block: Array) -> Array:
     return out
 
 
+@dataclass(frozen=True, slots=True)
+class _Poses(Manifold):
+    """Groups of poses, stored as a unit quaternion and a position."""
+
+    @final
+    def identity(self) -> Array:
+        return translation(np.zeros(3))
+
+    @final
+    def normalise(self, x: Array) -> Array:
+        return np.concatenate((so3.normalised(x[:4]), x[4:]))
+
+    @final
+    def random(self, rng: np.random.Generator) -> Array:
+        return np.concatenate((so3.random_quaternion(rng), rng.standard_normal(3)))
+
+
 @final
 @dataclass(frozen=True, slots=True)
-class RigidMotions(Manifold):
+class RigidMotions(_Poses):
     """SE(3), stored as [w, x, y, z, rx, ry, rz]: rotation from body to world, position of the body."""
-
-    def identity(self) -> Array:
-        return np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
     def compose(self, a: Array, b: Array) -> Array:
         # numbers, not arrays: setting up a mechanism composes some twenty poses a body
@@ -229,12 +243,6 @@ class RigidMotions(Manifold):
         b2, b4 = _dexp_inv_coefficients(angle)
         return np.eye(6) - 0.5 * a + b2 * square + b4 * square @ square
 
-    def normalise(self, x: Array) -> Array:
-        return np.concatenate((so3.normalised(x[:4]), x[4:]))
-
-    def random(self, rng: np.random.Generator) -> Array:
-        return np.concatenate((so3.random_quaternion(rng), rng.standard_normal(3)))
-
 
 def _lower(diagonal: Array, below: Array) -> Array:
     """[[D, 0], [B, D]] of 3×3 blocks."""
@@ -287,15 +295,11 @@ def _dexp_inv_coefficients(t: float) -> tuple[float, float]:
 
 @final
 @dataclass(frozen=True, slots=True)
-class DirectMotions(Manifold):
+class DirectMotions(_Poses):
     """SO(3) × ℝ³, stored like SE(3): rotation and world position, a direct product."""
 
-    def identity(self) -> Array:
-        return np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-
     def compose(self, a: Array, b: Array) -> Array:
-        rotation = so3.quaternion_to_matrix(a[:4]) @ so3.quaternion_to_matrix(b[:4])
-        return np.concatenate((so3.matrix_to_quaternion(rotation), a[4:] + b[4:]))
+        return np.concatenate((SO3.compose(a[:4], b[:4]), a[4:] + b[4:]))
 
     def inverse(self, a: Array) -> Array:
         return a * np.array([1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0])
@@ -317,12 +321,6 @@ class DirectMotions(Manifold):
 
     def dexp_inv(self, v: Array) -> Array:
         return _direct_blocks(so3.rotation_dexp_inv(v[:3]), 1.0)
-
-    def normalise(self, x: Array) -> Array:
-        return np.concatenate((so3.normalised(x[:4]), x[4:]))
-
-    def random(self, rng: np.random.Generator) -> Array:
-        return np.concatenate((so3.random_quaternion(rng), rng.standard_normal(3)))
 
 
 def _direct_blocks(block: Array, diagonal: float) -> Array:

@@ -59,10 +59,6 @@ over this, 2e-10."""
 INERTIA = 1e-9
 """Part of the largest principal moment by which moments may miss positivity and the triangle inequality: those of a
 thin plate or rod meet it with equality, and files are written with nine digits."""
-PROJECTOR = 1e-13
-"""Difference of the projectors on two subspaces that are one, times the condition of what computed them."""
-APART = 1e-6
-"""The same at most, whatever the condition: subspaces of other relations differ by a tenth and more."""
 DIFFERENCE = 1e-6
 """Step of a one-sided difference, beside 1 and the unknown: the root of rounding, over its curvature."""
 

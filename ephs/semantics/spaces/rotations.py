@@ -8,7 +8,9 @@ from math import atan2, cos, factorial, sin, sqrt, tan
 
 import numpy as np
 
+from ephs.semantics.spaces import so3, vectors
 from ephs.semantics.spaces.manifold import Array
+from ephs.semantics.spaces.series import DENOMINATORS, NUMERATORS
 
 # Below this angle the closed forms lose digits by cancellation and power series take over.
 SMALL_ANGLE = 0.5
@@ -17,7 +19,7 @@ _TERMS = 12
 
 def hat(v: Array) -> Array:
     """The skew matrix with hat(v) w = v × w."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.array(vectors.hat(list(v)))
 
 
 def vee(m: Array) -> Array:
@@ -58,13 +60,9 @@ def gamma(angle: float) -> float:
     return (angle - sin(angle)) / angle**3
 
 
-_NUMERATORS = (1, -1, 1, -1, 5, -691, 7, -3617, 43867, -174611, 854513, -236364091, 8553103)
-_DENOMINATORS = (6, 30, 42, 30, 66, 2730, 6, 510, 798, 330, 138, 2730, 6)
-
-
 def bernoulli_ratio(k: int) -> float:
     """B₂ₖ / (2k)! with the Bernoulli numbers, for k = 1 … 13."""
-    return _NUMERATORS[k - 1] / (_DENOMINATORS[k - 1] * factorial(2 * k))
+    return (-1) ** (k + 1) * NUMERATORS[k - 1] / (DENOMINATORS[k - 1] * factorial(2 * k))
 
 
 _COTANGENT = terms(lambda k: (-1) ** k * bernoulli_ratio(k + 1))
@@ -119,13 +117,7 @@ def rotation_dexp_inv(w: Array) -> Array:
 def quaternion_to_matrix(q: Array) -> Array:
     """Rotation matrix (3, 3) of a unit quaternion, or (3, 3, n) of many (4, n): 1 + 2 w v̂ + 2 v̂²."""
     w, x, y, z = q.tolist() if q.ndim == 1 else q
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
+    return np.array(so3.matrix([w, x, y, z]))
 
 
 def matrix_to_quaternion(m: Array) -> Array:

@@ -1,7 +1,7 @@
 """The cover of SE(2) as formulas over numbers of any kind: motions (φ, x, y), the angle not wrapped."""
 
 from ephs.semantics.spaces.series import alpha, beta, cot, gamma
-from ephs.semantics.spaces.vectors import Entries, Rows, add, scale, sub
+from ephs.semantics.spaces.vectors import Entries, Rows, add, sub
 from ephs.semantics.stage import Evaluator, Real
 
 
@@ -13,11 +13,6 @@ def _times(p: Real, q: Real, v: Entries) -> list[Real]:
 def compose(on: Evaluator, a: Entries, b: Entries) -> list[Real]:
     """Product of planar motions."""
     return [a[0] + b[0], *add(a[1:], _times(on.cos(a[0]), on.sin(a[0]), b[1:]))]
-
-
-def inverse(on: Evaluator, a: Entries) -> list[Real]:
-    """Inverse of a planar motion."""
-    return [-a[0], *scale(-1.0, _times(on.cos(a[0]), -on.sin(a[0]), a[1:]))]
 
 
 def exp(on: Evaluator, v: Entries) -> list[Real]:

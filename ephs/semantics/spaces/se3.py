@@ -9,19 +9,7 @@ wrenches (torque, force), both lists of six. With x = (R, p):
 
 from ephs.semantics.spaces import so3
 from ephs.semantics.spaces.series import beta, beta1, cot, cot1, gamma, gamma1
-from ephs.semantics.spaces.vectors import (
-    Columns,
-    Entries,
-    Rows,
-    add,
-    apply,
-    apply_transposed,
-    cross,
-    dot,
-    plus,
-    scale,
-    sub,
-)
+from ephs.semantics.spaces.vectors import Entries, Rows, add, cross, dot, plus, scale, sub
 from ephs.semantics.stage import Evaluator, Real
 
 
@@ -46,29 +34,6 @@ def adjoint(pose: Entries, u: Entries) -> list[Real]:
     """Ad_x u of a pose and a twist."""
     turning = so3.rotate(pose[:4], u[:3])
     return [*turning, *add(so3.rotate(pose[:4], u[3:]), cross(pose[4:], turning))]
-
-
-def coadjoint(pose: Entries, f: Entries) -> list[Real]:
-    """Ad*_x f of a pose and a wrench: the transpose of Ad_x."""
-    back = so3.conjugate(pose[:4])
-    return [*so3.rotate(back, sub(f[:3], cross(pose[4:], f[3:]))), *so3.rotate(back, f[3:])]
-
-
-def twist_inward(rotation: Columns, place: Entries, u: Entries) -> list[Real]:
-    """Ad_{x⁻¹} u: a twist of the frame around as the frame x = (R, p) inside sees it."""
-    return [*apply_transposed(rotation, u[:3]), *apply_transposed(rotation, add(u[3:], cross(u[:3], place)))]
-
-
-def twist_outward(rotation: Columns, place: Entries, u: Entries) -> list[Real]:
-    """Ad_x u: a twist of the frame x = (R, p) inside as the frame around sees it."""
-    turning = apply(rotation, u[:3])
-    return [*turning, *add(apply(rotation, u[3:]), cross(place, turning))]
-
-
-def wrench_outward(rotation: Columns, place: Entries, f: Entries) -> list[Real]:
-    """Ad*_{x⁻¹} f: a wrench on the frame x = (R, p) as the frame around sees it."""
-    force = apply(rotation, f[3:])
-    return [*add(apply(rotation, f[:3]), cross(place, force)), *force]
 
 
 def bracket(u: Entries, w: Entries) -> list[Real]:

@@ -12,9 +12,9 @@ from typing import Final
 
 from ephs.semantics.stage import Evaluator, Real, Truth
 
-# B₂ₖ / (2k)! of the Bernoulli numbers with all signs positive, k = 1 … 12.
-_NUMERATORS: Final = (1, 1, 1, 1, 5, 691, 7, 3617, 43867, 174611, 854513, 236364091)
-_DENOMINATORS: Final = (6, 30, 42, 30, 66, 2730, 6, 510, 798, 330, 138, 2730)
+NUMERATORS: Final = (1, 1, 1, 1, 5, 691, 7, 3617, 43867, 174611, 854513, 236364091, 8553103)
+DENOMINATORS: Final = (6, 30, 42, 30, 66, 2730, 6, 510, 798, 330, 138, 2730, 6)
+"""Of the Bernoulli numbers B₂ₖ without their signs, k = 1 … 13."""
 
 # Highest power first, as Horner's rule reads them.
 _COSINE: Final = tuple((-1) ** k / factorial(2 * k) for k in range(10, -1, -1))
@@ -23,8 +23,8 @@ _BETA: Final = tuple((-1) ** k / factorial(2 * k + 2) for k in range(9, -1, -1))
 _GAMMA: Final = tuple((-1) ** k / factorial(2 * k + 3) for k in range(9, -1, -1))
 _BETA1: Final = tuple(2 * k * (-1) ** k / factorial(2 * k + 2) for k in range(10, 0, -1))
 _GAMMA1: Final = tuple(2 * k * (-1) ** k / factorial(2 * k + 3) for k in range(10, 0, -1))
-_COT: Final = tuple(_NUMERATORS[k] / (_DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, -1, -1))
-_COT1: Final = tuple(2 * k * _NUMERATORS[k] / (_DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, 0, -1))
+_COT: Final = tuple(NUMERATORS[k] / (DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, -1, -1))
+_COT1: Final = tuple(2 * k * NUMERATORS[k] / (DENOMINATORS[k] * factorial(2 * k + 2)) for k in range(11, 0, -1))
 
 
 def horner(coefficients: Sequence[float], x: Real) -> Real:

@@ -79,11 +79,6 @@ def hat(a: Entries) -> Rows:
     return [[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]]
 
 
-def vee(a: Columns) -> Vector3:
-    """The vector of an antisymmetric matrix: `hat` undone."""
-    return [a[2][1], a[0][2], a[1][0]]
-
-
 def symmetric(entries: Entries) -> Rows:
     """The symmetric matrix of an upper triangle, row by row."""
     size = int((8 * len(entries) + 1) ** 0.5) // 2

@@ -13,6 +13,8 @@ from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
 from ephs.semantics.stage.memory import Cells
 from ephs.semantics.stage.numbers import (
+    ARITHMETIC,
+    ORDERS,
     Count,
     Integer,
     IntegerOperation,
@@ -25,17 +27,8 @@ from ephs.semantics.stage.numbers import (
 )
 
 _OPERATIONS: Final[dict[str, Callable[[Any, Any], Any]]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": lambda a, b: a / b,
-    "//": lambda a, b: a // b,
-    "%": operator.mod,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-}
+    **ARITHMETIC, **ORDERS, "//": lambda a, b: a // b, "%": operator.mod
+}  # fmt: skip
 _EXACT: Final[dict[Function, Callable[..., Any]]] = {
     "sqrt": np.sqrt,
     "absolute": np.abs,

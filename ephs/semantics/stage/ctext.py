@@ -11,9 +11,14 @@ from typing import Final, final
 from ephs.semantics.stage.errors import StageError
 
 _TYPES: Final = {"double": "double", "i64": "int64_t", "i1": "int", "ptr": "char *", "void": "void", "i8": "char"}
-_REAL: Final = {"fadd": "+", "fsub": "-", "fmul": "*", "fdiv": "/"}
+_PLAIN: Final = {"fadd": "+", "fsub": "-", "fmul": "*", "fdiv": "/", "sdiv": "/", "srem": "%", "ashr": ">>"}
 _WRAPPING: Final = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^", "shl": "<<", "lshr": ">>"}
-_SIGNED: Final = {"sdiv": "/", "srem": "%", "ashr": ">>"}
+_CASTS: Final = {
+    "sitofp": "(double){}", "uitofp": "(double)(uint64_t){}", "sext": "-(int64_t){}", "zext": "(int64_t){}",
+    "inttoptr": "(char *)(intptr_t){}",
+}  # fmt: skip
+_BITS: Final = {"double": "bits_to_double({})", "i64": "double_to_bits({})"}
+"""Cast of the bits of a number, by the type that it becomes."""
 _ORDER: Final = {"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
 _BUILT: Final = {
     "llvm.fabs.f64": "fabs", "llvm.sqrt.f64": "sqrt", "llvm.floor.f64": "floor", "llvm.copysign.f64": "copysign",
@@ -114,12 +119,10 @@ class _Function:
         self.given = set(self.kinds)
         self.entering: dict[str, list[tuple[str, str, str]]] = {}
         self.lines: list[str] = []
-        self._operations: dict[str, Callable[[str | None, str, str], None]] = {
-            "fneg": self._fneg, "fcmp": self._fcmp, "icmp": self._icmp, "select": self._select, "load":
-            self._load, "store": self._store, "getelementptr": self._getelementptr, "alloca": self._alloca,
-            "phi": self._phi, "br": self._br, "ret": self._ret, "call": self._call, "sitofp": self._sitofp,
-            "uitofp": self._uitofp, "sext": self._sext, "zext": self._zext, "inttoptr": self._inttoptr,
-            "bitcast": self._bitcast,
+        self._operations: dict[str, Callable[[str | None, str], None]] = {
+            "fneg": self._negate, "fcmp": self._compare, "icmp": self._compare, "select": self._select,
+            "load": self._load, "store": self._store, "getelementptr": self._step, "alloca": self._allocate,
+            "ret": self._return, "call": self._call,
         }  # fmt: skip
 
     def text(self) -> str:
@@ -168,7 +171,7 @@ class _Function:
         kind, _, word = words.partition(" ")
         return kind, self._value(word.replace("noalias ", ""), kind)
 
-    def _put(self, word: str | None, kind: str, value: str) -> None:
+    def _write(self, word: str | None, kind: str, value: str) -> None:
         if word is None or kind == "void":
             self.lines.append(f"  {value};")
         else:
@@ -183,72 +186,61 @@ class _Function:
         found = _LINE.match(line)
         word, operation, rest = found.groups() if found else (None, "", "")
         rest = re.sub(r"^(nsw |nuw |inbounds |fastcc |tail )+", "", rest)
-        write = self._writer(operation)
-        if write is None:
+        if operation in _PLAIN:
+            self._binary(word, rest, f"{{}} {_PLAIN[operation]} {{}}")
+        elif operation in _WRAPPING:
+            self._binary(word, rest, _wrapping(_WRAPPING[operation], rest))
+        elif operation in _CASTS or operation == "bitcast":
+            value, _, kind = rest.rpartition(" to ")
+            self._write(word, kind, (_CASTS.get(operation) or _BITS[kind]).format(self._typed(value)[1]))
+        elif operation in self._operations:
+            self._operations[operation](word, rest)
+        elif operation == "br":
+            self._branch(rest, block)
+        elif operation != "phi":  # whose value was handed over where the block was entered
             raise StageError("machine", where="c_text", found=line.strip())
-        write(word, rest, block)
-
-    def _writer(self, operation: str) -> Callable[[str | None, str, str], None] | None:
-        if operation in _REAL:
-            return lambda word, rest, _: self._binary(word, rest, f"{{}} {_REAL[operation]} {{}}")
-        if operation in _SIGNED:
-            return lambda word, rest, _: self._binary(word, rest, f"{{}} {_SIGNED[operation]} {{}}")
-        if operation in _WRAPPING:
-            sign = _WRAPPING[operation]
-            return lambda word, rest, _: self._binary(word, rest, _wrapping(sign, rest))
-        return self._operations.get(operation)
 
     def _binary(self, word: str | None, rest: str, form: str) -> None:
         kind, _, operands = rest.partition(" ")
         one, other = _split(operands)
-        self._put(word, kind, form.format(self._value(one, kind), self._value(other, kind)))
+        self._write(word, kind, form.format(self._value(one, kind), self._value(other, kind)))
 
-    def _fneg(self, word: str | None, rest: str, block: str) -> None:
+    def _negate(self, word: str | None, rest: str) -> None:
         kind, value = self._typed(rest)
-        self._put(word, kind, f"-{value}")
+        self._write(word, kind, f"-{value}")
 
-    def _compare(self, word: str | None, rest: str, prefixes: str) -> None:
-        order, _, words = rest.partition(" ")
-        kind, _, operands = words.partition(" ")
+    def _compare(self, word: str | None, rest: str) -> None:
+        order, kind, operands = rest.split(" ", 2)
         one, other = _split(operands)
-        sign = _ORDER.get(order) or _ORDER[order.lstrip(prefixes)]
-        self._put(word, "i1", f"{self._value(one, kind)} {sign} {self._value(other, kind)}")
+        sign = _ORDER.get(order) or _ORDER[order[1:]]  # ordered, or signed
+        self._write(word, "i1", f"{self._value(one, kind)} {sign} {self._value(other, kind)}")
 
-    def _fcmp(self, word: str | None, rest: str, block: str) -> None:
-        self._compare(word, rest, "o")
-
-    def _icmp(self, word: str | None, rest: str, block: str) -> None:
-        self._compare(word, rest, "s")
-
-    def _select(self, word: str | None, rest: str, block: str) -> None:
+    def _select(self, word: str | None, rest: str) -> None:
         (_, truth), (kind, one), (_, other) = map(self._typed, _split(rest))
-        self._put(word, kind, f"{truth} ? {one} : {other}")
+        self._write(word, kind, f"{truth} ? {one} : {other}")
 
-    def _load(self, word: str | None, rest: str, block: str) -> None:
+    def _load(self, word: str | None, rest: str) -> None:
         kind, pointer, *_ = _split(rest)
-        self._put(word, kind, f"*({_TYPES[kind]} *){self._typed(pointer)[1]}")
+        self._write(word, kind, f"*({_TYPES[kind]} *){self._typed(pointer)[1]}")
 
-    def _store(self, word: str | None, rest: str, block: str) -> None:
+    def _store(self, word: str | None, rest: str) -> None:
         value, pointer, *_ = _split(rest)
         kind, written = self._typed(value)
-        self._put(None, "void", f"*({_TYPES[kind]} *){self._typed(pointer)[1]} = {written}")
+        self._write(None, "void", f"*({_TYPES[kind]} *){self._typed(pointer)[1]} = {written}")
 
-    def _getelementptr(self, word: str | None, rest: str, block: str) -> None:
+    def _step(self, word: str | None, rest: str) -> None:
         kind, pointer, index = _split(rest)
         size = 1 if kind == "i8" else 8
-        self._put(word, "ptr", f"{self._typed(pointer)[1]} + {size} * {self._typed(index)[1]}")
+        self._write(word, "ptr", f"{self._typed(pointer)[1]} + {size} * {self._typed(index)[1]}")
 
-    def _alloca(self, word: str | None, rest: str, block: str) -> None:
+    def _allocate(self, word: str | None, rest: str) -> None:
         found = re.match(r"\[(\d+) x (\w+)\]|(\w+)", rest)
         size, kind = (found[1] or "1", found[2] or found[3]) if found else ("1", "i64")
         name = _name(word or "")
         self.slots.append(f"  {_TYPES[kind]} {name}_slot[{max(int(size), 1)}];")
-        self._put(word, "ptr", f"(char *){name}_slot")
+        self._write(word, "ptr", f"(char *){name}_slot")
 
-    def _phi(self, word: str | None, rest: str, block: str) -> None:
-        """Its value was handed over where the block was entered."""
-
-    def _br(self, word: str | None, rest: str, block: str) -> None:
+    def _branch(self, rest: str, block: str) -> None:
         parts = _split(rest)
         if len(parts) == 1:
             self.lines.append(f"  {self._jump(block, parts[0].split('%')[1])}")
@@ -257,10 +249,10 @@ class _Function:
         truth = self._typed(parts[0])[1]
         self.lines.append(f"  if ({truth}) {{ {self._jump(block, yes)} }} else {{ {self._jump(block, no)} }}")
 
-    def _ret(self, word: str | None, rest: str, block: str) -> None:
+    def _return(self, word: str | None, rest: str) -> None:
         self.lines.append("  return;" if rest == "void" else f"  return {self._typed(rest)[1]};")
 
-    def _call(self, word: str | None, rest: str, block: str) -> None:
+    def _call(self, word: str | None, rest: str) -> None:
         found = re.match(r"(\S+) ([@%][\w.]+)\((.*)\)$", rest)
         if found is None:
             raise StageError("machine", where="c_text", found=rest)
@@ -269,35 +261,13 @@ class _Function:
         values = ", ".join(value for _, value in arguments)
         if name.startswith("%"):
             kinds = ", ".join(_TYPES[kind] for kind, _ in arguments)
-            self._put(word, result, f"(({_TYPES[result]} (*)({kinds})){_name(name)})({values})")
+            self._write(word, result, f"(({_TYPES[result]} (*)({kinds})){_name(name)})({values})")
         elif name[1:] in _BUILT:
-            self._put(word, result, f"{_BUILT[name[1:]]}({values})")
+            self._write(word, result, f"{_BUILT[name[1:]]}({values})")
         elif name.startswith("@llvm.memcpy"):
-            self._put(None, "void", f"memcpy({', '.join(value for _, value in arguments[:3])})")
+            self._write(None, "void", f"memcpy({', '.join(value for _, value in arguments[:3])})")
         else:
-            self._put(word, result, f"{_name(name)}({values})")
-
-    def _cast(self, word: str | None, rest: str, form: str) -> None:
-        given, _, kind = rest.rpartition(" to ")
-        self._put(word, kind, form.format(self._typed(given)[1]))
-
-    def _sitofp(self, word: str | None, rest: str, block: str) -> None:
-        self._cast(word, rest, "(double){}")
-
-    def _uitofp(self, word: str | None, rest: str, block: str) -> None:
-        self._cast(word, rest, "(double)(uint64_t){}")
-
-    def _sext(self, word: str | None, rest: str, block: str) -> None:
-        self._cast(word, rest, "-(int64_t){}")
-
-    def _zext(self, word: str | None, rest: str, block: str) -> None:
-        self._cast(word, rest, "(int64_t){}")
-
-    def _inttoptr(self, word: str | None, rest: str, block: str) -> None:
-        self._cast(word, rest, "(char *)(intptr_t){}")
-
-    def _bitcast(self, word: str | None, rest: str, block: str) -> None:
-        self._cast(word, rest, "bits_to_double({})" if rest.endswith("double") else "double_to_bits({})")
+            self._write(word, result, f"{_name(name)}({values})")
 
 
 def _wrapping(sign: str, rest: str) -> str:

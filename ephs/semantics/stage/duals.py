@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.evaluator import Evaluator, Function
-from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
-from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
-from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
+from ephs.semantics.stage.evaluator import Evaluator, Function, Layered
+from ephs.semantics.stage.memory import Cells, RealCells
+from ephs.semantics.stage.numbers import ORDERS, Integer, Number, Operation, Order, Real, StagedCondition, Truth
+from ephs.semantics.stage.reaching import Part
 
 Ruled: TypeAlias = tuple[Real, tuple[Real, ...]]
 """The value of a function, and its derivative by each argument."""
@@ -54,7 +54,7 @@ class StagedDual(Number):
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
         (a, _), (b, _) = _pair(left, right)
-        return _ORDERS[order](a, b)
+        return ORDERS[order](a, b)
 
     def _negative(self) -> Real:
         return StagedDual(-self.value, tuple(-slope for slope in self.slopes), self.level)
@@ -85,14 +85,6 @@ def _times(slope: Real, factor: Real) -> Real:
 
 def _over(slope: Real, divisor: Real) -> Real:
     return 0.0 if _nought(slope) else slope / divisor
-
-
-_ORDERS: Final[dict[Order, Callable[[Real, Real], Truth]]] = {
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
-}
 
 
 @final
@@ -140,7 +132,7 @@ class DualCells(Cells[Real]):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Duals(Evaluator):
+class Duals(Layered):
     """Evaluation with dual numbers of another evaluator's numbers.
 
     Attributes
@@ -199,64 +191,20 @@ class Duals(Evaluator):
         a, b = self.dual(one), self.dual(other)
         return self.dual(self.base.select(truth, a.value, b.value), self.base.select(truth, a.slopes, b.slopes))
 
-    def _both(self, one: Truth, other: Truth) -> Truth:
-        return self.base.both(one, other)
-
-    def _negate(self, truth: StagedCondition) -> Truth:
-        return self.base.negate(truth)
-
-    def _same(self, one: Integer, other: Integer) -> Truth:
-        return self.base.same(one, other)
-
-    def real(self, integer: Integer) -> Real:
-        return self.dual(self.base.real(integer))
-
-    def integer(self, real: Real) -> Integer:
-        return self.base.integer(self.dual(real).value)
-
-    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
-        self.base.loop(count, body, start, down)
-
-    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
-        self.base.when(truth, yes, no)
-
-    def repeat(self, body: Callable[[], Truth]) -> None:
-        self.base.repeat(body)
-
     def _reals(self, size: int) -> RealCells:
         return self.cells(self.base._reals(size), self.base._reals(size * self.directions))
-
-    def _wholes(self, size: int) -> IntegerCells:
-        return self.base._wholes(size)
 
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
         constants = self.base._constants(values, whole)
         return constants if whole else self.cells(constants)
 
-    def _rehearse(self, body: Callable[[], None]) -> None:
-        self.base._rehearse(body)
+    def _handed(self, cells: Any, start: Integer) -> tuple[Part, Part]:
+        if not isinstance(cells, DualCells) or cells.slopes is None:
+            raise StageError("passive")
+        return ("reals", (cells.values, start)), ("reals", (cells.slopes, start * self.directions))
 
-    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
-        """Call a function's tangent by address; tables of programs with dual numbers contain addresses of tangents."""
-        rest, passed = iter(parts), list[Part]()
-        arguments: list[tuple[Atom, ...]] = []
-        for atoms in function.signature.arguments:
-            slopes: list[Part] = []
-            for atom, value in (next(rest) for _ in atoms):
-                if atom == "real":
-                    raise StageError("unreached", what="the derivative of a number that is handed over by itself")
-                if atom != "reals":
-                    passed.append((atom, value))
-                    continue
-                cells, start = value
-                if not isinstance(cells, DualCells) or cells.slopes is None:
-                    raise StageError("passive")
-                passed.append((atom, (cells.values, start)))
-                slopes.append((atom, (cells.slopes, start * self.directions)))
-            passed += slopes
-            arguments.append((*atoms, *(atom for atom, _ in slopes)))
-        signature = Signature(tuple(arguments), function.signature.returns)
-        return self.base._reach(Reached(signature, function.address), passed)
+    def _tape(self) -> list[Part]:
+        return []
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         return self.base._call(on, function, arguments)

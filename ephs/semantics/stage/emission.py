@@ -52,9 +52,9 @@ class FunctionWriter:
         """The type of a real number."""
         return self.typed("double")
 
-    def typed(self, scalar: str) -> str:
-        """Return the type of so many numbers of a scalar type as there are members."""
-        return scalar if self.width == 1 else f"<{self.width} x {scalar}>"
+    def typed(self, scalar: str, wide: bool = True) -> str:
+        """Return the type of so many numbers of a scalar type as there are members; of one where it is not wide."""
+        return f"<{self.width} x {scalar}>" if wide and self.width > 1 else scalar
 
     def fresh(self) -> str:
         """Return a name that was not used yet."""
@@ -64,10 +64,10 @@ class FunctionWriter:
     def let(self, text: str) -> str:
         """Write an instruction and return the name of its result."""
         name = self.fresh()
-        self.do(f"{name} = {text}")
+        self.write(f"{name} = {text}")
         return name
 
-    def do(self, text: str) -> None:
+    def write(self, text: str) -> None:
         """Write an instruction."""
         if len(self.lines) >= LIMIT:
             raise StageError("endless", limit=LIMIT)
@@ -83,13 +83,13 @@ class FunctionWriter:
         """Return a name for a block."""
         return self.fresh()[1:]
 
-    def go(self, label: str) -> None:
+    def jump(self, label: str) -> None:
         """Branch to a block."""
-        self.do(f"br label %{label}")
+        self.write(f"br label %{label}")
 
     def fork(self, condition: str, yes: str, no: str) -> None:
         """Branch to one of two blocks."""
-        self.do(f"br i1 {condition}, label %{yes}, label %{no}")
+        self.write(f"br i1 {condition}, label %{yes}, label %{no}")
 
     def begin(self, label: str) -> None:
         """Begin a block."""
@@ -115,11 +115,11 @@ class FunctionWriter:
         if isinstance(value, Symbol):
             self.own(value.writer)
             return value.name
-        return self.constant(_hexadecimal(_plain(value)), "double")
+        return self.constant(hexadecimal(_plain(value)), "double")
 
     def of_constant(self, value: float, whole: bool) -> str:
         """Return the operand of one known number, whatever the number of members."""
-        return str(_whole(int(value))) if whole else _hexadecimal(float(value))
+        return str(_whole(int(value))) if whole else hexadecimal(float(value))
 
     def of_integer(self, value: Integer, wide: bool = False) -> str:
         """Return the operand of an integer, one for each member where `wide`."""
@@ -155,7 +155,8 @@ def _whole(value: Integer) -> int:
     return int(value)
 
 
-def _hexadecimal(value: float) -> str:
+def hexadecimal(value: float) -> str:
+    """Return the operand of a known real number."""
     return "0x" + struct.pack(">d", value).hex().upper()
 
 
@@ -191,19 +192,14 @@ class WholeSymbol(Count):
     name: str
     wide: bool = False
 
-    def _wide(self, left: Integer, right: Integer) -> bool:
-        return any(isinstance(side, WholeSymbol) and side.wide for side in (left, right))
-
     def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
-        to, wide = self.writer, self._wide(left, right)
-        kind = to.typed("i64") if wide else "i64"
-        a, b = to.of_integer(left, wide), to.of_integer(right, wide)
+        to, kind, a, b, wide = operands(self.writer, left, right)
         if operation in _WHOLE:
             return WholeSymbol(to, to.let(f"{_WHOLE[operation]} {kind} {a}, {b}"), wide)
         # The machine rounds towards zero: one less where the remainder's sign is not the divisor's.
         rest = to.let(f"srem {kind} {a}, {b}")
         zero = to.of_integer(0, wide)
-        truth = f"<{to.width} x i1>" if wide else "i1"
+        truth = to.typed("i1", wide)
         some = to.let(f"icmp ne {kind} {rest}, {zero}")
         mixed = to.let(f"icmp slt {kind} {to.let(f'xor {kind} {rest}, {b}')}, {zero}")
         less = to.let(f"and {truth} {some}, {mixed}")
@@ -215,10 +211,16 @@ class WholeSymbol(Count):
         return WholeSymbol(to, to.let(f"add {kind} {quotient}, {to.let(f'sext {truth} {less} to {kind}')}"), wide)
 
     def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
-        to, wide = self.writer, self._wide(left, right)
-        kind = to.typed("i64") if wide else "i64"
-        a, b = to.of_integer(left, wide), to.of_integer(right, wide)
+        to, kind, a, b, wide = operands(self.writer, left, right)
         return TruthSymbol(to, to.let(f"icmp s{_ORDER[order]} {kind} {a}, {b}"), wide)
+
+
+def operands(
+    to: FunctionWriter, left: Integer, right: Integer, wide: bool = False
+) -> tuple[FunctionWriter, str, str, str, bool]:
+    """The writer, the type and the operands of two integers, and whether there is one of each for each member."""
+    wide = wide or any(isinstance(side, WholeSymbol) and side.wide for side in (left, right))
+    return to, to.typed("i64", wide), to.of_integer(left, wide), to.of_integer(right, wide), wide
 
 
 @final
@@ -240,14 +242,14 @@ class RealPointer(RealCells):
     name: str
     shared: bool = False
 
-    def _at(self, kind: str, index: Integer) -> str:
+    def _address(self, kind: str, index: Integer) -> str:
         to = self.writer
         return to.let(f"getelementptr inbounds {kind}, ptr {self.name}, i64 {to.of_integer(index)}")
 
     def load(self, index: Integer) -> Real:
         """Return the number at an index."""
         to, kind = self.writer, "double" if self.shared else self.writer.real
-        found = to.let(f"load {kind}, ptr {self._at(kind, index)}, align 8")
+        found = to.let(f"load {kind}, ptr {self._address(kind, index)}, align 8")
         return Symbol(to, to.spread(found, "double") if self.shared else found)
 
     def store(self, index: Integer, value: Real) -> None:
@@ -256,7 +258,7 @@ class RealPointer(RealCells):
         if self.shared and to.width > 1:
             raise StageError("shared")
         operand = to.of_real(value)
-        to.do(f"store {to.real} {operand}, ptr {self._at(to.real, index)}, align 8")
+        to.write(f"store {to.real} {operand}, ptr {self._address(to.real, index)}, align 8")
 
 
 @final
@@ -267,15 +269,15 @@ class IntegerPointer(IntegerCells):
     writer: FunctionWriter
     name: str
 
-    def _at(self, index: Integer) -> str:
+    def _address(self, index: Integer) -> str:
         to = self.writer
         return to.let(f"getelementptr inbounds i64, ptr {self.name}, i64 {to.of_integer(index)}")
 
     def load(self, index: Integer) -> Integer:
         to = self.writer
-        return WholeSymbol(to, to.let(f"load i64, ptr {self._at(index)}, align 8"))
+        return WholeSymbol(to, to.let(f"load i64, ptr {self._address(index)}, align 8"))
 
     def store(self, index: Integer, value: Integer) -> None:
         to = self.writer
         operand = to.of_integer(value)
-        to.do(f"store i64 {operand}, ptr {self._at(index)}, align 8")
+        to.write(f"store i64 {operand}, ptr {self._address(index)}, align 8")

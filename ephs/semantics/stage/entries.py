@@ -189,7 +189,7 @@ class Entry:
             return self.function(
                 unrolled,
                 *[
-                    kind.join([unrolled.held(part) for part in parts[name]]) if name in parts else next(others)
+                    kind.join([unrolled.as_cells(part) for part in parts[name]]) if name in parts else next(others)
                     for name, kind in self.kinds.items()
                 ],
             )

@@ -116,15 +116,22 @@ def _log(low: float, high: float) -> Interval:
     return _out([math.log(end) if end else -math.inf for end in (low, high)], _ULPS)
 
 
+def extrema(low: float, high: float) -> tuple[bool, bool]:
+    """Whether the cosine may be −1, and 1, at angles between two."""
+    turn = 2.0 * math.pi
+    bottom, top = (
+        math.floor((high + shift + NEAR) / turn) >= math.ceil((low + shift - NEAR) / turn) for shift in (math.pi, 0.0)
+    )
+    return bottom, top
+
+
 def _wave(low: float, high: float, peak: float) -> Interval:
     """Bound the cosine of x − peak."""
     if math.isinf(low) or math.isinf(high):
         return _WHOLE
     if max(abs(low), abs(high)) > _FAR:
         return Interval(-1.0, 1.0)
-    turn, near = 2.0 * math.pi, NEAR
-    top = math.floor((high - peak + near) / turn) >= math.ceil((low - peak - near) / turn)
-    bottom = math.floor((high - peak + math.pi + near) / turn) >= math.ceil((low - peak + math.pi - near) / turn)
+    bottom, top = extrema(low - peak, high - peak)
     of = math.sin if peak else math.cos
     ends = _out((of(low), of(high)), _ULPS)
     return _clipped(Interval(-1.0 if bottom else ends.low, 1.0 if top else ends.high), -1.0, 1.0)

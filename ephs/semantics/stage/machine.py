@@ -8,7 +8,15 @@ from typing import Any, Final, cast, final
 import numpy as np
 
 from ephs.semantics.stage.elementary import COMPOSED
-from ephs.semantics.stage.emission import FunctionWriter, IntegerPointer, RealPointer, Symbol, TruthSymbol, WholeSymbol
+from ephs.semantics.stage.emission import (
+    FunctionWriter,
+    IntegerPointer,
+    RealPointer,
+    Symbol,
+    TruthSymbol,
+    WholeSymbol,
+    operands,
+)
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Evaluator, Function, known
 from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, Matrix, RealCells, Variable, Vector
@@ -90,7 +98,7 @@ class Machine(Evaluator):
                 for place, (kind, operand) in enumerate(leaves):
                     value = to.let(f"insertvalue {returns} {value}, {kind} {operand}, {place}")
                 last = f"ret {returns} {value}"
-            to.do(last)
+            to.write(last)
             head = f"define {linkage}{returns} @{name}({', '.join(parameters)}) {{\nentry:"
             self._functions.append("\n".join([head, *to.slots, *to.lines, "}"]))
         return returns, form
@@ -136,28 +144,22 @@ class Machine(Evaluator):
     # Conditions
 
     def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
-        to = self.to
-        chosen, wide = self._truth(truth)
+        to, (chosen, wide) = self.to, self._truth(truth)
+
+        def selected(kind: str, yes: str, no: str) -> str:
+            return to.let(f"select {to.typed('i1', wide)} {chosen}, {kind} {yes}, {kind} {no}")
+
         if isinstance(one, bool | StagedCondition):
-            spread = wide or any(isinstance(side, TruthSymbol) and side.wide for side in (one, other))
-            a, b = (self._of_truth(side, spread) for side in (one, other))
-            kind = to.typed("i1") if spread else "i1"
-            return TruthSymbol(
-                to, to.let(f"select {'i1' if not wide else kind} {chosen}, {kind} {a}, {kind} {b}"), spread
-            )
+            kind, a, b, spread = self._truths(one, other, wide)
+            return TruthSymbol(to, selected(kind, a, b), spread)
         if (
             isinstance(one, WholeSymbol)
             or isinstance(other, WholeSymbol)
             or (isinstance(one, int) and isinstance(other, int))
         ):
-            spread = wide or any(isinstance(side, WholeSymbol) and side.wide for side in (one, other))
-            kind = to.typed("i64") if spread else "i64"
-            a, b = to.of_integer(one, spread), to.of_integer(other, spread)
-            return WholeSymbol(
-                to, to.let(f"select {to.typed('i1') if wide else 'i1'} {chosen}, {kind} {a}, {kind} {b}"), spread
-            )
-        a, b = to.of_real(one), to.of_real(other)
-        return Symbol(to, to.let(f"select {to.typed('i1') if wide else 'i1'} {chosen}, {to.real} {a}, {to.real} {b}"))
+            _, kind, a, b, spread = operands(to, one, other, wide)
+            return WholeSymbol(to, selected(kind, a, b), spread)
+        return Symbol(to, selected(to.real, to.of_real(one), to.of_real(other)))
 
     def _truth(self, truth: object) -> tuple[str, bool]:
         assert isinstance(truth, TruthSymbol)
@@ -171,21 +173,22 @@ class Machine(Evaluator):
         text = "true" if truth else "false"
         return self.to.constant(text, "i1") if wide else text
 
+    def _truths(self, one: Any, other: Any, wide: bool = False) -> tuple[str, str, str, bool]:
+        """The type and the operands of two conditions, and whether there is one of each for each member."""
+        wide = wide or any(isinstance(side, TruthSymbol) and side.wide for side in (one, other))
+        return self.to.typed("i1", wide), self._of_truth(one, wide), self._of_truth(other, wide), wide
+
     def _both(self, one: Truth, other: Truth) -> Truth:
-        to, wide = self.to, any(isinstance(side, TruthSymbol) and side.wide for side in (one, other))
-        a, b = self._of_truth(one, wide), self._of_truth(other, wide)
-        return TruthSymbol(to, to.let(f"and {to.typed('i1') if wide else 'i1'} {a}, {b}"), wide)
+        kind, a, b, wide = self._truths(one, other)
+        return TruthSymbol(self.to, self.to.let(f"and {kind} {a}, {b}"), wide)
 
     def _negate(self, truth: StagedCondition) -> Truth:
-        to, (name, wide) = self.to, self._truth(truth)
-        return TruthSymbol(
-            to, to.let(f"xor {to.typed('i1') if wide else 'i1'} {name}, {self._of_truth(True, wide)}"), wide
-        )
+        kind, a, b, wide = self._truths(truth, True)
+        return TruthSymbol(self.to, self.to.let(f"xor {kind} {a}, {b}"), wide)
 
     def _same(self, one: Integer, other: Integer) -> Truth:
-        to, wide = self.to, any(isinstance(side, WholeSymbol) and side.wide for side in (one, other))
-        a, b = to.of_integer(one, wide), to.of_integer(other, wide)
-        return TruthSymbol(to, to.let(f"icmp eq {to.typed('i64') if wide else 'i64'} {a}, {b}"), wide)
+        to, kind, a, b, wide = operands(self.to, one, other)
+        return TruthSymbol(to, to.let(f"icmp eq {kind} {a}, {b}"), wide)
 
     def _single(self, truth: Truth, what: str) -> str:
         """Return the operand of a condition that is the same for all members."""
@@ -200,10 +203,10 @@ class Machine(Evaluator):
         first, last = to.of_integer(start), to.of_integer(count)
         head, inner, out = to.label(), to.label(), to.label()
         before = to.block
-        to.go(head)
+        to.jump(head)
         to.begin(head)
         index, following = to.fresh(), to.fresh()
-        to.do("")
+        to.write("")
         place = len(to.lines) - 1
         to.fork(to.let(f"icmp slt i64 {index}, {last}"), inner, out)
         to.begin(inner)
@@ -213,9 +216,9 @@ class Machine(Evaluator):
             body(WholeSymbol(to, to.let(f"sub i64 {to.let(f'sub i64 {ends}, 1')}, {index}")))
         else:
             body(WholeSymbol(to, index))
-        to.do(f"{following} = add nsw i64 {index}, 1")
+        to.write(f"{following} = add nsw i64 {index}, 1")
         to.lines[place] = f"  {index} = phi i64 [ {first}, %{before} ], [ {following}, %{to.block} ]"
-        to.go(head)
+        to.jump(head)
         to.begin(out)
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
@@ -230,17 +233,17 @@ class Machine(Evaluator):
         to.fork(self._single(truth, "on.when"), one, out if no is None else other)
         to.begin(one)
         yes()
-        to.go(out)
+        to.jump(out)
         if no is not None:
             to.begin(other)
             no()
-            to.go(out)
+            to.jump(out)
         to.begin(out)
 
     def repeat(self, body: Callable[[], Truth]) -> None:
         to = self.to
         inner, out = to.label(), to.label()
-        to.go(inner)
+        to.jump(inner)
         to.begin(inner)
         truth = body()
         to.fork(self._single(truth, "on.repeat"), out, inner)
@@ -283,7 +286,7 @@ class Machine(Evaluator):
         operands = ", ".join(f"{kind} {operand}" for kind, operand in passed)
         call = f"call fastcc {emitted.returns} @{emitted.name}({operands})"
         if emitted.returns == "void":
-            to.do(call)
+            to.write(call)
             return _shaped(to, emitted.form, iter(()))
         value = to.let(call)
         if not emitted.returns.startswith("{"):
@@ -309,7 +312,7 @@ class Machine(Evaluator):
         pointer = to.let(f"inttoptr i64 {to.of_integer(function.address)} to ptr")
         if function.signature.returns:
             return WholeSymbol(to, to.let(f"call i64 {pointer}({', '.join(operands)})"))
-        to.do(f"call void {pointer}({', '.join(operands)})")
+        to.write(f"call void {pointer}({', '.join(operands)})")
         return 0
 
     def _emit(self, on: Evaluator, function: Callable[..., Any], form: Any, kinds: list[str]) -> _Emitted:
@@ -343,11 +346,11 @@ def _flat(to: FunctionWriter, value: Any, leaf: Callable[[str, str], None]) -> A
             leaf(to.real, to.of_real(value))
             return (Symbol,)
         case WholeSymbol():
-            leaf(to.typed("i64") if value.wide else "i64", to.of_integer(value))
+            leaf(to.typed("i64", value.wide), to.of_integer(value))
             return (WholeSymbol, value.wide)
         case TruthSymbol():
             to.own(value.writer)
-            leaf(to.typed("i1") if value.wide else "i1", value.name)
+            leaf(to.typed("i1", value.wide), value.name)
             return (TruthSymbol, value.wide)
         case RealPointer() | IntegerPointer():
             to.own(value.writer)

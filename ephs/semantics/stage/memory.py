@@ -6,7 +6,7 @@ checked against the size where that is known too: everywhere in plain evaluation
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Generic, TypeAlias, TypeVar, cast, final
+from typing import ClassVar, Generic, Self, TypeAlias, TypeVar, cast, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,15 +105,38 @@ def inside(index: Integer, size: Integer, what: str) -> Integer:
     return index
 
 
-def _part(start: Integer, length: Integer, size: Integer, what: str) -> None:
-    if isinstance(start, int) and isinstance(length, int) and isinstance(size, int) and length:
-        inside(start, size, what)
-        inside(start + length - 1, size, what)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Window(Generic[Value]):
+    """Numbers in a row."""
+
+    cells: Cells[Value]
+    start: Integer
+    size: Integer
+    what: ClassVar[str]
+    """What an error says that it is."""
+
+    __iter__ = None  # Python would ask for entries without end.
+
+    @final
+    def __getitem__(self, index: Integer) -> Value:
+        return self.cells.load(self.start + inside(index, self.size, self.what))
+
+    @final
+    def __setitem__(self, index: Integer, value: Value) -> None:
+        self.cells.store(self.start + inside(index, self.size, self.what), value)
+
+    @final
+    def part(self, start: Integer, length: Integer) -> Self:
+        """Return a window of this memory: `length` entries from `start`."""
+        if isinstance(start, int) and isinstance(length, int) and isinstance(self.size, int) and length:
+            inside(start, self.size, self.what)
+            inside(start + length - 1, self.size, self.what)
+        return type(self)(self.cells, self.start + start, length)
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Vector:
+class Vector(_Window[Real]):
     """Real numbers in a row.
 
     Attributes
@@ -124,45 +147,15 @@ class Vector:
         How many.
     """
 
-    cells: RealCells
-    start: Integer
-    size: Integer
-
-    __iter__ = None  # Python would ask for entries without end.
-
-    def __getitem__(self, index: Integer) -> Real:
-        return self.cells.load(self.start + inside(index, self.size, "a vector"))
-
-    def __setitem__(self, index: Integer, value: Real) -> None:
-        self.cells.store(self.start + inside(index, self.size, "a vector"), value)
-
-    def part(self, start: Integer, length: Integer) -> "Vector":
-        """Return a window of this memory: `length` entries from `start`."""
-        _part(start, length, self.size, "a vector")
-        return Vector(self.cells, self.start + start, length)
+    what = "a vector"
 
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Integers:
+class Integers(_Window[Integer]):
     """Integers in a row, like `Vector`."""
 
-    cells: IntegerCells
-    start: Integer
-    size: Integer
-
-    __iter__ = None  # Python would ask for entries without end.
-
-    def __getitem__(self, index: Integer) -> Integer:
-        return self.cells.load(self.start + inside(index, self.size, "integers"))
-
-    def __setitem__(self, index: Integer, value: Integer) -> None:
-        self.cells.store(self.start + inside(index, self.size, "integers"), value)
-
-    def part(self, start: Integer, length: Integer) -> "Integers":
-        """Return a window of this memory: `length` entries from `start`."""
-        _part(start, length, self.size, "integers")
-        return Integers(self.cells, self.start + start, length)
+    what = "integers"
 
 
 @final
@@ -177,16 +170,16 @@ class Matrix:
 
     __iter__ = None  # Python would ask for entries without end.
 
-    def _at(self, row: Integer, column: Integer) -> Integer:
+    def _index(self, row: Integer, column: Integer) -> Integer:
         inside(row, self.rows, "the rows of a matrix")
         inside(column, self.columns, "the columns of a matrix")
         return self.start + (row * self.columns + column)
 
     def __getitem__(self, at: tuple[Integer, Integer]) -> Real:
-        return self.cells.load(self._at(*at))
+        return self.cells.load(self._index(*at))
 
     def __setitem__(self, at: tuple[Integer, Integer], value: Real) -> None:
-        self.cells.store(self._at(*at), value)
+        self.cells.store(self._index(*at), value)
 
     def row(self, row: Integer) -> Vector:
         """Return a row as a window of this memory."""

@@ -6,8 +6,10 @@ Operators work on both and drop what a known number makes idle: x + 0, x − 0, 
 sign of a zero.
 """
 
+import operator
 from abc import ABC, abstractmethod
-from typing import Final, Literal, NoReturn, TypeAlias, Union, final
+from collections.abc import Callable
+from typing import Any, ClassVar, Final, Generic, Literal, NoReturn, TypeAlias, TypeVar, Union, cast, final
 
 import numpy as np
 
@@ -23,9 +25,19 @@ Operation: TypeAlias = Literal["+", "-", "*", "/"]
 IntegerOperation: TypeAlias = Literal["+", "-", "*", "//", "%"]
 Order: TypeAlias = Literal["<", "<=", ">", ">="]
 
-
-_ZERO: Final = np.float64(0.0)
-"""A zero that follows IEEE where it divides a known number; Python's own raises."""
+Value = TypeVar("Value")
+ARITHMETIC: Final[dict[Operation, Callable[[Any, Any], Any]]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": lambda a, b: a / b,
+}
+ORDERS: Final[dict[Order, Callable[[Any, Any], Any]]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
 
 
 class StagedCondition:
@@ -74,60 +86,98 @@ class _Unknown:
     __hash__ = object.__hash__
 
 
-class Number(_Unknown, ABC):
+class _Operand(_Unknown, ABC, Generic[Value]):
+    """Operators that real numbers and integers have in common; known zeros and ones are idle."""
+
+    __slots__ = ()
+    _plain: ClassVar[tuple[type, ...]]
+    """Python's own types of such numbers."""
+    _zero: ClassVar[Any]
+
+    @abstractmethod
+    def _apply(self, operation: Any, left: Value, right: Value) -> Value:
+        """Apply an operation; at least one side is of this class."""
+
+    @abstractmethod
+    def _order(self, order: Order, left: Value, right: Value) -> Truth:
+        """Compare; at least one side is of this class."""
+
+    @final
+    def _require(self, operation: str, left: object, right: object) -> None:
+        other = right if left is self else left
+        if not isinstance(other, self._plain) and type(other) is not type(self):
+            raise StageError("operand", what=operation, left=type(left).__name__, right=type(right).__name__)
+
+    @final
+    def _binary(self, operation: str, left: object, right: object) -> Any:
+        self._require(operation, left, right)
+        return self._apply(operation, cast("Value", left), cast("Value", right))
+
+    @final
+    def _compare(self, order: Order, other: object) -> Truth:
+        self._require(order, self, other)
+        return self._order(order, cast("Value", self), cast("Value", other))
+
+    @final
+    def __add__(self, other: Value) -> Value:
+        return cast("Value", self) if _is(other, 0.0) else self._binary("+", self, other)
+
+    @final
+    def __radd__(self, other: Value) -> Value:
+        return cast("Value", self) if _is(other, 0.0) else self._binary("+", other, self)
+
+    @final
+    def __sub__(self, other: Value) -> Value:
+        return cast("Value", self) if _is(other, 0.0) else self._binary("-", self, other)
+
+    @final
+    def __mul__(self, other: Value) -> Value:
+        if _is(other, 0.0):
+            return self._zero
+        return cast("Value", self) if _is(other, 1.0) else self._binary("*", self, other)
+
+    @final
+    def __rmul__(self, other: Value) -> Value:
+        if _is(other, 0.0):
+            return self._zero
+        return cast("Value", self) if _is(other, 1.0) else self._binary("*", other, self)
+
+    @final
+    def __lt__(self, other: Value) -> Truth:
+        return self._compare("<", other)
+
+    @final
+    def __le__(self, other: Value) -> Truth:
+        return self._compare("<=", other)
+
+    @final
+    def __gt__(self, other: Value) -> Truth:
+        return self._compare(">", other)
+
+    @final
+    def __ge__(self, other: Value) -> Truth:
+        return self._compare(">=", other)
+
+
+def _is(other: object, value: float) -> bool:
+    return isinstance(other, float | int) and other == value
+
+
+class Number(_Operand[Real]):
     """A real number with a known value."""
 
     __slots__ = ()
     __array_ufunc__ = None  # A number of NumPy on the left leaves operators to this class.
-
-    @abstractmethod
-    def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
-        """Apply an operation; at least one side is of this class."""
-
-    @abstractmethod
-    def _order(self, order: Order, left: Real, right: Real) -> Truth:
-        """Compare; at least one side is of this class."""
+    _plain = (float, int)
+    _zero = np.float64(0.0)  # It follows IEEE where it divides a known number; Python's own raises.
 
     @abstractmethod
     def _negative(self) -> Real:
         """Return −x."""
 
     @final
-    def _binary(self, operation: Operation, left: object, right: object) -> Real:
-        other = right if left is self else left
-        if not isinstance(other, float | int) and type(other) is not type(self):
-            raise StageError("operand", what=operation, left=type(left).__name__, right=type(right).__name__)
-        assert isinstance(left, float | int | Number)
-        assert isinstance(right, float | int | Number)
-        return self._apply(operation, left, right)
-
-    @final
-    def __add__(self, other: Real) -> Real:
-        return self if _is(other, 0.0) else self._binary("+", self, other)
-
-    @final
-    def __radd__(self, other: Real) -> Real:
-        return self if _is(other, 0.0) else self._binary("+", other, self)
-
-    @final
-    def __sub__(self, other: Real) -> Real:
-        return self if _is(other, 0.0) else self._binary("-", self, other)
-
-    @final
     def __rsub__(self, other: Real) -> Real:
         return self._negative() if _is(other, 0.0) else self._binary("-", other, self)
-
-    @final
-    def __mul__(self, other: Real) -> Real:
-        if _is(other, 0.0):
-            return _ZERO
-        return self if _is(other, 1.0) else self._binary("*", self, other)
-
-    @final
-    def __rmul__(self, other: Real) -> Real:
-        if _is(other, 0.0):
-            return _ZERO
-        return self if _is(other, 1.0) else self._binary("*", other, self)
 
     @final
     def __truediv__(self, other: Real) -> Real:
@@ -135,7 +185,7 @@ class Number(_Unknown, ABC):
 
     @final
     def __rtruediv__(self, other: Real) -> Real:
-        return _ZERO if _is(other, 0.0) else self._binary("/", other, self)
+        return self._zero if _is(other, 0.0) else self._binary("/", other, self)
 
     @final
     def __neg__(self) -> Real:
@@ -145,79 +195,17 @@ class Number(_Unknown, ABC):
     def __pos__(self) -> Real:
         return self
 
-    @final
-    def __lt__(self, other: Real) -> Truth:
-        return self._compare("<", other)
 
-    @final
-    def __le__(self, other: Real) -> Truth:
-        return self._compare("<=", other)
-
-    @final
-    def __gt__(self, other: Real) -> Truth:
-        return self._compare(">", other)
-
-    @final
-    def __ge__(self, other: Real) -> Truth:
-        return self._compare(">=", other)
-
-    @final
-    def _compare(self, order: Order, other: object) -> Truth:
-        if not isinstance(other, float | int) and type(other) is not type(self):
-            raise StageError("operand", what=order, left=type(self).__name__, right=type(other).__name__)
-        assert isinstance(other, float | int | Number)
-        return self._order(order, self, other)
-
-
-def _is(other: object, value: float) -> bool:
-    return isinstance(other, float | int) and other == value
-
-
-class Count(_Unknown, ABC):
+class Count(_Operand[Integer]):
     """An integer with a known value; // and % round down, as in Python."""
 
     __slots__ = ()
-
-    @abstractmethod
-    def _apply(self, operation: IntegerOperation, left: Integer, right: Integer) -> Integer:
-        """Apply an operation; at least one side is of this class."""
-
-    @abstractmethod
-    def _order(self, order: Order, left: Integer, right: Integer) -> Truth:
-        """Compare; at least one side is of this class."""
-
-    @final
-    def _binary(self, operation: IntegerOperation, left: object, right: object) -> Integer:
-        other = right if left is self else left
-        if not isinstance(other, int) and type(other) is not type(self):
-            raise StageError("operand", what=operation, left=type(left).__name__, right=type(right).__name__)
-        assert isinstance(left, int | Count)
-        assert isinstance(right, int | Count)
-        return self._apply(operation, left, right)
-
-    @final
-    def __add__(self, other: Integer) -> Integer:
-        return self if _is(other, 0) else self._binary("+", self, other)
-
-    @final
-    def __radd__(self, other: Integer) -> Integer:
-        return self if _is(other, 0) else self._binary("+", other, self)
-
-    @final
-    def __sub__(self, other: Integer) -> Integer:
-        return self if _is(other, 0) else self._binary("-", self, other)
+    _plain = (int,)
+    _zero = 0
 
     @final
     def __rsub__(self, other: Integer) -> Integer:
         return self._binary("-", other, self)
-
-    @final
-    def __mul__(self, other: Integer) -> Integer:
-        return 0 if _is(other, 0) else self if _is(other, 1) else self._binary("*", self, other)
-
-    @final
-    def __rmul__(self, other: Integer) -> Integer:
-        return 0 if _is(other, 0) else self if _is(other, 1) else self._binary("*", other, self)
 
     @final
     def __floordiv__(self, other: Integer) -> Integer:
@@ -238,26 +226,3 @@ class Count(_Unknown, ABC):
     @final
     def __neg__(self) -> Integer:
         return self._binary("-", 0, self)
-
-    @final
-    def __lt__(self, other: Integer) -> Truth:
-        return self._compare("<", other)
-
-    @final
-    def __le__(self, other: Integer) -> Truth:
-        return self._compare("<=", other)
-
-    @final
-    def __gt__(self, other: Integer) -> Truth:
-        return self._compare(">", other)
-
-    @final
-    def __ge__(self, other: Integer) -> Truth:
-        return self._compare(">=", other)
-
-    @final
-    def _compare(self, order: Order, other: object) -> Truth:
-        if not isinstance(other, int) and type(other) is not type(self):
-            raise StageError("operand", what=order, left=type(self).__name__, right=type(other).__name__)
-        assert isinstance(other, int | Count)
-        return self._order(order, self, other)

@@ -1,6 +1,6 @@
 """Tables of records with named fields: rows of integers in one array, of real numbers in another."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import prod
 from typing import Any, ClassVar, Generic, Self, TypeVar, cast, final, overload
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, IntegerCells, RealCells, inside
+from ephs.semantics.stage.memory import ArrayIntegers, ArrayReals, Cells, IntegerCells, RealCells, inside
 from ephs.semantics.stage.numbers import Integer, Real
 from ephs.semantics.stage.reaching import Reached, Signature
 
@@ -27,16 +27,22 @@ class _RecordField:
         self.name = name
 
     @final
-    def _nested(self, load: Callable[[int], Any]) -> list[Any]:
+    def _nested(self, cells: Cells[Any], start: Integer) -> list[Any]:
         """Return lists of the shape, filled in order."""
 
         def rows(shape: tuple[int, ...], first: int) -> Any:
             if not shape:
-                return load(first)
+                return cells.load(start + first)
             step = prod(shape[1:])
             return [rows(shape[1:], first + k * step) for k in range(shape[0])]
 
         return rows(self.shape, self.offset)
+
+    @final
+    def _keep(self, cells: Cells[Any], start: Integer, value: object) -> None:
+        """Keep lists of the shape, in order."""
+        for place, entry in enumerate(self._entries(value, self.shape)):
+            cells.store(start + (self.offset + place), entry)
 
     @final
     def _entries(self, value: object, shape: tuple[int, ...]) -> Iterator[Any]:
@@ -111,11 +117,10 @@ class IntegersField(_RecordField):
     @overload
     def __get__(self, row: "Record", owner: type) -> list[Integer]: ...
     def __get__(self, row: "Record | None", owner: type) -> "Self | list[Integer]":
-        return self if row is None else self._nested(lambda at: row.integers.load(row.integer_start + at))
+        return self if row is None else self._nested(row.integers, row.integer_start)
 
     def __set__(self, row: "Record", value: Sequence[Integer]) -> None:
-        for place, entry in enumerate(self._entries(value, self.shape)):
-            row.integers.store(row.integer_start + (self.offset + place), entry)
+        self._keep(row.integers, row.integer_start, value)
 
 
 @final
@@ -127,11 +132,10 @@ class VectorField(_RecordField):
     @overload
     def __get__(self, row: "Record", owner: type) -> list[Real]: ...
     def __get__(self, row: "Record | None", owner: type) -> "Self | list[Real]":
-        return self if row is None else self._nested(lambda at: row.reals.load(row.real_start + at))
+        return self if row is None else self._nested(row.reals, row.real_start)
 
     def __set__(self, row: "Record", value: Sequence[Real]) -> None:
-        for place, entry in enumerate(self._entries(value, self.shape)):
-            row.reals.store(row.real_start + (self.offset + place), entry)
+        self._keep(row.reals, row.real_start, value)
 
 
 @final
@@ -143,11 +147,10 @@ class MatrixField(_RecordField):
     @overload
     def __get__(self, row: "Record", owner: type) -> list[list[Real]]: ...
     def __get__(self, row: "Record | None", owner: type) -> "Self | list[list[Real]]":
-        return self if row is None else self._nested(lambda at: row.reals.load(row.real_start + at))
+        return self if row is None else self._nested(row.reals, row.real_start)
 
     def __set__(self, row: "Record", value: Sequence[Sequence[Real]]) -> None:
-        for place, entry in enumerate(self._entries(value, self.shape)):
-            row.reals.store(row.real_start + (self.offset + place), entry)
+        self._keep(row.reals, row.real_start, value)
 
 
 def real() -> RealField:
@@ -213,16 +216,13 @@ class Record:
 
     @final
     def __setattr__(self, name: str, value: object) -> None:
-        field = getattr(type(self), name, None)
-        if not isinstance(field, _RecordField):
-            fields = [key for key, field in vars(type(self)).items() if isinstance(field, _RecordField)]
-            raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
+        if not isinstance(getattr(type(self), name, None), _RecordField):
+            raise _no_field(type(self), name)
         object.__setattr__(self, name, value)
 
     @final
     def __getattr__(self, name: str) -> Any:
-        fields = [key for key, field in vars(type(self)).items() if isinstance(field, _RecordField)]
-        raise StageError("field", record=type(self).__name__, found=name, expected=", ".join(fields))
+        raise _no_field(type(self), name)
 
     @final
     @classmethod
@@ -234,6 +234,11 @@ class Record:
             ArrayReals(np.zeros((size * cls.real_width, *([] if members is None else [members])))),
             size,
         )
+
+
+def _no_field(cls: type[Record], name: str) -> StageError:
+    fields = [key for key, field in vars(cls).items() if isinstance(field, _RecordField)]
+    return StageError("field", record=cls.__name__, found=name, expected=", ".join(fields))
 
 
 Row = TypeVar("Row", bound=Record)

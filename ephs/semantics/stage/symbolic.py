@@ -7,16 +7,10 @@ from typing import Any, Final, TypeAlias, final
 
 from ephs.semantics.stage.errors import StageError
 from ephs.semantics.stage.evaluator import Function, Interpreted
-from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
+from ephs.semantics.stage.numbers import ARITHMETIC, Integer, Number, Operation, Order, Real, StagedCondition, Truth
 
 sp: Any = import_module("sympy")
 Expr: TypeAlias = Any
-_OPERATIONS: Final[dict[Operation, Callable[[Expr, Expr], Expr]]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-}
 _ORDERS: Final[dict[Order, Any]] = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge}
 _FUNCTIONS: Final[dict[Function, Callable[..., Expr]]] = {
     "sqrt": sp.sqrt,
@@ -38,7 +32,7 @@ class Expression(Number):
     value: Expr
 
     def _apply(self, operation: Operation, left: Real, right: Real) -> Real:
-        return Expression(_OPERATIONS[operation](expression(left), expression(right)))
+        return Expression(ARITHMETIC[operation](expression(left), expression(right)))
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
         return _truth(_ORDERS[order](expression(left), expression(right)))

@@ -12,10 +12,10 @@ from typing import Any, Final, TypeAlias, cast, final
 
 from ephs.semantics.stage.duals import RULES
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.evaluator import Evaluator, Function
+from ephs.semantics.stage.evaluator import Evaluator, Function, Layered
 from ephs.semantics.stage.memory import Cells, IntegerCells, Integers, RealCells, Variable, Vector
-from ephs.semantics.stage.numbers import Integer, Number, Operation, Order, Real, StagedCondition, Truth
-from ephs.semantics.stage.reaching import Atom, Part, Reached, Signature
+from ephs.semantics.stage.numbers import ORDERS, Integer, Number, Operation, Order, Real, StagedCondition, Truth
+from ephs.semantics.stage.reaching import Part
 from ephs.semantics.stage.records import Record
 
 POSITION, ROWS, CAPACITY, COUNT = range(4)
@@ -77,16 +77,7 @@ class Traced(Number):
                 return on.traced(quotient, (*_scaled(one, under), *_scaled(other, -(quotient * under))))
 
     def _order(self, order: Order, left: Real, right: Real) -> Truth:
-        a, b = _split(left)[0], _split(right)[0]
-        match order:
-            case "<":
-                return a < b
-            case "<=":
-                return a <= b
-            case ">":
-                return a > b
-            case ">=":
-                return a >= b
+        return ORDERS[order](_split(left)[0], _split(right)[0])
 
     def _negative(self) -> Real:
         return Traced(self.on, -self.value, _scaled(self.terms, -1.0))
@@ -122,15 +113,15 @@ class TapedCells(Cells[Real]):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Taped(Evaluator):
+class Taped(Layered):
     """Evaluation that writes a tape, with another evaluator's numbers."""
 
     base: Evaluator
     tape: SlopeTape
 
-    def constant(self, value: Real) -> Real:
+    def constant(self, number: Real) -> Real:
         """Return a number of the base as a constant."""
-        return Traced(self, value, ())
+        return Traced(self, number, ())
 
     def bare(self, number: Real) -> Real:
         """Return the base's number of one."""
@@ -178,71 +169,21 @@ class Taped(Evaluator):
         place = self.base.select(truth, self.place(left), self.place(right))
         return Traced(self, self.base.select(truth, a, b), ((place, 1.0),))
 
-    def _both(self, one: Truth, other: Truth) -> Truth:
-        return self.base.both(one, other)
-
-    def _negate(self, truth: StagedCondition) -> Truth:
-        return self.base.negate(truth)
-
-    def _same(self, one: Integer, other: Integer) -> Truth:
-        return self.base.same(one, other)
-
-    def real(self, integer: Integer) -> Real:
-        return self.constant(self.base.real(integer))
-
-    def integer(self, real: Real) -> Integer:
-        return self.base.integer(_split(real)[0])
-
-    def loop(self, count: Integer, body: Callable[[Integer], None], start: Integer = 0, down: bool = False) -> None:
-        self.base.loop(count, body, start, down)
-
-    def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
-        self.base.when(truth, yes, no)
-
-    def repeat(self, body: Callable[[], Truth]) -> None:
-        self.base.repeat(body)
-
     def _reals(self, size: int) -> RealCells:
         return TapedCells(self, self.base._reals(size), self.base._wholes(size))
-
-    def _wholes(self, size: int) -> IntegerCells:
-        return self.base._wholes(size)
 
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
         constants = self.base._constants(values, whole)
         return constants if whole else TapedCells(self, constants, _Nothing())
 
-    def _rehearse(self, body: Callable[[], None]) -> None:
-        self.base._rehearse(body)
+    def _handed(self, cells: Any, start: Integer) -> tuple[Part, Part]:
+        if not isinstance(cells, TapedCells):
+            raise StageError("passive")
+        return ("reals", (cells.values, start)), ("integers", (cells.places, start))
 
-    def _reach(self, function: Reached, parts: list[Part]) -> Integer:
-        """Call a function by address that writes to the same tape; tables of taped programs contain such addresses."""
-        rest, passed = iter(parts), list[Part]()
-        arguments: list[tuple[Atom, ...]] = []
-        for atoms in function.signature.arguments:
-            rows: list[Part] = []
-            for atom, value in (next(rest) for _ in atoms):
-                if atom == "real":
-                    raise StageError("unreached", what="the derivative of a number that is handed over by itself")
-                if atom != "reals":
-                    passed.append((atom, value))
-                    continue
-                cells, start = value
-                if not isinstance(cells, TapedCells):
-                    raise StageError("passive")
-                passed.append((atom, (cells.values, start)))
-                rows.append(("integers", (cells.places, start)))
-            passed += rows
-            arguments.append((*atoms, *(atom for atom, _ in rows)))
+    def _tape(self) -> list[Part]:
         tape = self.tape
-        own: list[Part] = [
-            ("integers", (tape.counters, 0)),
-            ("integers", (tape.places, 0)),
-            ("reals", (tape.slopes, 0)),
-        ]
-        passed += own
-        signature = Signature((*arguments, ("integers",), ("integers",), ("reals",)), function.signature.returns)
-        return self.base._reach(Reached(signature, function.address), passed)
+        return [("integers", (tape.counters, 0)), ("integers", (tape.places, 0)), ("reals", (tape.slopes, 0))]
 
     def _call(self, on: Evaluator, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         if on is not self:

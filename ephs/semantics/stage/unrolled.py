@@ -11,7 +11,7 @@ from typing import Any, Final, TypeAlias, cast, final
 import numpy as np
 
 from ephs.semantics.stage.errors import StageError
-from ephs.semantics.stage.evaluator import Evaluator, Function
+from ephs.semantics.stage.evaluator import Based, Evaluator, Function
 from ephs.semantics.stage.memory import Cells, IntegerCells, RealCells
 from ephs.semantics.stage.numbers import Count, Integer, Real, StagedCondition, Truth
 from ephs.semantics.stage.reaching import Part, Reached
@@ -43,7 +43,7 @@ class Local(Cells[Any]):
 
 
 @final
-class Unrolled(Evaluator):
+class Unrolled(Based):
     """Evaluation over another evaluator, with known loops unrolled.
 
     Parameters
@@ -57,7 +57,7 @@ class Unrolled(Evaluator):
         self._journals: list[dict[Place, Any]] = []
         self._births = 0
 
-    def held(self, part: Any) -> Any:
+    def as_cells(self, part: Any) -> Any:
         """Return an array as cells that start with its numbers, or a number as it is; division by zero follows IEEE."""
         if not isinstance(part, np.ndarray):
             return part
@@ -92,7 +92,7 @@ class Unrolled(Evaluator):
         places = self._changed(lambda: self.base.loop(count, body, start, down))
         slots = self._slots(places)
         self.base.loop(count, lambda index: self._through(slots, lambda: body(index)), start, down)
-        self._settle(slots)
+        self._fetch(slots)
 
     def when(self, truth: Truth, yes: Callable[[], None], no: Callable[[], None] | None = None) -> None:
         if not isinstance(truth, StagedCondition):
@@ -111,7 +111,7 @@ class Unrolled(Evaluator):
             if isinstance(found[0], StagedCondition):
                 slots = self._slots(places)
                 self.base.repeat(lambda slots=slots: self._through(slots, body))
-                self._settle(slots)
+                self._fetch(slots)
                 return
             if body():
                 return
@@ -134,7 +134,7 @@ class Unrolled(Evaluator):
                 slots[place].store(0, old)
 
         self.base.when(truth, inside, outside)
-        self._settle(slots)
+        self._fetch(slots)
 
     def _run(self, body: Callable[[], Any]) -> dict[Place, Any]:
         """Run a body and return the places that it changed, with their former numbers."""
@@ -193,7 +193,7 @@ class Unrolled(Evaluator):
             cells.entries[index] = old
         return results[0]
 
-    def _settle(self, slots: dict[Place, Cells[Any]]) -> None:
+    def _fetch(self, slots: dict[Place, Cells[Any]]) -> None:
         for (cells, index), slot in slots.items():
             cells.store(index, slot.load(0))
 
@@ -208,23 +208,11 @@ class Unrolled(Evaluator):
     def _constants(self, values: list[Any], whole: bool) -> Cells[Any]:
         return self.base._constants(values, whole)
 
-    def _rehearse(self, body: Callable[[], None]) -> None:
-        self.base._rehearse(body)
-
     def _function(self, name: Function, *arguments: Real) -> Real:
         return self.base._function(name, *arguments)
 
     def _choose(self, truth: StagedCondition, one: Any, other: Any) -> Any:
         return self.base.select(truth, one, other)
-
-    def _both(self, one: Truth, other: Truth) -> Truth:
-        return self.base.both(one, other)
-
-    def _negate(self, truth: StagedCondition) -> Truth:
-        return self.base.negate(truth)
-
-    def _same(self, one: Integer, other: Integer) -> Truth:
-        return self.base.same(one, other)
 
     def real(self, integer: Integer) -> Real:
         return self.base.real(integer)

@@ -5,12 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from itertools import product
 
+from ephs.semantics.stage.intervals import extrema
 from ephs.semantics.symbols.terms import Term
 
 OUTWARDS = 8e-16
 """Part by which bounds are moved outwards: two of the last digits, and more than functions err by."""
-NEAR = 1e-9
-"""Angle in rad by which extrema are taken to lie within an interval: more than turns round by."""
 ROUNDING = 1e-15
 """Error of a cosine."""
 
@@ -178,11 +177,8 @@ def _wave(peak: float) -> Callable[[float, float], Interval]:
     def rule(low: float, high: float) -> Interval:
         if not (math.isfinite(low) and math.isfinite(high)) or max(abs(low), abs(high)) > 1e6:
             return -1.0, 1.0
-        turn = 2.0 * math.pi
         values = [math.cos(low - peak), math.cos(high - peak)]
-        near = NEAR
-        top = math.floor((high - peak + near) / turn) >= math.ceil((low - peak - near) / turn)
-        bottom = math.floor((high - peak + math.pi + near) / turn) >= math.ceil((low - peak + math.pi - near) / turn)
+        bottom, top = extrema(low - peak, high - peak)
         least, most = -1.0 if bottom else min(values) - ROUNDING, 1.0 if top else max(values) + ROUNDING
         return max(least, -1.0), min(most, 1.0)
 

@@ -9,7 +9,7 @@ A warning follows the equations where the initial state admits no motion, or whe
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Literal, final
 
 from ephs.operad import Path, Quantity
@@ -73,27 +73,22 @@ class Equations:
 
     def __str__(self) -> str:
         lines: list[str] = []
-        about = ""
-        for row in self.rows:
-            if row.about != about:
-                about = row.about
-                lines.append(f"{about}:")
-            lines.append(f"  {text_of(row.left)} = {text_of(row.right)}")
+        for about, rows in groupby(self.rows, lambda row: row.about):
+            lines += [f"{about}:", *(f"  {text_of(row.left)} = {text_of(row.right)}" for row in rows)]
         return "\n".join([*lines, f"at the start {self.doubt}"] if self.doubt else lines)
 
     def latex(self) -> str:
         """An ``align`` environment with a line for each equation."""
         lines: list[str] = []
-        about = ""
-        for row in self.rows:
-            if row.about != about:
-                about = row.about
-                spelled = escaped(about, formula=False)
-                lines.append(rf"  \intertext{{{spelled}}}")
-            lines.append(rf"  {self._tex(row.left)} &= {self._tex(row.right)} \\")
+
+        def say_between(words: str) -> None:
+            lines.append(rf"  \intertext{{{escaped(words, formula=False)}}}")
+
+        for about, rows in groupby(self.rows, lambda row: row.about):
+            say_between(about)
+            lines.extend(rf"  {self._tex(row.left)} &= {self._tex(row.right)} \\" for row in rows)
         if self.doubt:
-            spelled = escaped(f"at the start {self.doubt}", formula=False)
-            lines.append(rf"  \intertext{{{spelled}}}")
+            say_between(f"at the start {self.doubt}")
         return "\n".join([r"\begin{align*}", *lines, r"\end{align*}"])
 
     def _tex(self, expression: Expr) -> str:

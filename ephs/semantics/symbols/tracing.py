@@ -10,12 +10,11 @@ from typing import Any, Final, final
 
 import numpy as np
 
-from ephs.operad import Quantity
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.functions import Sinhc
 
-__all__ = ["Trace", "Untraceable", "symbols_of", "trace"]
+__all__ = ["Trace", "Untraceable", "trace"]
 
 DIGITS = 10**30
 """Rational numbers beyond this become floats: a formula could make exact numbers of any size."""
@@ -73,13 +72,6 @@ def trace(function: Callable[..., Any], arguments: Mapping[str, Any]) -> Trace:
     shaped = np.empty(len(entries), dtype=object)
     shaped[:] = entries
     return Trace(shaped.reshape(found.tape.shape), dict(zip(parameters, found.parameters, strict=True)))
-
-
-def symbols_of(name: str, quantity: Quantity, size: int) -> tuple[Expr, ...]:
-    """Symbols for the numbers of a port's state."""
-    positive = True if quantity.positive else None
-    names = (name,) if size == 1 else tuple(f"{name}_{i}" for i in range(size))
-    return tuple(sp.Symbol(each, real=True, positive=positive) for each in names)
 
 
 def _number(value: float) -> Expr:

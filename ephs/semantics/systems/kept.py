@@ -24,7 +24,7 @@ class Kept:
         self._found: dict[Hashable, Any] = {}
         self._lock = Lock()
 
-    def of(self, key: Hashable, make: Callable[[], T]) -> T:
+    def result(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return the result of this key, computed if it is absent; exceptions are not cached."""
         with self._lock:
             if key in self._found:
@@ -43,4 +43,4 @@ class Kept:
 
 def once(owner: Any, key: Hashable, make: Callable[[], T]) -> T:
     """Return the result for a frozen value with a slot ``_kept`` and a key, computed once."""
-    return cast("Kept", owner._kept).of(key, make)
+    return cast("Kept", owner._kept).result(key, make)

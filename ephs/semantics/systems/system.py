@@ -139,7 +139,7 @@ class System:
     def states(self) -> Directory[Quantity]:
         """The states of the storages: path of the component, then its port -> quantity."""
 
-        def found() -> Directory[Quantity]:
+        def all_states() -> Directory[Quantity]:
             return Directory.trusted(
                 {
                     path / port: quantity
@@ -149,7 +149,7 @@ class System:
                 }
             )
 
-        return once(self, "states", found)
+        return once(self, "states", all_states)
 
     @property
     def initial(self) -> dict[Path, Array]:

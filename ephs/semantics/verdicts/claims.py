@@ -114,7 +114,7 @@ def claim_of(primitive: "Primitive", signs: Mapping[str, int]) -> Claim:
     expected = 1 if primitive.kind == "storage" else bundle.size * (bundle.size + k)
     if len(outputs) != expected:
         raise Untraceable(f"{len(outputs)} numbers where {expected} are wanted")
-    gradient = None if formula.gradient is None else terms(_flat(formula.gradient))
+    gradient = None if formula.gradient is None else terms(flat_gradient(formula.gradient))
     return of_formulas(primitive, outputs, tuple(seen), gradient, signs)
 
 
@@ -140,14 +140,12 @@ def of_formulas(
     )
 
 
-def _listed(value: Any) -> Sequence[Any]:
-    """The parts of a gradient, port by port."""
-    return cast("Sequence[Any]", value) if isinstance(value, list | tuple) else (value,)
+def flat_gradient(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A gradient that is given port by port as one vector."""
 
-
-def _flat(function: Callable[..., Any]) -> Callable[..., Any]:
     def flat(**x: Any) -> Any:
-        parts = _listed(function(**x))
+        found = function(**x)
+        parts = cast("Sequence[Any]", found) if isinstance(found, list | tuple) else (found,)
         return np.concatenate([np.atleast_1d(np.asarray(part, dtype=object)) for part in parts])
 
     return flat

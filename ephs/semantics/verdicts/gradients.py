@@ -1,7 +1,7 @@
 """Gradients given by hand against the energy: its exact derivative, or differences where it cannot be recorded."""
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import StorageStep as Recorded
 from ephs.semantics.spaces import manifold
+from ephs.semantics.verdicts.claims import flat_gradient
 from ephs.semantics.verdicts.rounding import ROUNDED, rounding, slopes_of, steps_of
 
 if TYPE_CHECKING:
@@ -63,13 +64,8 @@ def _rounding_of_given(storage: "Storage", numbers: list[float], gradient: Array
     assert given is not None
     sizes = {str(port): manifold(storage.interface[port].quantity.space).size for port in storage.reads}
 
-    def flat(**states: Any) -> Any:
-        found = given(**states)
-        parts: list[Any] = list(found) if isinstance(found, list | tuple) else [found]  # pyright: ignore[reportUnknownArgumentType]
-        return np.concatenate([np.atleast_1d(np.asarray(part, dtype=object)) for part in parts])
-
     try:
-        recording = record(flat, {name: None if size == 1 else size for name, size in sizes.items()})
+        recording = record(flat_gradient(given), {name: None if size == 1 else size for name, size in sizes.items()})
     except Untraceable:
         return ROUNDED * np.abs(gradient).sum() * np.ones(gradient.shape)
     outputs = list(recording.tape.outputs)

@@ -13,7 +13,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.charts import moved
 from ephs.semantics.derive.recording import Recording
-from ephs.semantics.derive.relating import StatePort
+from ephs.semantics.derive.relating import StatePort, spans_of
 from ephs.semantics.derive.tape import OPERATIONS, Tape
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
@@ -57,12 +57,10 @@ def slopes_of(
     n = sum(port.dim for port in ports)
     duals = Duals(PLAIN, n)
     states: list[Real] = []
-    first = at = 0
     with np.errstate(all="ignore"):
-        for port in ports:
-            point = [duals.dual(np.float64(each)) for each in x[first : first + port.size]]
-            states += moved(duals, port.code, point, [duals.along(np.float64(0.0), at + i) for i in range(port.dim)])
-            first, at = first + port.size, at + port.dim
+        for port, own, by in spans_of(ports):
+            point = [duals.dual(np.float64(each)) for each in x[own]]
+            states += moved(duals, port.code, point, [duals.along(np.float64(0.0), i) for i in range(n)[by]])
     (found,) = _run(duals, tape, states, parameters, factor)
     return np.array(duals.dual(found).slopes, dtype=float) * np.ones(n)
 

@@ -8,13 +8,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from types import CellType, CodeType, FunctionType
+from types import CodeType, FunctionType
 from typing import TYPE_CHECKING, cast, final
 
 import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.derive.recording import filled
 from ephs.semantics.primitives.forms import tape_of
 from ephs.semantics.spaces import SO3, codes, manifold
 
@@ -206,20 +207,12 @@ def _written(value: object, seen: set[int]) -> list[float]:
             parts = list(value.co_consts)
         case FunctionType():
             used = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
-            cells = [cell.cell_contents for cell in value.__closure__ or () if _filled(cell)]
+            cells = [cell.cell_contents for cell in value.__closure__ or () if filled(cell)]
             parts = [value.__code__, *cells, *(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values()]
             parts += [each for each in used if isinstance(each, int | float | FunctionType)]
         case _:
             pass
     return [number for part in parts for number in _written(part, seen)]
-
-
-def _filled(cell: CellType) -> bool:
-    try:
-        _ = cell.cell_contents
-    except ValueError:
-        return False
-    return True
 
 
 def trial_of(primitive: "Primitive", numbers: Sequence[float], reference: Reference) -> Trial:

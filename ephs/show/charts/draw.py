@@ -19,7 +19,7 @@ from ephs.show.charts.outcomes import SILENT, ChartOutcome
 from ephs.show.charts.reasons import Key, Reason, letter_of, reasons, reasons_table
 from ephs.show.charts.runs import RunEnding, RunSetting
 from ephs.show.charts.stability import Cell
-from ephs.show.plots.curves import STYLE
+from ephs.show.plots.curves import styled
 from ephs.show.shared.figures import new_figure, plain
 from ephs.show.shared.palette import BLACK, BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY
 
@@ -76,13 +76,10 @@ def draw_work_precision(points: Sequence[Point], title: str, folder: Path, name:
     hollow marks and dashed lines; runs that their audit refuses are ringed. Failed runs
     are counted at the right edge, their reasons are listed below.
     """
-    from matplotlib import rc_context
-
-    style: Any = STYLE
     series: dict[tuple[str, str], list[Point]] = {}
     for point in points:
         series.setdefault((point.method, point.setting.kind), []).append(point)
-    with rc_context(style):
+    with styled():
         figure = new_figure(12.0, 9.6)
         (left, middle), (right, lawful) = figure.subplots(2, 2, sharey=True)
         panels = (
@@ -131,14 +128,12 @@ def draw_stability(cells: Sequence[Cell], family: Family, folder: Path, name: st
     A cell has the error of an accurate run, or another outcome, with the letter of its reason, which is listed below
     the matrix; whole messages are in the data.
     """
-    from matplotlib import rc_context
     from matplotlib.patches import Patch, Rectangle
 
     values = list(dict.fromkeys(cell.value for cell in cells))
     rows = list(dict.fromkeys(_row(cell, family) for cell in cells))
     found = reasons(cells)
-    style: Any = STYLE
-    with rc_context(style):
+    with styled():
         width = 2.6 + 1.15 * max(len(values), 4)
         figure = new_figure(width, 1.7 + 0.23 * len(rows) + _LINE * len(_lines(found, int(15 * width))))
         axes = figure.subplots()
@@ -248,20 +243,23 @@ def _line_style(method: str) -> tuple[str, str]:
     return _PEER_COLOURS[at % len(_PEER_COLOURS)], _PEER_MARKERS[at // len(_PEER_COLOURS) % len(_PEER_MARKERS)]
 
 
+def _look(method: str, kind: str) -> dict[str, Any]:
+    """The look of a method's marks; those of constant steps are hollow."""
+    colour, marker = _line_style(method)
+    face = "white" if kind == "step" else colour
+    return {"color": colour, "marker": marker, "markersize": 5.0, "markerfacecolor": face}
+
+
 def _curve(axes: "Axes", method: str, kind: str, points: Sequence[Point], key: str) -> None:
     done = [p for p in points if p.outcome is RunEnding.DONE and getattr(p, key) > 0 and p.error > 0.0]
     if not done:
         return
-    colour, marker = _line_style(method)
     x, y = [getattr(p, key) for p in done], [p.error for p in done]
     hollow = kind == "step"
     axes.plot(
         x,
         y,
-        color=colour,
-        marker=marker,
-        markersize=5.0,
-        markerfacecolor="white" if hollow else colour,
+        **_look(method, kind),
         linestyle="--" if hollow else "-",
         linewidth=1.1,
         label=f"{method}{', steps' if hollow and _both(method) else ''}",
@@ -303,18 +301,14 @@ def _failures(axes: "Axes", series: Mapping[tuple[str, str], Sequence[Point]], f
         return
     axes.text(1.06, 1.0, "failed", transform=axes.transAxes, fontsize=8.0, color=GREY, va="bottom")
     for row, ((method, kind), points) in enumerate(failed.items()):
-        colour, marker = _line_style(method)
         y = 0.96 - 0.045 * row
         axes.plot(
             [1.05],
             [y],
             transform=axes.transAxes,
             clip_on=False,
-            color=colour,
-            marker=marker,
-            markersize=5.0,
-            markerfacecolor="white" if kind == "step" else colour,
             linestyle="none",
+            **_look(method, kind),
         )
         ways = {p.outcome for p in points}
         how = next(iter(ways)).value if len(ways) == 1 else "failed"

@@ -156,7 +156,7 @@ def _refined(
             for _ in range(repeats_after(repeats, first.wall, limit))
         ]
         runs = [run.solution.stats["integrate_s"] for run in [*rest, first] if run.solution is not None]
-        stats, error = first.solution.stats, float(PosesInTime.of(first.solution).off(truth.motion)[-1])
+        stats, error = first.solution.stats, float(PosesInTime.of_solution(first.solution).off(truth.motion)[-1])
         count = int(stats.get("evaluations", stats.get("iterations", 0)))
         defect = float(first.solution.energy_error[-1])
         point = measured_point(name, setting, error, float(np.median(runs)), count, int(stats["steps"]), defect, truth)

@@ -55,7 +55,7 @@ class PosesInTime:
     size: float = 0.0
 
     @staticmethod
-    def of(solution: Solution) -> "PosesInTime":
+    def of_solution(solution: Solution) -> "PosesInTime":
         """The motion of a solution, at its times."""
         names = [name for name, _ in solution.scene.all_bodies()]
         bodies = [solution.body(name) for name in names]
@@ -150,7 +150,7 @@ def tight_reference(
         if len(solutions) < 2:
             said = said or runs[-1].message
             continue
-        motion, check = map(PosesInTime.of, solutions)
+        motion, check = map(PosesInTime.of_solution, solutions)
         if not (np.isfinite(motion.position).all() and np.isfinite(check.position).all()):
             continue
         found = ReferenceMotion(motion, float(motion.off(check)[-1]), f"{method}, {tight}", (method, tight))
@@ -181,7 +181,7 @@ def condition(scene: Scene, truth: ReferenceMotion, limit: float = 60.0) -> Arra
     run = attempt(changed, float(motion.t[-1]), *truth.run, limit=limit, save_at=motion.t)
     if run.solution is None:
         return np.ones(len(motion.t))
-    return np.maximum.accumulate(PosesInTime.of(run.solution).off(motion, motion.length)) / CHANGE
+    return np.maximum.accumulate(PosesInTime.of_solution(run.solution).off(motion, motion.length)) / CHANGE
 
 
 def resting_reference(scene: Scene, save_at: Array) -> ReferenceMotion:

@@ -108,7 +108,7 @@ def stability(
                 if cell is None:
                     if note is not None:
                         note(f"{family.name} {family.label(value)}: {method.name}, {setting}")
-                    trial = trial or _ValueTrial.of(family, value, limit)
+                    trial = trial or _ValueTrial.prepared(family, value, limit)
                     cell = trial.cell(method, setting, limit, slow.get(setting.kind))
                     if kept is not None:
                         kept.add(cell)
@@ -132,7 +132,7 @@ class _ValueTrial:
     why: str
 
     @classmethod
-    def of(cls, family: Family, value: float, limit: float) -> "_ValueTrial":
+    def prepared(cls, family: Family, value: float, limit: float) -> "_ValueTrial":
         """Reference for a value of a family's parameter."""
         times = np.linspace(0.0, family.end(value), INSTANTS)
         truth, why = _truth(family, value, times, limit)
@@ -151,7 +151,7 @@ class _ValueTrial:
             run = attempt(self.scene, until, method, setting, limit=limit, save_at=self.times, max_steps=MOST_STEPS)
         else:
             run = ChartRun(None, RunEnding.SLOW, f"{RunEnding.SLOW}: already at {slow}", 0.0)
-        found = None if run.solution is None else PosesInTime.of(run.solution)
+        found = None if run.solution is None else PosesInTime.of_solution(run.solution)
         steps = 0 if run.solution is None else int(run.solution.stats["steps"])
         outcome, error, held = _outcome(found, self.truth, right(setting, self.condition, steps))
         said = run.message or self.why

@@ -29,8 +29,7 @@ KINDS = ("storage", "environment", "reversible", "irreversible", "composite", "u
 class Lettering:
     """A short name at a place: `base` with `sub` set as a subscript.
 
-    `at` is the centre of the lettering, `size` the height of its type, `width` what it is reckoned to take. `anchor`,
-    ``"start"``, ``"middle"`` or ``"end"``, says which point of it stays where it is in a font of another width.
+    `at` is the centre of the lettering, `size` the height of its type, `width` what it is reckoned to take.
     """
 
     base: str
@@ -38,13 +37,6 @@ class Lettering:
     at: Point
     size: float
     width: float
-    anchor: str = "middle"
-
-    @property
-    def start(self) -> Point:
-        """The anchor's point on the base line, a third of the type's size below the centre."""
-        shift = {"start": -0.5, "middle": 0.0, "end": 0.5}[self.anchor]
-        return (self.at[0] + shift * self.width, self.at[1] + 0.35 * self.size)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -146,17 +138,23 @@ class Placement:
         return boxes | {junction.path: (junction.at, junction.radius) for junction in self.junctions}
 
 
+def all_boxes(placement: Placement) -> tuple[PlacedBox, ...]:
+    """The boxes of a picture, those of its legend last."""
+    return (*placement.boxes, *(box for box, _ in placement.legend))
+
+
+def notes_of(placement: Placement) -> tuple[Lettering, ...]:
+    """Names of ports on wires, and words of the legend."""
+    names = (wire.label for wire in placement.wires if wire.label is not None)
+    return (*names, *(word for _, word in placement.legend))
+
+
 def distances(point: Points, starts: Points, ends: Points) -> Points:
     """Distance of one point (2,), or of points (n, 2), to segments from `starts` to `ends`, (n, 2) each."""
     along = ends - starts
     length2 = np.maximum((along * along).sum(axis=-1), POINT**2)
     part = np.clip((((point - starts) * along).sum(axis=-1)) / length2, 0.0, 1.0)
     return np.linalg.norm(point - starts - part[..., None] * along, axis=-1)
-
-
-def gap(point: Point, line: tuple[Point, ...]) -> float:
-    """Distance of a point to a polyline."""
-    return float(_gaps(np.asarray([point], dtype=float), line)[0])
 
 
 def _gaps(points: Points, line: tuple[Point, ...]) -> Points:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
 from ephs.operad import Nesting, Pattern
-from ephs.show.diagrams.geometry import KINDS
+from ephs.show.diagrams.geometry import KINDS, Point, Points
 from ephs.show.shared.errors import ShowError
 
 if TYPE_CHECKING:
@@ -55,6 +55,11 @@ class Graph:
     def radii(self) -> dict[str, float]:
         """Radius of every node, by path."""
         return {disc.path: disc.radius for disc in self.discs} | {path: DOT for path, _ in self.dots}
+
+
+def places_of(paths: Iterable[str], points: Points) -> dict[str, Point]:
+    """Points (n, 2) by the paths of what they are of."""
+    return {path: (float(x), float(y)) for path, (x, y) in zip(paths, points, strict=True)}
 
 
 def width_of(base: str, sub: str, size: float) -> float:

@@ -30,7 +30,7 @@ from ephs.show.diagrams.geometry import (
     faults,
     hatching,
 )
-from ephs.show.diagrams.graph import DOT, TYPE, Disc, Graph, UnplacedWire, read, width_of
+from ephs.show.diagrams.graph import DOT, TYPE, Disc, Graph, UnplacedWire, places_of, read, width_of
 from ephs.show.diagrams.legend import legend
 from ephs.show.diagrams.lettering import Sheet, around, beside
 from ephs.show.diagrams.routing import bulged, route, straight, trimmed
@@ -114,7 +114,7 @@ def _roomy(page: _DrawnGraph, points: Points, first: Placement | None = None) ->
 
 def _picture(page: _DrawnGraph, points: Points, room: float = 1.0) -> Placement:
     graph, radii = page.graph, page.graph.radii()
-    at = {path: (float(x), float(y)) for path, (x, y) in zip(radii, points, strict=True)}
+    at = places_of(radii, points)
     regions = opening.regions(page.members, at, radii)
     field = _PlacedNodes(at, radii, regions)
     wires = [_wire(edge, line, None) for edge, line in _inner_lines(graph, field, 16.0 * room)]
@@ -257,7 +257,7 @@ def _with_label(wire: Wire, port: str, sheet: Sheet) -> Wire:
     if not port:
         return wire
     text = sheet.write((port, ""), PORT_TYPE, beside(wire.points, (port, ""), PORT_TYPE))
-    return Wire(wire.title, wire.ends, wire.role, wire.power, wire.points, text)
+    return replace(wire, label=text)
 
 
 def _moved(point: Point, shift: Point) -> Point:
@@ -265,19 +265,12 @@ def _moved(point: Point, shift: Point) -> Point:
 
 
 def _shifted(text: Lettering, shift: Point) -> Lettering:
-    return Lettering(text.base, text.sub, _moved(text.at, shift), text.size, text.width)
+    return replace(text, at=_moved(text.at, shift))
 
 
 def _moved_wire(wire: Wire, shift: Point) -> Wire:
     label = _shifted(wire.label, shift) if wire.label is not None else None
-    return Wire(
-        wire.title,
-        wire.ends,
-        wire.role,
-        wire.power,
-        tuple(_moved(point, shift) for point in wire.points),
-        label,
-    )
+    return replace(wire, points=tuple(_moved(point, shift) for point in wire.points), label=label)
 
 
 def _box(disc: Disc, centre: Point) -> PlacedBox:

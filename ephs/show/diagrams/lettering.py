@@ -16,7 +16,7 @@ LESS = 1e-9
 OVERLAP = 1e6
 """Cost of lying on something: more than that of any place along a wire, 0.05 a pixel."""
 _AIR = 1.5
-Place = tuple[Point, str, float]
+Place = tuple[Point, float]
 
 
 @final
@@ -33,13 +33,13 @@ class Sheet:
     written: list[tuple[float, float, float, float]] = field(default_factory=list)
 
     def write(self, name: tuple[str, str], size: float, places: Iterable[Place]) -> Lettering:
-        """Set a name at the best of some places, (centre, anchor, cost), and record it."""
+        """Set a name at the best of some places, (centre, cost), and record it."""
         width = width_of(*name, size)
         best, cost = Lettering(*name, (0.0, 0.0), size, width), math.inf
-        for centre, anchor, dislike in places:
+        for centre, dislike in places:
             if dislike >= cost:
                 continue
-            text = Lettering(*name, centre, size, width, anchor)
+            text = Lettering(*name, centre, size, width)
             now = dislike + self._trouble(text)
             if now < cost - LESS:
                 best, cost = text, now
@@ -80,9 +80,8 @@ def around(centre: Point, radius: float, name: tuple[str, str], size: float) -> 
             # The lettering's nearest edge, not its centre, is at the reach.
             x = centre[0] + cosine * (reach + half)
             y = centre[1] + sine * (reach + 0.45 * size)
-            anchor = "start" if cosine > 0.3 else "end" if cosine < -0.3 else "middle"
-            places.append(((x, y), anchor, 0.12 * min(step, 16 - step) + 1.2 * far))
-    return sorted(places, key=lambda place: place[2])
+            places.append(((x, y), 0.12 * min(step, 16 - step) + 1.2 * far))
+    return sorted(places, key=lambda place: place[1])
 
 
 def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[Place]:
@@ -96,8 +95,7 @@ def beside(line: tuple[Point, ...], name: tuple[str, str], size: float) -> list[
             nx, ny = -dy * side, dx * side
             # The rectangle's corner nearest to the wire keeps a distance from it.
             off = _AIR + 1.0 + abs(nx) * half + abs(ny) * 0.55 * size
-            anchor = "start" if nx > 0.3 else "end" if nx < -0.3 else "middle"
-            places.append(((x + off * nx, y + off * ny), anchor, 0.05 * along))
+            places.append(((x + off * nx, y + off * ny), 0.05 * along))
     return places
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ephs.operad import Nesting, Pattern
 from ephs.show.diagrams import positions as places
 from ephs.show.diagrams.geometry import BETTER, Lettering, PlacedRegion, Point, Points
-from ephs.show.diagrams.graph import TYPE, Graph, read, width_of
+from ephs.show.diagrams.graph import TYPE, Graph, places_of, read, width_of
 
 if TYPE_CHECKING:
     from ephs.semantics import System
@@ -41,7 +41,7 @@ class Opened:
         discs = tuple(replace(d, radius=sizes.get(d.path, d.radius)) for d in self.outer.discs)
         outer = replace(self.outer, discs=discs)
         for points in places.proposals(outer):
-            at = {path: (float(x), float(y)) for path, (x, y) in zip(outer.radii(), points, strict=True)}
+            at = places_of(outer.radii(), points)
             for box, nodes in insides.items():
                 centre, _ = _circle(nodes, self.graph.radii(), box)
                 relative = {path: (x - centre[0], y - centre[1]) for path, (x, y) in nodes.items()}
@@ -53,8 +53,8 @@ class Opened:
         graph = self.inner[box]
         points = next(iter(places.proposals(graph)))
         kept = self.members[box]
-        paths = [f"{box}.{path}" for path in graph.radii()]
-        return {path: (float(x), float(y)) for path, (x, y) in zip(paths, points, strict=True) if path in kept}
+        placed = places_of((f"{box}.{path}" for path in graph.radii()), points)
+        return {path: point for path, point in placed.items() if path in kept}
 
     def _turned(self, nodes: Mapping[str, Point], centre: Point, at: Mapping[str, Point]) -> dict[str, Point]:
         """The turn, of sixteen, with the shortest wires to the outside."""

@@ -3,7 +3,7 @@
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from ephs.show.diagrams.geometry import Lettering, Placement
+from ephs.show.diagrams.geometry import Lettering, Placement, all_boxes, notes_of
 from ephs.show.shared.palette import FILLS, GREY, INK, PAPER, RIMS
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def draw_placement(axes: "Axes", placement: Placement, scale: float = 1.0) -> No
         across_points, down_points = zip(*wire.points, strict=True)
         dashes = "-" if wire.power else (0, (1.2, 2.2)) if wire.role == "link" else (0, (3.3, 2.5))
         axes.add_line(Line2D(across_points, down_points, color=INK, lw=1.2 * scale, ls=dashes, zorder=2))
-    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
+    for box in all_boxes(placement):
         rim = RIMS[box.kind]
         axes.add_patch(Circle(box.at, box.radius, fc=FILLS[box.kind], ec=rim, lw=1.3 * scale, zorder=3))
         for (x1, y1), (x2, y2) in box.hatching:
@@ -55,11 +55,8 @@ def draw_placement(axes: "Axes", placement: Placement, scale: float = 1.0) -> No
     for junction in placement.junctions:
         axes.add_patch(Circle(junction.at, junction.radius, fc=INK, ec=INK, lw=0, zorder=5))
         _write(axes, junction.label, INK, scale, halo=PAPER)
-    for wire in placement.wires:
-        if wire.label is not None:
-            _write(axes, wire.label, GREY, scale, halo=PAPER)
-    for _, word in placement.legend:
-        _write(axes, word, GREY, scale, halo=PAPER)
+    for text in notes_of(placement):
+        _write(axes, text, GREY, scale, halo=PAPER)
 
 
 def _write(axes: "Axes", text: Lettering, colour: str, scale: float, *, halo: str) -> None:

@@ -14,8 +14,6 @@ from ephs.show.diagrams.geometry import BETTER, POINT, Points, distances
 from ephs.show.diagrams.graph import Graph
 from ephs.show.shared.errors import ShowError
 
-LEFT = 1e-6
-"""Coordinate above which a point counts as right of the middle."""
 GAP = 26.0
 CLEARANCE = 9.0
 GRID = 80.0

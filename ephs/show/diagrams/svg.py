@@ -1,6 +1,6 @@
 """A placed picture as SVG."""
 
-from ephs.show.diagrams.geometry import Lettering, Placement, Point
+from ephs.show.diagrams.geometry import Lettering, Placement, Point, all_boxes
 from ephs.show.diagrams.legend import title
 from ephs.show.shared.palette import FILLS, GREY, INK, PAPER, RIMS
 
@@ -51,7 +51,7 @@ def to_svg(placement: Placement) -> str:
             line.args["stroke-dasharray"] = "1.5 3" if wire.role == "link" else "4 3"
         line.append_title(wire.title)
         drawing.append(line)
-    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
+    for box in all_boxes(placement):
         group = svg.Group(class_=f"box {box.kind}" if box.path else f"legend {box.kind}")
         if box.path:
             group.append_title(title(box.path, box.kind))

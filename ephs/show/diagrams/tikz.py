@@ -1,6 +1,6 @@
 """A placed picture as TikZ, to be compiled by plain LaTeX with the article class."""
 
-from ephs.show.diagrams.geometry import KINDS, Lettering, Placement, Point
+from ephs.show.diagrams.geometry import KINDS, Lettering, Placement, Point, all_boxes, notes_of
 from ephs.show.shared.palette import FILLS, RIMS
 
 _ESCAPES = {
@@ -57,7 +57,7 @@ def to_tikz(placement: Placement) -> str:
         body.append(
             rf"\draw{dash} {' -- '.join(_coordinates(point) for point in wire.points)}; % {_comment(wire.title)}"
         )
-    for box in (*placement.boxes, *(box for box, _ in placement.legend)):
+    for box in all_boxes(placement):
         style = f"fill=ephs{box.kind},draw=ephs{box.kind}rim"
         what = box.path or f"legend: {box.kind}"
         body.append(rf"\filldraw[{style}] {_coordinates(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(what)}")
@@ -72,8 +72,7 @@ def to_tikz(placement: Placement) -> str:
             rf"\fill {_coordinates(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}"
         )
         body.append(_node(junction.label, ""))
-    body += [_node(wire.label, "text=gray,") for wire in placement.wires if wire.label is not None]
-    body += [_node(word, "text=gray,") for _, word in placement.legend]
+    body += [_node(text, "text=gray,") for text in notes_of(placement)]
     body.append(r"\end{tikzpicture}")
     lines = [*head, r"\begin{document}", r"\hbox{%", *body, "}", r"\end{document}"]
     return "\n".join(lines) + "\n"

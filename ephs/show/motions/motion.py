@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import DIRECTION, TINY
+from ephs.semantics.spaces.rotations import matrix_to_quaternion
 
 OPPOSITE = 1e-9
 """Distance of a cosine from −1 within which a rotation's axis is arbitrary."""
@@ -105,31 +106,6 @@ def rotate(quaternion: Array, vector: Array) -> Array:
 def point_of(pose: Array, local: Array) -> Array:
     """World place (..., 3) of a body's point under poses (..., 7)."""
     return pose[..., 4:] + rotate(pose[..., :4], np.broadcast_to(local, (*pose.shape[:-1], 3)))
-
-
-def matrix_to_quaternion(matrix: Array) -> Array:
-    """Unit quaternion (4,) of a rotation matrix (3, 3)."""
-    outer = np.array(
-        [
-            [1 + matrix[0, 0] + matrix[1, 1] + matrix[2, 2], 0, 0, 0],
-            [matrix[2, 1] - matrix[1, 2], 1 + matrix[0, 0] - matrix[1, 1] - matrix[2, 2], 0, 0],
-            [
-                matrix[0, 2] - matrix[2, 0],
-                matrix[1, 0] + matrix[0, 1],
-                1 - matrix[0, 0] + matrix[1, 1] - matrix[2, 2],
-                0,
-            ],
-            [
-                matrix[1, 0] - matrix[0, 1],
-                matrix[2, 0] + matrix[0, 2],
-                matrix[2, 1] + matrix[1, 2],
-                1 - matrix[0, 0] - matrix[1, 1] + matrix[2, 2],
-            ],
-        ]
-    )
-    outer = outer + np.tril(outer, -1).T  # four times q qᵀ: take its longest column
-    column = outer[:, int(np.argmax(np.diag(outer)))]
-    return column / np.linalg.norm(column)
 
 
 def between(first: Array, second: Array) -> tuple[Array, float]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.show.motions.motion import Array, Film, between_instants, nearest, point_of, rotate
-from ephs.show.motions.sheets import sheets_of
+from ephs.show.motions.sheets import normals, sheets_of
 from ephs.show.motions.symbols import METAL, Colour
 from ephs.show.shared.errors import ShowError
 
@@ -203,7 +203,7 @@ def shades_of(sol: Any, frames: Film, colour: str | None) -> tuple[Shades, ...]:
 def _temperatures(sol: Any, frames: Film) -> Shades:
     """Of thermal nodes, of elements of beams with a store of their own, and of shells that of the node they warm."""
     names = [name for name, _ in sol.outline.all_thermal()]
-    found = {name: _at(frames, sol, np.asarray(sol.thermal(name).temperature, dtype=float)) for name in names}
+    found = {name: _at_frames(frames, sol, np.asarray(sol.thermal(name).temperature, dtype=float)) for name in names}
     for _, beam in sol.outline.all_beams():
         if all(joint in found for joint in beam.joints):
             found |= _at_nodes(beam, found)
@@ -221,7 +221,7 @@ def _strains(sol: Any, frames: Film) -> tuple[Shades, ...]:
     for name, beam in sol.outline.all_beams():
         motion = sol.beam(name)
         lengths = [each.length for each in (sol.outline.joint(joint).strain for joint in beam.joints) if each]
-        along = _at(frames, sol, motion.energy / np.array(beam.lengths or lengths))
+        along = _at_frames(frames, sol, motion.energy / np.array(beam.lengths or lengths))
         found |= dict(zip(beam.joints, along.T, strict=True))
         found |= _at_nodes(beam, found)
     return (Shades(f"{COLOURS['energy']} of beams", "J/m", found, {}, 0.0, _highest(found)),) if found else ()
@@ -233,20 +233,19 @@ def _stresses(sol: Any, frames: Film, colour: str) -> tuple[Shades, ...]:
     for name in sheets_of(sol.outline):
         motion = sol.shell(name)
         if colour == "energy":
-            corner = motion.position[0][motion.cells]
-            across = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+            across = normals(motion.position[0][motion.cells])
             values = motion.energy / (0.5 * np.linalg.norm(across, axis=1))
         else:
             given = getattr(motion, colour)
             twice = np.array([1.0, 1.0, 2.0])[: given.shape[2]]  # 12 and 21 are one number
             values = np.sqrt(np.square(given) @ twice)
         if not np.isnan(values).any():
-            found[name] = _at(frames, sol, values)
+            found[name] = _at_frames(frames, sol, values)
     unit = {"energy": "J/m²", "moment": "N"}.get(colour, "N/m")
     return (Shades(f"{COLOURS[colour]} of shells", unit, {}, found, 0.0, _highest(found)),) if found else ()
 
 
-def _at(frames: Film, sol: Any, values: Array) -> Array:
+def _at_frames(frames: Film, sol: Any, values: Array) -> Array:
     """Values (n,) or (n, k) of a solution at the frames."""
     t = np.asarray(sol.t, dtype=float)
     columns = [between_instants(t, frames.times, column) for column in values.reshape(len(t), -1).T]

@@ -3,9 +3,8 @@
 import base64
 import html
 import json
-from collections.abc import Iterable
-from importlib.resources import files
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,12 +13,20 @@ from ephs.show.motions.motion import Array, best_side, rotate
 from ephs.show.motions.overlays import GROUND, tint
 from ephs.show.motions.solids import Solid, box, cylinder, held_at, sphere
 from ephs.show.motions.stage import Stage
-from ephs.show.motions.symbols import METAL, MUTED, ink
+from ephs.show.motions.symbols import JOINTS, METAL, MUTED, half_axis, ink
+from ephs.show.shared.page import asset
 
 MOST_FACES = 1500
 """Faces of a body above which its convex hull is drawn."""
 LONGEST = 0.35
 """Length of the longest arrow, in parts of the mechanism's size."""
+
+
+_SOLIDS: Final[dict[str, Callable[[Array], Any]]] = {
+    "cylinder": lambda sides: cylinder(*sides),
+    "box": box,
+    "sphere": lambda sides: sphere(*sides),
+}
 
 
 def player(stage: Stage, title: str, height: str = "30rem") -> str:
@@ -33,12 +40,10 @@ def player(stage: Stage, title: str, height: str = "30rem") -> str:
         Of the canvas, in the words of CSS.
     """
     data = json.dumps(_data(stage), ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    script = files("ephs.show").joinpath("assets", "player.js").read_text(encoding="utf-8")
-    style = files("ephs.show").joinpath("assets", "player.css").read_text(encoding="utf-8")
     return (
-        f"<style>{style}</style>"
+        f"<style>{asset('player.css')}</style>"
         f'<div class="player" style="height:{height}" role="img" aria-label="{html.escape(title)}">'
-        f'<script type="application/json">{data}</script></div><script>{script}</script>'
+        f'<script type="application/json">{data}</script></div><script>{asset("player.js")}</script>'
     )
 
 
@@ -105,19 +110,10 @@ def _few(solid: Solid) -> tuple[Array, Any]:
 def _symbol(name: str, joint: Joint, names: list[str], stage: Stage, size: float) -> list[dict[str, Any]]:
     """The symbol of a joint on body 1, its axis along z of frame C1."""
     r = stage.symbol_size(joint, size)
-    shapes = {
-        "revolute": [cylinder(r, 4.0 * r)],
-        "screw": [cylinder(0.7 * r, 4.0 * r)],
-        "cylindrical": [cylinder(0.6 * r, 6.0 * r), cylinder(r, 2.0 * r)],
-        "prismatic": [box(np.array([0.7, 0.7, 7.0]) * r), box(np.array([1.6, 1.6, 2.0]) * r)],
-        "planar": [box(np.array([5.0, 5.0, 0.2]) * r)],
-        "spherical": [sphere(1.1 * r)],
-        "universal": [sphere(0.8 * r)],
-        "fixed": [box(np.full(3, 1.3 * r))],
-    }.get(joint.kind, [])
+    shapes = [_SOLIDS[shape](r * np.array(sides)) for _, shape, sides, *_ in JOINTS.get(joint.kind, ())]
     frame = np.asarray(joint.frame1, dtype=float)
     body = -1 if joint.body1 == GROUND else names.index(joint.body1)
-    half = 6.0 if joint.kind == "prismatic" else 5.0
+    half = half_axis(joint.kind)
     ends = np.array([[0.0, 0.0, -half * r], [0.0, 0.0, half * r]])
     axis = (frame[4:] + rotate(frame[:4], ends)).ravel().tolist()
     return [
@@ -127,7 +123,7 @@ def _symbol(name: str, joint: Joint, names: list[str], stage: Stage, size: float
             faces,
             METAL,
             heat=joint.heat,
-            axis=None if k or joint.kind in ("spherical", "fixed") else axis,
+            axis=None if k or not half else axis,
             label="" if k else name,
             place=frame[4:].tolist(),
         )

@@ -44,6 +44,11 @@ class DrawnShell:
         return np.stack([point_of(poses.get(body, still), at) for body, at in self.ends], axis=-2)
 
 
+def normals(corners: Array) -> Array:
+    """(n, 3) twice the areas of quadrilaterals, along their normals, from corners (n, 4, 3)."""
+    return np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+
+
 def sheets_of(scene: Any) -> dict[str, DrawnShell]:
     """The shells of a scene, or of a system's outline."""
     found: dict[str, DrawnShell] = {}

@@ -12,7 +12,7 @@ import numpy as np
 from ephs.show.motions.lines import lines_of
 from ephs.show.motions.motion import Array, best_side, point_of, rotate
 from ephs.show.motions.overlays import Tones
-from ephs.show.motions.sheets import DrawnShell, sheets_of
+from ephs.show.motions.sheets import DrawnShell, normals, sheets_of
 from ephs.show.motions.solids import Solid, coarse, held_at, solids_of
 from ephs.show.motions.symbols import MUTED, Colour, ink
 from ephs.show.shared.palette import GREY, INK, PAPER
@@ -178,10 +178,10 @@ def _surface(solid: Solid, at: Array, colour: Array) -> tuple[list[Array], list[
             shown.append((float(at[face, 2].mean()), at[face, :2], shade))
     shown.sort(key=lambda entry: entry[0])
     edges: list[Array] = []
-    for (a, b), normals in beside.items():
-        seen = [n[2] > 0.0 for n in normals]
-        bent = len(normals) == 2 and float(normals[0] @ normals[1]) < _SMOOTH
-        if any(seen) and (not all(seen) or bent or len(normals) == 1):
+    for (a, b), beyond in beside.items():
+        seen = [n[2] > 0.0 for n in beyond]
+        bent = len(beyond) == 2 and float(beyond[0] @ beyond[1]) < _SMOOTH
+        if any(seen) and (not all(seen) or bent or len(beyond) == 1):
             edges.append(at[[a, b], :2])
     return [face for _, face, _ in shown], [shade for _, _, shade in shown], edges
 
@@ -189,7 +189,7 @@ def _surface(solid: Solid, at: Array, colour: Array) -> tuple[list[Array], list[
 def _draw_sheet(out: Sketch, sheet: DrawnShell, at: Array, colours: list[Colour] | None, own: Colour) -> None:
     """The faces of a shell, the far ones first: shaded, or less so in colours that mean something."""
     corner = at[sheet.cells]
-    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    normal = normals(corner)
     length = np.linalg.norm(normal, axis=1)
     light = np.abs(normal @ (_LIGHT / np.linalg.norm(_LIGHT))) / np.where(length > 0.0, length, 1.0)
     tones = 0.4 + 0.6 * np.array(own)[None] / 255.0 if colours is None else np.array(colours) / 255.0

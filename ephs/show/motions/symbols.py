@@ -1,6 +1,7 @@
 """Shapes of bodies, joints and springs in space."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,24 @@ MUTED: Colour = (168, 174, 182)
 METAL: Colour = (70, 76, 84)
 _AXIS: Colour = (198, 58, 40)
 _PLACES = {"position": "position", "wxyz": "rotation"}
+
+
+JOINTS: Mapping[str, tuple[tuple[Any, ...], ...]] = {
+    "revolute": (("pin", "cylinder", (1.0, 4.0)),),
+    "screw": (("pin", "cylinder", (0.7, 4.0)),),
+    "cylindrical": (("pin", "cylinder", (0.6, 6.0)), ("sleeve", "cylinder", (1.0, 2.0))),
+    "prismatic": (("rail", "box", (0.7, 0.7, 7.0)), ("carriage", "box", (1.6, 1.6, 2.0))),
+    "planar": (("plate", "box", (5.0, 5.0, 0.2), 0.6),),
+    "spherical": (("ball", "sphere", (1.1,)),),
+    "universal": (("cross", "sphere", (0.8,)),),
+    "fixed": (("weld", "box", (1.3, 1.3, 1.3)),),
+}
+"""Symbol of each kind of joint about its axis z: solids with their sizes in radii of the symbol, and their opacity."""
+
+
+def half_axis(kind: str) -> float:
+    """Half the length of the axis that is drawn through a joint's symbol, in its radii; 0 where it has none."""
+    return 0.0 if kind in ("spherical", "fixed") or kind not in JOINTS else 6.0 if kind == "prismatic" else 5.0
 
 
 def ink(index: int) -> Colour:
@@ -67,50 +86,25 @@ def add_joint(server: Any, node: str, joint: Any, size: float) -> list[Any]:
     pose = np.asarray(joint.frame1, dtype=float)
     scene.add_frame(node, show_axes=False, wxyz=pose[:4], position=pose[4:])
     metal: list[Any] = []
-    match joint.kind:
-        case "revolute":
-            metal.append(_cylinder(scene, node, size, 4.0 * size))
-            _axis(scene, node, size)
-        case "screw":
-            metal.append(_cylinder(scene, node, 0.7 * size, 4.0 * size))
-            turns = np.linspace(0.0, 8 * math.pi, 97)
-            thread = np.stack(
-                [
-                    0.85 * size * np.cos(turns),
-                    0.85 * size * np.sin(turns),
-                    size * (turns / (2 * math.pi) - 2),
-                ],
-                1,
-            )
-            _polyline(scene, f"{node}/thread", thread, _AXIS, 0.16 * size)
-            _axis(scene, node, size)
-        case "cylindrical":
-            metal.append(_cylinder(scene, node, 0.6 * size, 6.0 * size))
-            metal.append(scene.add_cylinder(f"{node}/sleeve", radius=size, height=2.0 * size, color=METAL))
-            _axis(scene, node, size)
-        case "prismatic":
-            metal.append(scene.add_box(f"{node}/rail", color=METAL, dimensions=(0.7 * size, 0.7 * size, 7.0 * size)))
-            metal.append(
-                scene.add_box(f"{node}/carriage", color=METAL, dimensions=(1.6 * size, 1.6 * size, 2.0 * size))
-            )
-            _axis(scene, node, size, half=6.0)
-        case "planar":
-            metal.append(
-                scene.add_box(
-                    f"{node}/plate", color=METAL, dimensions=(5.0 * size, 5.0 * size, 0.2 * size), opacity=0.6
-                )
-            )
-            _axis(scene, node, size)
-        case "spherical":
-            metal.append(scene.add_icosphere(f"{node}/ball", radius=1.1 * size, color=METAL, subdivisions=3))
-        case "universal":
-            metal.append(scene.add_icosphere(f"{node}/cross", radius=0.8 * size, color=METAL, subdivisions=3))
-            _axis(scene, node, size)
-        case "fixed":
-            metal.append(scene.add_box(f"{node}/weld", color=METAL, dimensions=(1.3 * size, 1.3 * size, 1.3 * size)))
-        case _:
-            # A free joint has no symbol.
-            pass
+    for name, shape, sides, *opacity in JOINTS.get(joint.kind, ()):
+        lengths = tuple(size * side for side in sides)
+        style: dict[str, Any] = {"color": METAL} | dict(zip(("opacity",), opacity, strict=False))
+        if shape == "cylinder":
+            drawn = scene.add_cylinder(f"{node}/{name}", radius=lengths[0], height=lengths[1], **style)
+        elif shape == "sphere":
+            drawn = scene.add_icosphere(f"{node}/{name}", radius=lengths[0], subdivisions=3, **style)
+        else:
+            drawn = scene.add_box(f"{node}/{name}", dimensions=lengths, **style)
+        metal.append(drawn)
+    if joint.kind == "screw":
+        turns = np.linspace(0.0, 8 * math.pi, 97)
+        thread = np.stack(
+            [0.85 * size * np.cos(turns), 0.85 * size * np.sin(turns), size * (turns / (2 * math.pi) - 2)], 1
+        )
+        _polyline(scene, f"{node}/thread", thread, _AXIS, 0.16 * size)
+    if half := half_axis(joint.kind):
+        ends = np.array([[0.0, 0.0, -half * size], [0.0, 0.0, half * size]])
+        _polyline(scene, f"{node}/axis", ends, _AXIS, 2.5, units="screen")
     return metal
 
 
@@ -130,15 +124,6 @@ def add_stick(server: Any, node: str, ends: tuple[Array, Array], colour: Colour,
     turn, length = between(*ends)
     middle = 0.5 * (ends[0] + ends[1])
     server.scene.add_cylinder(node, radius=radius, height=length, color=colour, wxyz=turn, position=middle)
-
-
-def _cylinder(scene: Any, node: str, radius: float, height: float) -> Any:
-    return scene.add_cylinder(f"{node}/pin", radius=radius, height=height, color=METAL)
-
-
-def _axis(scene: Any, node: str, size: float, half: float = 5.0) -> None:
-    ends = np.array([[0.0, 0.0, -half * size], [0.0, 0.0, half * size]])
-    _polyline(scene, f"{node}/axis", ends, _AXIS, 2.5, units="screen")
 
 
 def _polyline(scene: Any, node: str, line: Array, colour: Colour, thickness: float, units: str = "world") -> Any:

@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from pathlib import Path as FilePath
 from threading import Lock
 from typing import Any, Final, final
@@ -22,7 +21,7 @@ from ephs.mechanics.scene.model import Joint, Scene
 from ephs.semantics.bundles.bundle import Array
 from ephs.show.motions.player import player
 from ephs.show.motions.stage import Stage, stage_of
-from ephs.show.shared.page import Page
+from ephs.show.shared.page import Page, asset
 from ephs.solve.result.record import RunRecord
 from ephs.solve.running.ending import solution_of
 
@@ -62,13 +61,13 @@ class Posed:
                 "<!DOCTYPE html>", '<html lang="en">',
                 '<head><meta charset="utf-8"><meta name="viewport" content="width=device-width">',
                 f"<title>{title}</title>",
-                f'<link rel="icon" href="data:,"><style>{_asset("report.css")}{_asset("view.css")}</style></head>',
+                f'<link rel="icon" href="data:,"><style>{asset("report.css")}{asset("view.css")}</style></head>',
                 f"<body><h1>{title}</h1>",
                 '<p class="lead">Move a joint; drop a scene, URDF, MJCF or SDF file on the page to see it.</p>',
                 player(stage, self.scene.name, "38rem"), f'<p id="said" role="status">{html.escape(self.notes)}</p>',
                 '<div id="sliders"></div>',
                 f'<script type="application/json" id="view">{data}</script>',
-                f"<script>{_asset('view.js')}</script></body></html>", "",
+                f"<script>{asset('view.js')}</script></body></html>", "",
             ]),
             self.scene.name,
         )  # fmt: skip
@@ -193,7 +192,3 @@ def _sliders(name: str, joint: Joint, stage: Stage) -> list[dict[str, Any]]:
             "low": float(min(span[0], at[k])), "high": float(max(span[1], at[k])), "unit": "rad" if turns[k] else "m",
         })  # fmt: skip
     return found
-
-
-def _asset(name: str) -> str:
-    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")

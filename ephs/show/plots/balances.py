@@ -7,9 +7,7 @@ import numpy as np
 
 from ephs.show.plots.flows import ExergyBand, exergy_bands
 from ephs.show.plots.panels import entropy_panels
-from ephs.show.shared.palette import BLUE, GREEN, GREY, ORANGE, RED, SKY
 
-_COLOURS = {"storage": (BLUE, SKY), "destroyed": (RED, RED), "boundary": (ORANGE, GREEN)}
 _VERBS = {("storage", True): "gives", ("storage", False): "takes", ("destroyed", False): "destroys"}
 
 
@@ -54,7 +52,6 @@ def _flow(bands: list[ExergyBand]) -> str:
 
 def _bar(band: ExergyBand, total: float) -> str:
     share = band.amount / total
-    colour = _COLOURS.get(band.kind, (GREY, GREY))[0 if band.source else 1]
     verb = _VERBS.get((band.kind, band.source), "")
-    bar = f'<div><span style="display:block;width:{100.0 * share:.2f}%;background:{colour}"></span></div>'
+    bar = f'<div><span style="display:block;width:{100.0 * share:.2f}%;background:{band.colour}"></span></div>'
     return f"<div>{html.escape(band.name)} {verb}</div>{bar}<div>{number(band.amount)} J ({100.0 * share:.1f} %)</div>"

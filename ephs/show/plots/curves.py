@@ -4,6 +4,7 @@ Every function returns a matplotlib ``Figure`` that is bound to no window, and t
 other system alike.
 """
 
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,6 +47,14 @@ STYLE = {
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 4),
 }
+
+
+def styled() -> AbstractContextManager[None]:
+    """The style of all figures, in which they are drawn."""
+    from matplotlib import rc_context
+
+    style: Any = STYLE
+    return rc_context(style)
 
 
 def plot_motion(sol: Any) -> "Figure":
@@ -112,11 +121,8 @@ def _times(sol: Any, values: Array) -> Array:
 
 
 def _panels(sol: Any, what: str, panels: list[Panel]) -> "tuple[Figure, list[Axes]]":
-    from matplotlib import rc_context
-
-    style: Any = STYLE
     heights = [panel.height for panel in panels]
-    with rc_context(style):
+    with styled():
         figure = new_figure(_WIDTH, 0.7 + _ROW * sum(heights))
         grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
         axes: list[Axes] = list(grid[:, 0])

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ephs.mechanics.scene.errors import did_you_mean, listing
-from ephs.show.plots.curves import STYLE
+from ephs.show.plots.curves import styled
 from ephs.show.plots.series import thinned
 from ephs.show.shared.errors import ShowError
 from ephs.show.shared.figures import new_figure, plain
@@ -36,8 +36,6 @@ def plot_wrenches(sol: Any, *joints: str) -> "Figure":
     ShowError
         If the solution has no joints, or none of such a name.
     """
-    from matplotlib import rc_context
-
     known = list(sol.freedoms)
     if not known:
         raise ShowError("nothing", path=str(sol.name), found="joints", expected="a mechanism with joints")
@@ -49,8 +47,7 @@ def plot_wrenches(sol: Any, *joints: str) -> "Figure":
             )
     chosen = list(joints) or known[:MOST]
     t = np.asarray(sol.t, dtype=float)
-    style: Any = STYLE
-    with rc_context(style):
+    with styled():
         figure = new_figure(7.2, 0.8 + 1.5 * len(chosen))
         grid = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
         for (left, right), name in zip(grid, chosen, strict=True):

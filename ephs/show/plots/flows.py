@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ephs.show.plots.curves import STYLE
+from ephs.show.plots.curves import styled
 from ephs.show.shared.figures import new_figure, plain
 from ephs.show.shared.palette import BLUE, GREEN, GREY, ORANGE, RED, SKY
 
@@ -18,6 +18,10 @@ GAP, SLOT = 0.02, 0.05
 """Between bands at the edge, and the least room that a band and its name get there, of the height of all."""
 
 
+_COLOURS = {"storage": (BLUE, SKY), "destroyed": (RED, RED), "boundary": (ORANGE, GREEN)}
+"""Colours of sources and of sinks."""
+
+
 class ExergyBand(NamedTuple):
     """A source (from the left) or a sink (to the right) of exergy, in J."""
 
@@ -25,6 +29,11 @@ class ExergyBand(NamedTuple):
     amount: float
     source: bool
     kind: str
+
+    @property
+    def colour(self) -> str:
+        """By what it is of, and its side."""
+        return _COLOURS.get(self.kind, (GREY, GREY))[0 if self.source else 1]
 
 
 def exergy_bands(sol: Any, path: Any = ".") -> list[ExergyBand]:
@@ -59,11 +68,9 @@ def exergy_bands(sol: Any, path: Any = ".") -> list[ExergyBand]:
 
 def plot_exergy_flow(sol: Any, path: Any = ".") -> "Figure":
     """A Sankey diagram: sources of exergy on the left, sinks and destruction on the right, widths in J."""
-    import matplotlib as mpl
-
     bands = exergy_bands(sol, path)
     total = sum(band.amount for band in bands if band.source)
-    with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType] - the style's values are of many types
+    with styled():
         most = max(sum(band.source for band in bands), sum(not band.source for band in bands), 1)
         figure = new_figure(7.2, 1.6 + 0.26 * most)
         axes = figure.subplots()
@@ -102,13 +109,6 @@ def _merged(bands: list[ExergyBand]) -> list[ExergyBand]:
 
 def _side(axes: "Axes", bands: list[ExergyBand], total: float, *, left: bool) -> None:
     """Bands from the edge to the middle; at the edge they stand apart."""
-    colours = {
-        "storage": BLUE if left else SKY,
-        "destroyed": RED,
-        "boundary": ORANGE if left else GREEN,
-        "others": GREY,
-        "defect": GREY,
-    }
     slots = [max(band.amount / total, SLOT) for band in bands]
     edge, inner = 0.5 + 0.5 * (sum(slots) + GAP * (len(bands) - 1)), 1.0
     s = np.linspace(0.0, 1.0, 60)
@@ -118,7 +118,7 @@ def _side(axes: "Axes", bands: list[ExergyBand], total: float, *, left: bool) ->
         width = band.amount / total
         start = edge - 0.5 * (slot - width)
         top = start + (inner - start) * bend
-        axes.fill_between(x, top - width, top, color=colours[band.kind], alpha=0.8, linewidth=0.0)
+        axes.fill_between(x, top - width, top, color=band.colour, alpha=0.8, linewidth=0.0)
         verb = {"destroyed": " destroys", "storage": " gives" if left else " takes"}.get(band.kind, "")
         where = (-0.02, "right") if left else (1.02, "left")
         label = f"{plain(band.name, 30)}{verb}  {band.amount:.3g} J ({100.0 * width:.1f} %)"

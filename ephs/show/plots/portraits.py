@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ephs.mechanics.scene.errors import did_you_mean, listing
-from ephs.show.plots.curves import STYLE
+from ephs.show.plots.curves import styled
 from ephs.show.plots.series import Array, freedom_lines
 from ephs.show.shared.errors import ShowError
 from ephs.show.shared.figures import new_figure
@@ -45,14 +45,11 @@ def plot_phase(sol: Any, *which: str | tuple[str, str]) -> "Figure":
     ShowError
         If there is no such degree of freedom or state, or nothing that could be drawn by default.
     """
-    from matplotlib import rc_context
-
     known = _freedoms(sol)
     curves = [_curve(sol, each, known) for each in which] or _default(sol, known)
     columns = 2 if len(curves) == 4 else min(3, len(curves))
     rows = -(-len(curves) // columns)
-    style: Any = STYLE
-    with rc_context(style):
+    with styled():
         figure = new_figure(3.4 if columns == 1 else 7.2, 0.5 + (2.7 if columns == 1 else 7.2 / columns * 0.85) * rows)
         grid = figure.subplots(rows, columns, squeeze=False)
         for axes, curve in zip(grid.flat, curves, strict=False):

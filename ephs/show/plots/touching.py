@@ -7,11 +7,12 @@ import numpy as np
 
 from ephs.mechanics.scene.build import component_path
 from ephs.show.plots.panels import Curve, Panel
+from ephs.show.shared.page import wide_table
 from ephs.show.shared.palette import CYCLE
 
 _HEAD = (
-    "least gap [m]", "largest force [N]", "largest slip [m/s]", "most energy stored [J]", "energy at the end [J]",
-    "exergy destroyed [J]",
+    "contact", "least gap [m]", "largest force [N]", "largest slip [m/s]", "most energy stored [J]",
+    "energy at the end [J]", "exergy destroyed [J]",
 )  # fmt: skip
 
 
@@ -40,7 +41,7 @@ def contact_table(sol: Any) -> str:
     names = _names(sol)
     if not names or not len(sol.t):
         return ""
-    rows, apart, shared = list[str](), 0, list[str]()
+    rows, apart, shared = list[list[str]](), 0, list[str]()
     for name in names:
         motion, book = sol.contact(name), sol.ledger(component_path("contacts", name))
         force = np.linalg.norm(motion.force, axis=1)
@@ -51,9 +52,7 @@ def contact_table(sol: Any) -> str:
         numbers = (
             motion.gap.min(), force.max(), motion.slip.max(), book.exergy.max(), book.exergy[-1], book.destroyed[-1],
         )  # fmt: skip
-        cells = "".join(f"<td>{value:.4g}</td>" for value in numbers)
-        rows.append(f"<tr><th>{html.escape(name)}</th>{cells}</tr>")
-    head = "".join(f"<th>{words}</th>" for words in _HEAD)
+        rows.append([html.escape(name), *(f"{value:.4g}" for value in numbers)])
     loose = html.escape(", ".join(shared))
     share = f" Contacts that share a load have indeterminate forces, of which those of least norm are listed: {loose}."
     others = f" {apart} other pairs never touched." if rows and apart else ""
@@ -62,6 +61,5 @@ def contact_table(sol: Any) -> str:
     return (
         "<h2>Contacts</h2><p>Gaps, forces and slips are the largest at kept instants. Destroyed exergy is the heat that"
         f" the environment took; each step is in it.{others}{share if shared else ''}</p>"
-        f'<div class="wide"><table><thead><tr><th>contact</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
+        f"{wide_table(_HEAD, rows)}"
     )

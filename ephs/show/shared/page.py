@@ -1,7 +1,9 @@
 """A page: displayed in notebooks and built documentation as a frame, elsewhere a file."""
 
 import html
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path as FilePath
 from typing import final
 
@@ -40,3 +42,15 @@ class Page:
 
     def __repr__(self) -> str:
         return f"<Page {self.title!r}, {len(self.html) / 1e6:.1f} MB; save(path) writes it>"
+
+
+def asset(name: str) -> str:
+    """The text of a script or a style that comes with the package."""
+    return files("ephs.show").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def wide_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """An HTML table that may be wider than the page; the first cell of a row is its head."""
+    names = "".join(f"<th>{words}</th>" for words in head)
+    body = "".join(f"<tr><th>{first}</th>{''.join(f'<td>{x}</td>' for x in rest)}</tr>" for first, *rest in rows)
+    return f'<div class="wide"><table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table></div>'

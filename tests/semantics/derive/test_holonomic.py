@@ -88,11 +88,11 @@ def test_power_is_the_same_on_both_sides_of_a_map(seed):
     """⟨Tᵀ f'|e⟩ = ⟨f'|T e⟩, and the matrices come back from their numbers."""
     rng = np.random.default_rng(seed)
     matrices = [SE3.adjoint(SE3.random(rng)), rng.standard_normal((3, 2)), np.eye(2), np.zeros((6, 0))]
-    maps, numbers = Maps.of(matrices)
+    maps, numbers = Maps.of_matrices(matrices)
     assert [block.sort for block in maps.blocks] == ["frame", "any", "same", "any"]
     rows = maps.rows(numbers)
     for block, matrix, found in zip(maps.blocks, matrices, rows, strict=True):
-        assert np.array_equal(np.array(found).reshape(matrix.shape), matrix) and block == Block.of(matrix)
+        assert np.array_equal(np.array(found).reshape(matrix.shape), matrix) and block == Block.of_matrix(matrix)
     e, f = rng.standard_normal(maps.outside), rng.standard_normal(maps.inside)
     inward, outward = np.array(maps.inward(rows, e.tolist())), np.array(maps.outward(rows, f.tolist()))
     terms = np.abs(f) @ np.abs(inward) + np.abs(outward) @ np.abs(e)
