@@ -127,6 +127,23 @@ def test_a_scene_in_another_state_has_the_digits_of_one_made_anew(seed):
     assert scene_system(made_anew(moved)) is not scene_system(scene)
 
 
+def test_a_part_that_was_heated_is_another_one(tmp_path):
+    """The scene above shares its system with no scene of before; another part does."""
+    hot, cold = "[thermal.box]\ncapacity = 5.0\ntemperature = 300.0\n", BOUNCING.replace("[1.0, 0.0, 0.0]", "[0, 0, 0]")
+    (tmp_path / "hot.toml").write_text(
+        cold + hot + '[conduction.out]\nbetween = ["box", "environment"]\nconductance = 1.0\n'
+    )
+    (tmp_path / "cold.toml").write_text(cold)
+    parts = '[parts.hot]\nuse = "hot.toml"\n[parts.cold]\nuse = "cold.toml"\nposition = [3.0, 0.0, 0.0]\n'
+    (tmp_path / "whole.toml").write_text("format = 1\n" + parts)
+    scene = ephs.load(tmp_path / "whole.toml")
+    moved = later(scene)
+    assert moved.parts["hot"].thermal["box"].temperature < 300.0
+    assert scene_system(moved) is not scene_system(scene)
+    assert scene_system(moved.parts["cold"]) is scene_system(scene.parts["cold"])
+    assert parts_of(moved) == parts_of(made_anew(moved))
+
+
 def test_elements_that_read_motions_for_more_than_their_start_are_made_anew(monkeypatch):
     """The control: read while it is built, the start of a spring is that of the scene for which it was built."""
     text = (

@@ -263,34 +263,37 @@ def started(scene: "Scene", element: "Element", start: Start) -> "Mapping[str, A
 
 
 def moved(scene: "Scene", other: "Scene") -> "Scene":
-    """A scene that differs from another one in the motion of bodies and joints, and perhaps in other elements.
+    """A scene that shares its system with another one where all elements are the same, as its parts do: see `form_of`.
 
-    If it does not in others, it shares what does not depend on motion: see `form_of`.
+    Bodies and joints may differ in their motion at the start, and in nothing else.
     """
-    for (_, level), (_, before) in zip(scene.levels(), other.levels(), strict=True):
-        if level.world is before.world and not level.elements and _same_elements(level, before):
-            once(level, "like", lambda before=before: once(before, "like", lambda: before))
+    levels = [(own, before) for (_, own), (_, before) in zip(scene.levels(), other.levels(), strict=True)]
+    for own, before in levels:
+        below = zip(own.levels(), before.levels(), strict=True)
+        if all(_same_elements(one, like) for (_, one), (_, like) in below):
+            once(own, "like", lambda before=before: once(before, "like", lambda: before))
     return scene
 
 
 def _same_elements(scene: "Scene", other: "Scene") -> bool:
-    """Whether two levels have the same elements but for bodies and joints."""
+    """Whether two levels have the same world and the same elements but for bodies and joints, none of one's own."""
     from ephs.mechanics.scene.model import ELEMENTS
 
     own = [(scene.section(key), other.section(key)) for key in ELEMENTS if key not in ("bodies", "joints")]
-    return all(a.keys() == b.keys() and all(a[name] is b[name] for name in a) for a, b in own)
+    same = all(a.keys() == b.keys() and all(a[name] is b[name] for name in a) for a, b in own)
+    return same and scene.world is other.world and not scene.elements
 
 
 def form_of(scene: "Scene") -> "Scene":
-    """A scene with the same elements and system: it differs in how bodies and joints move at the start, or is it."""
+    """The scene that a scene shares its system with: itself, or one that differs in motion at the start alone."""
     like = once(scene, "like", lambda: scene)
     return scene if like is scene or any(_elements(level).moving for _, level in like.levels()) else like
 
 
 def built(scene: "Scene") -> SceneLevel:
-    """Junctions, boxes and inputs of the elements of a level; made once and kept with the scene.
+    """Junctions, boxes and inputs of the elements of a level, made once for all scenes that share them.
 
-    Values of states at the start may be those of another scene: see `starts`.
+    States at the start in its fillings may be those of another scene: ``starts`` makes those of this one.
     """
     return _elements(form_of(scene))
 
