@@ -4,7 +4,7 @@ SSP3(4,3,3) of Pareschi and Russo, J. Sci. Comput. 25 (2005) 129-155, of order 3
 stability, its implicit one is L-stable. No weight is negative, so that no step loses entropy, whatever its length.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, final
 
@@ -12,11 +12,13 @@ import numpy as np
 
 from ephs.mechanics.methods.explicit import Explicit, Tableau
 from ephs.mechanics.methods.tableaux import arrays
+from ephs.mechanics.road.pack import PackedLink
 from ephs.mechanics.tree.engine.drags import chains, frictions, memory_of
 from ephs.mechanics.tree.engine.engine import Engine
 from ephs.mechanics.tree.engine.links import links_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.stages import evaluated
+from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
@@ -88,7 +90,7 @@ class Semi:
         """The present engine, which a start may make anew, with memory, and its stages."""
         eq, engine = self._equations, self._equations.engine
         if self._made is None or self._made[0] is not engine:
-            rows, parts = len(engine.array("value")), links_of(eq.reduced).parts
+            rows, parts = len(engine.array("value")), _parts(eq.reduced)
             sizes = engine.tables, parts, engine.sizes[1], rows, eq.driven.tolist()
             memory = memory_of(*sizes, pushed=eq.given.pushed) | {"scheme": SCHEME, "again": AGAIN}
             given = ARRAYS, self._steering, self._base, self._start, self._k, memory, self._y, self._q
@@ -135,9 +137,14 @@ def semi_implicit(equations: ReducedEquations, control: Control) -> Explicit:
 
 def cheap(equations: ReducedEquations) -> bool:
     """Whether the masses of a tree are factorised in little time, and no contact is hard."""
-    reach = chains(links_of(equations.reduced).parts)["reach"]
+    reach = chains(_parts(equations.reduced))["reach"]
     narrow = reach.size <= FREEDOMS and np.sum((np.arange(reach.size) - reach) ** 2.0) <= WORK * reach.size
     return bool(narrow) and equations.problem.descriptor.strikes is None
+
+
+def _parts(reduced: Reduced) -> Sequence[PackedLink]:
+    """The links, found once: of their joints alone, which stay where numbers of tables are overwritten."""
+    return once(reduced, "links", lambda: links_of(reduced).parts)
 
 
 def _programs(equations: ReducedEquations) -> dict[int, int]:

@@ -14,7 +14,6 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
-from ephs.semantics.systems.kept import once
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.finding.mechanism import Reduced
@@ -61,15 +60,11 @@ class Found:
 
 
 def links_of(reduced: "Reduced", *, apart: bool = False) -> Found:
-    """The links of a reduced scene, found once.
+    """The links of a reduced scene.
 
     With ``apart`` each body is a link, also of planar mechanisms and where bodies are fixed to each other: what joints
     transmit is then known of all of them, in all six directions.
     """
-    return once(reduced, ("links", apart), lambda: _found_links(reduced, apart=apart))
-
-
-def _found_links(reduced: "Reduced", *, apart: bool) -> Found:
     t = reduced.tables
     joints = [i for i in range(len(reduced.edges)) if t.kind[i] != SPRING]
     normal = None if apart else _plane(reduced, joints)
