@@ -9,7 +9,7 @@ import numpy as np
 
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.checked import Checked
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, SceneElement, frozen
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, frozen
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import Fault
 from ephs.mechanics.scene.homogeneous import mass_and_moments
@@ -48,7 +48,7 @@ class World(Measured):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Body(SceneElement):
+class Body(Measured):
     """A rigid body.
 
     Attributes

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias, final
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.element import Measured, Named, SceneElement
+from ephs.mechanics.scene.element import Measured, Named
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.schema_numbers import EntryTable, NonNegative, Number, Positive, Text, Vector, key
 from ephs.mechanics.scene.sections import SectionEntry
@@ -38,7 +38,7 @@ class Strain(Measured):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Beam(SceneElement):
+class Beam(Measured):
     """A rod: its nodes are the bodies ``NAME.0`` … ``NAME.n``, its elements the joints ``NAME-1`` … ``NAME-n``.
 
     Attributes

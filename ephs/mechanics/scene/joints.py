@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body
 from ephs.mechanics.scene.checked import Checked
-from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, NON_NEGATIVE, POSE, Named, SceneElement, frozen
+from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, NON_NEGATIVE, POSE, Measured, Named, frozen
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import did_you_mean, shown
 from ephs.mechanics.scene.flexible import Strain
@@ -94,7 +94,7 @@ class JointEntry(EntryTable):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint(SceneElement):
+class Joint(Measured):
     """A joint of body 2 on body 1, through a lower pair or a universal joint.
 
     Attributes

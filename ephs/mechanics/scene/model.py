@@ -265,7 +265,7 @@ class Scene:
 
 ATTACHED: Mapping[str, type[Element]] = {of.section: of for of in (Motor, Gear, Cylinder, GasSpring, Actuator)}
 """Attachments of joints, by their sections."""
-ELEMENTS: Mapping[str, type[SceneElement] | type[Element]] = {
+ELEMENTS: Mapping[str, type[SceneElement]] = {
     "bodies": Body,
     "joints": Joint,
     "springs": Spring,

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.element import JOINTS, SceneElement
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
@@ -19,15 +18,11 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
     """
     units = length, mass, time
 
-    def other(path: str, x: SceneElement | Element) -> SceneElement | Element:
-        match x:
-            case Joint():
-                return _joint(x, *units)
-            case Element():
-                tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
-                return x.rescaled(*units, _firsts(tied, length))
-            case _:
-                return x.rescaled(*units)
+    def other(path: str, x: SceneElement) -> SceneElement:
+        if isinstance(x, Joint):
+            return _joint(x, *units)
+        tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
+        return x.rescaled(*units, _firsts(tied, length))
 
     registered = {section for _, level in scene.levels() for section in level.elements}
     changes = dict.fromkeys((*ELEMENTS, *registered), other)

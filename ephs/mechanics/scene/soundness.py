@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
+from ephs.mechanics.scene.element import JOINTS, OUTSIDE, Measured, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
@@ -89,7 +89,7 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
     return found if lost else scene
 
 
-def _all(scene: Scene) -> Iterator[tuple[str, SceneElement | Element]]:
+def _all(scene: Scene) -> Iterator[tuple[str, SceneElement]]:
     """Every element of a scene with its dotted name."""
     for section in ELEMENTS:
         yield from scene.every(section)
@@ -104,7 +104,7 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
         match each:
             case Joint():
                 yield name, _joint(name, each)
-            case SceneElement():
+            case Measured():
                 yield name, each.values()
 
 
