@@ -57,18 +57,6 @@ def law_of(table: Checked[MotionEntry]) -> MotionLaw:
         return STILL
 
 
-def law_from(data: Any) -> MotionLaw | None:
-    """The motion law of the text of a scene: a number, of older files, is a constant rate."""
-    if data is None or isinstance(data, int | float):
-        return None if data is None else PolynomialMotion((float(data),))
-    of: dict[str, Any] = data
-    if "coefficients" in of:
-        return PolynomialMotion(tuple(of["coefficients"]))
-    return (
-        HarmonicMotion(**of) if "amplitude" in of else TabulatedMotion(tuple(of["times"]), tuple(of["displacements"]))
-    )
-
-
 def first_rate(law: MotionLaw | None) -> float | None:
     """The rate of a motion law at the start; None without."""
     return None if law is None else law.rate(0.0)
