@@ -65,12 +65,11 @@ def check_beam(table: Checked[Any], names: ReferableNames) -> None:
     if table.sound("heat", "thermal") and entry.thermal is not None and entry.heat != ENVIRONMENT:
         table.fault("beam heat", "heat")
     elif table.sound("heat"):
-        names.check(table, entry.heat, "heat", "thermal")
+        names.check(table, entry.heat, "heat", "node")
     if table.sound("surface") and entry.surface is not None and entry.surface.heat is not None:
-        names.check(table, entry.surface.heat, "surface.heat", "thermal")
+        names.check(table, entry.surface.heat, "surface.heat", "node")
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
-        if end != FREE_END:
-            names.check(table, end, f"ends[{i}]", "body")
+        names.check(table, end, f"ends[{i}]", "end")
 
 
 def resolve_beam(table: Checked[Any], world: World) -> BeamDraft | None:

@@ -38,6 +38,15 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "surface": frozenset(),
 }
 """Kind of a name that refers to something -> the names that are the same in all parts."""
+HOLDERS: Final[Mapping[str, tuple[str, ...]]] = {
+    **dict.fromkeys(("body", "end", "side"), ("bodies",)),
+    "carrier": ("bodies", "shells"),
+    "node": ("thermal",),
+    **dict.fromkeys(JOINTS, ("joints",)),
+    "tendon": ("tendons",),
+    "surface": ("surfaces",),
+}
+"""Kind of a name -> the sections that have what it refers to, as scenes do; files may name beams for sides."""
 POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
 """A lower bound, and whether it is excluded."""
 

@@ -206,7 +206,7 @@ def resolve_joint(table: Checked[JointEntry], names: "ReferableNames") -> tuple[
         if entry.bodies[0] == entry.bodies[1]:
             table.fault("same body", "bodies", f'"{entry.bodies[0]}" twice')
     if table.sound("heat"):
-        names.check(table, entry.heat, "heat", "thermal")
+        names.check(table, entry.heat, "heat", "node")
     if not table.sound("type"):
         return None
     if entry.type not in joint_types():

@@ -30,7 +30,7 @@ from ephs.mechanics.scene.errors import (
 )
 from ephs.mechanics.scene.joints import Asked, resolve_joint
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
+from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, frozen, with_sections
 from ephs.mechanics.scene.moving import moved
 from ephs.mechanics.scene.resolve_elements import (
     ReferableNames,
@@ -39,7 +39,6 @@ from ephs.mechanics.scene.resolve_elements import (
     settled,
     with_contacts,
 )
-from ephs.mechanics.scene.schema_elements import attributes
 from ephs.mechanics.scene.state import Snapshot, adjusted
 from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
@@ -147,15 +146,14 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _FileRead
     rods = _beams(document, world)
     parts |= {name: rod.nodes for name, rod in rods.items()}
     warm = {name for rod in rods.values() for name in rod.thermal}
-    names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
+    names = ReferableNames.of(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
     for table in sections["beams"].values():
         check_beam(table, names)
     mode = r.inertia or document.assembly.inertia
     bodies = [resolve_body(table, mode, path.parent, r.odd) for table in sections["bodies"].values()]
     joints = [resolve_joint(table, names) for table in sections["joints"].values()]
-    stores = sections["thermal"].items()
-    thermal = {name: ThermalNode(name=name, **attributes(ThermalNode, table.entry)) for name, table in stores}
-    elements = resolve_elements(document, parts, names, path.parent, faults)
+    thermal = {name: ThermalNode(name, **dict(table.entry)) for name, table in sections["thermal"].items()}
+    elements = resolve_elements(document, names, path.parent, faults)
     if faults:
         return None
     drafts = [*filter(None, joints), *(start for rod in rods.values() for start in rod.joints)]
@@ -225,7 +223,8 @@ def _parse(path: Path, r: _FileReading) -> Mapping[str, Any] | None:
 
 
 def _world(document: Document, wanted: World | None, faults: list[Fault]) -> World:
-    own = None if document.world is None else World(**attributes(World, document.world))
+    given = document.world
+    own = None if given is None else World(frozen(given.gravity), given.temperature, given.pressure)
     if wanted is None:
         return own or World()
     if own is not None and _described(own) != _described(wanted):
@@ -294,13 +293,6 @@ def _beams(document: Document, world: World) -> dict[str, BeamDraft]:
 def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     inner = legible(f"{key}.{found.key}" if found.key else f"{key}.use")
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
-
-
-def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> ReferableNames:
-    bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
-    thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
-    sections = document.sections
-    return ReferableNames(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
 
 
 def _is_name(text: str) -> bool:
