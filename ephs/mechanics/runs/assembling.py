@@ -120,9 +120,9 @@ def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection
     reached = known | {-1, *range(len(poses))} - {hop.body for hop in hops}
     for hop in hops:
         link = joints.links[hop.link]
-        if hop.body not in known and (link.body1 if hop.forward else link.body2) in reached:
+        if hop.body not in known and link.other(hop.body) in reached:
             x = out[joints.relative[hop.link]]
-            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+            poses[hop.body] = link.placed(hop.body, poses, x)
             reached.add(hop.body)
     for path, pose in zip(joints.poses, poses, strict=True):
         if path is not None:
@@ -164,7 +164,7 @@ def _placed(joints: FlatJoints, state: Mapping[Path, Array]) -> Array:
     for hop in spanning_hops(joints.links, len(poses), ()):
         if joints.poses[hop.body] is None:
             link, x = joints.links[hop.link], state[joints.relative[hop.link]]
-            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+            poses[hop.body] = link.placed(hop.body, poses, x)
     return poses
 
 

@@ -113,7 +113,7 @@ def _place(
     def follow(body: int, name: str) -> None:
         link = links[name]
         x = link.coupling.identity() if link.coordinates is None else link.coupling.element(link.coordinates)
-        poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
+        poses[body] = link.placed(body, poses, x)
 
     _place_open(open_bodies, list(links.values()), follow)
     return poses
@@ -139,7 +139,7 @@ def _move(
     def follow(body: int, name: str) -> None:
         link, x = by_name[name], elements[name]
         rate = np.zeros(link.coupling.dim) if link.rate is None else link.rate
-        twists[body] = link.move_second(twists, x, rate) if link.body2 == body else link.move_first(twists, x, rate)
+        twists[body] = link.moved(body, twists, x, rate)
 
     # A joint with `at` and `axis` moves a body only if its rate is specified.
     leading = [
@@ -165,23 +165,19 @@ def _place_open(open_bodies: list[int], links: Sequence[AssemblyJoint], follow: 
     waiting = {b: None for b in open_bodies if of[b]}  # in order
     followers: dict[int, list[int]] = {}
     for b in waiting:
-        followers.setdefault(_other(of[b][0], b), []).append(b)
-    ready = deque(b for b in waiting if _other(of[b][0], b) not in waiting)
+        followers.setdefault(of[b][0].other(b), []).append(b)
+    ready = deque(b for b in waiting if of[b][0].other(b) not in waiting)
     while waiting:
         if ready:
             body = ready.popleft()
             link = of[body][0]
         else:
-            ways = ((b, link) for b in waiting for link in of[b] if _other(link, b) not in waiting)
+            ways = ((b, link) for b in waiting for link in of[b] if link.other(b) not in waiting)
             body, link = next(ways, (next(iter(waiting)), None))
         if link is not None:
             follow(body, link.name)
         del waiting[body]
         ready.extend(b for b in followers.get(body, []) if b in waiting)
-
-
-def _other(link: AssemblyJoint, body: int) -> int:
-    return link.body1 if link.body2 == body else link.body2
 
 
 def _link(start: Start, index: Mapping[str, int], poses: Array) -> AssemblyJoint:

@@ -118,28 +118,27 @@ class AssemblyJoint:
         rate = self.coupling.left_inverse(basis) @ relative
         return rate, relative - basis @ rate
 
-    def place_second(self, poses: Array, x: Array) -> Array:
-        """Pose of body 2 from that of body 1 and the joint's element."""
-        return self._place(self.first(poses), self.coupling.include(x), self.frame2)
+    def other(self, body: int) -> int:
+        """The body at its other end."""
+        return self.body1 if self.body2 == body else self.body2
 
-    def place_first(self, poses: Array, x: Array) -> Array:
-        """Pose of body 1 from that of body 2 and the joint's element."""
-        return self._place(self.second(poses), SE3.inverse(self.coupling.include(x)), self.frame1)
+    def placed(self, body: int, poses: Array, x: Array) -> Array:
+        """Pose of one of its bodies from that of the other and the joint's element."""
+        between = self.coupling.include(x)
+        if self.body2 == body:
+            there = SE3.compose(SE3.compose(self.first(poses), between), SE3.inverse(self.frame2))
+        else:
+            there = SE3.compose(SE3.compose(self.second(poses), SE3.inverse(between)), SE3.inverse(self.frame1))
+        return SE3.normalise(there)
 
-    def move_second(self, twists: Array, x: Array, rate: Array) -> Array:
-        """The twist of body 2 from that of body 1 and the joint's rate."""
-        rows1, _ = self.rows(x)
-        return SE3.adjoint(self.frame2) @ (self.coupling.basis(x) @ rate - rows1 @ twist(twists, self.body1))
-
-    def move_first(self, twists: Array, x: Array, rate: Array) -> Array:
-        """The twist of body 1 from that of body 2 and the joint's rate."""
-        _, rows2 = self.rows(x)
+    def moved(self, body: int, twists: Array, x: Array, rate: Array) -> Array:
+        """Twist of one of its bodies from that of the other and the joint's rate."""
+        rows1, rows2 = self.rows(x)
+        own = self.coupling.basis(x) @ rate
+        if self.body2 == body:
+            return SE3.adjoint(self.frame2) @ (own - rows1 @ twist(twists, self.body1))
         to1 = SE3.compose(self.frame1, self.coupling.include(x))
-        return SE3.adjoint(to1) @ (rows2 @ twist(twists, self.body2) - self.coupling.basis(x) @ rate)
-
-    @staticmethod
-    def _place(frame: Array, between: Array, offset: Array) -> Array:
-        return SE3.normalise(SE3.compose(SE3.compose(frame, between), SE3.inverse(offset)))
+        return SE3.adjoint(to1) @ (rows2 @ twist(twists, self.body2) - own)
 
 
 def pose_at(poses: Array, body: int) -> Array:

@@ -119,7 +119,7 @@ def with_state(
     for hop in spanning_hops(links, len(poses), speeds):
         rate = speeds.get(hop.name, now.joints[hop.link].rate)
         link, x = links[hop.link], xs[hop.link]
-        twists[hop.body] = link.move_second(twists, x, rate) if hop.forward else link.move_first(twists, x, rate)
+        twists[hop.body] = link.moved(hop.body, twists, x, rate)
     scale = replace(now, poses=poses, twists=twists).scale(scene.world.gravity)
     if adjust and largest_slip(links, twists, xs, scale) > ASSEMBLY:
         moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds), scale)
@@ -295,7 +295,7 @@ def _carry(links: Sequence[AssemblyJoint], poses: Array, before: Sequence[Array]
     for hop in spanning_hops(links, len(poses), named):
         link = links[hop.link]
         x = before[hop.link] if link.coordinates is None else link.coupling.element(link.coordinates)
-        poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+        poses[hop.body] = link.placed(hop.body, poses, x)
     return poses, elements(links, poses)
 
 

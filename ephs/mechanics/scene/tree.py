@@ -12,13 +12,11 @@ from ephs.operad.disjoint import DisjointSets
 @final
 @dataclass(frozen=True, slots=True)
 class Hop:
-    """One step outwards: through link number ``link`` (of this name) to ``body``; forward where that is its
-    body 2."""
+    """One step outwards: through link number ``link`` (of this name) to ``body``."""
 
     link: int
     name: str
     body: int
-    forward: bool
 
 
 def spanning_hops(links: Sequence[AssemblyJoint], count: int, preferred: Container[str]) -> list[Hop]:
@@ -45,10 +43,9 @@ def spanning_hops(links: Sequence[AssemblyJoint], count: int, preferred: Contain
             here = queue.popleft()
             for number in neighbours[here]:
                 link = links[number]
-                forward = link.body1 == here
-                there = link.body2 if forward else link.body1
+                there = link.other(here)
                 if there not in reached:
                     reached.add(there)
                     queue.append(there)
-                    hops.append(Hop(number, link.name, there, forward))
+                    hops.append(Hop(number, link.name, there))
     return hops
