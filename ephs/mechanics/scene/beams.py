@@ -22,7 +22,7 @@ from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.errors import shown
 from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
-from ephs.mechanics.scene.joints import Asked, Joint
+from ephs.mechanics.scene.joints import Asked, Joint, bare_joint
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.resolve_elements import ReferableNames
 from ephs.mechanics.scene.sections import Section, resolve_section
@@ -243,10 +243,8 @@ def _joint(
     strain: Strain | None = None,
 ) -> Joint:  # fmt: skip
     """A joint of a beam, its coordinates and rates yet to be measured."""
-    d = {"free": 6, "spherical": 3, "fixed": 0}[kind]
-    none, frames = frozen(np.zeros(d)), (frozen(frame1), frozen(frame2))
-    loss = frozen(np.zeros((d, d)))
-    return Joint(name, kind, *bodies, *frames, 0.0, loss, none, none, heat, none, None, none, none, strain=strain)
+    zero = frozen(np.zeros({"free": 6, "spherical": 3, "fixed": 0}[kind]))
+    return replace(bare_joint(name, kind, bodies, (frame1, frame2), zero, zero), heat=heat, strain=strain)
 
 
 def _settled(strain: Array) -> Array:

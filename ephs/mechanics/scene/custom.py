@@ -297,7 +297,7 @@ def _check_keys(kind: type[Element]) -> None:
     properties = kind.model_json_schema().get("properties", {})
     for name, field in kind.model_fields.items():
         where = f"{kind.__name__}.{name}"
-        if name in dir(Element) or not _is_name(name):
+        if name in dir(Element) or not is_name(name):
             raise ElementError("reserved", where, f'"{name}"')
         if field.description is None or not isinstance(field.json_schema_extra, _Hidden):
             raise ElementError("key", where, field.description or "no meaning")
@@ -327,7 +327,8 @@ def _forms(schema: Mapping[str, Any]) -> set[str]:
     return {str(schema.get("type", "a table"))}
 
 
-def _is_name(text: str) -> bool:
+def is_name(text: str) -> bool:
+    """Whether a text is one component of a path."""
     try:
         Name([text])
     except PatternError:

@@ -149,24 +149,16 @@ class Joint(Measured):
 def free_joint(body: Body) -> Joint:
     """The implicit free joint of a body that no joint holds: of the ground and the body, both frames the
     identity."""
-    zero = frozen(np.zeros(6))
-    return Joint(
-        name=body.name,
-        kind="free",
-        body1=GROUND,
-        body2=body.name,
-        frame1=IDENTITY_POSE,
-        frame2=IDENTITY_POSE,
-        pitch=0.0,
-        friction=frozen(np.zeros((6, 6))),
-        stiffness=zero,
-        rest=zero,
-        heat=ENVIRONMENT,
-        drive=zero,
-        motion=None,
-        coordinate=body.pose,
-        rate=body.twist,
-    )
+    return bare_joint(body.name, "free", (GROUND, body.name), (IDENTITY_POSE, IDENTITY_POSE), body.pose, body.twist)
+
+
+def bare_joint(
+    name: str, kind: str, bodies: tuple[str, str], frames: tuple[Array, Array], coordinate: Array, rate: Array
+) -> Joint:
+    """A joint without spring, friction and drive: its bodies, its frames (7,) in them, its element and its rate."""
+    d = rate.size
+    zero, loss, places = frozen(np.zeros(d)), frozen(np.zeros((d, d))), (frozen(frames[0]), frozen(frames[1]))
+    return Joint(name, kind, *bodies, *places, 0.0, loss, zero, zero, ENVIRONMENT, zero, None, coordinate, rate)
 
 
 @final

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.bodies import resolve_body
 from ephs.mechanics.scene.contacts import overlaps
+from ephs.mechanics.scene.custom import is_name
 from ephs.mechanics.scene.entries import Document, read_document
 from ephs.mechanics.scene.errors import (
     Fault,
@@ -43,8 +44,6 @@ from ephs.mechanics.scene.state import Snapshot, adjusted
 from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.operad import Path as Name
-from ephs.operad import PatternError
 from ephs.operad.collector import paused_collector
 
 MODELS = (".urdf", ".xml", ".sdf")
@@ -295,21 +294,13 @@ def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
-def _is_name(text: str) -> bool:
-    try:
-        Name([text])
-    except PatternError:
-        return False
-    return True
-
-
 def _check_names(document: Document, faults: list[Fault]) -> None:
     """Names are path components, and no path may mean two things."""
     held = {name for table in document.sections["joints"].values() for name in table.entry.bodies}
     for section, tables in document.sections.items():
         for name in tables:
             key = f"{section}.{name}"
-            if not _is_name(name):
+            if not is_name(name):
                 faults.append(fault("name", f'{section}."{name}"', shown(name)))
             elif name in (GROUND, ENVIRONMENT):
                 faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))

@@ -26,19 +26,14 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
 
     registered = {section for _, level in scene.levels() for section in level.elements}
     changes = dict.fromkeys((*ELEMENTS, *registered), other)
-    return _moved_apart(mapped(scene, changes, scene.world.rescaled(*units)), length)
+    pose = np.array([1.0] * 4 + [length] * 3)
+    return mapped(scene, changes, scene.world.rescaled(*units), origin=lambda there: frozen(there * pose))
 
 
 def _firsts(joints: Iterable[Joint], length: float) -> tuple[float, ...]:
     """The unit of the first coordinate of each joint; of none the length."""
     found = [freedom_units(coupling_of(j), j.coordinate, length) for j in joints]
     return tuple(float(unit[0]) if unit.size else 1.0 for unit in found) or (length,)
-
-
-def _moved_apart(scene: Scene, length: float) -> Scene:
-    """The scene with the origins of all its levels in another unit of length."""
-    parts = {name: _moved_apart(part, length) for name, part in scene.parts.items()}
-    return replace(scene, parts=parts, origin=frozen(scene.origin * np.array([1.0] * 4 + [length] * 3)))
 
 
 def _joint(j: Joint, length: float, mass: float, time: float) -> Joint:
