@@ -15,9 +15,8 @@ from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.motion.shells import LinkedShell, ShellMotion, linked_shell_motion, shells_of_links
 from ephs.mechanics.scene.joints import bare_joint
-from ephs.mechanics.scene.kinematics import AssemblyJoint
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Hop, spanning_hops
 from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, World, frozen
-from ephs.mechanics.scene.tree import Hop, spanning_hops
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
 from ephs.mechanics.tree.finding.tendons import length_errors

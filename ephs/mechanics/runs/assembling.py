@@ -16,8 +16,7 @@ from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.scene.adjust import mass_roots
 from ephs.mechanics.scene.assembly import gyration
 from ephs.mechanics.scene.geometry import JointCoupling
-from ephs.mechanics.scene.kinematics import AssemblyJoint, extent
-from ephs.mechanics.scene.tree import spanning_hops
+from ephs.mechanics.scene.kinematics import AssemblyJoint, extent, spanning_hops
 from ephs.mechanics.tree.finding.frames import Frames, frames_of
 from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.operad import Path

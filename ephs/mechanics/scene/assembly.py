@@ -15,11 +15,10 @@ import numpy as np
 
 from ephs.mechanics.scene.bodies import BodyDraft
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.joints import Asked
 from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, pose_at
 from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
-from ephs.mechanics.scene.motions import first_rate
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -182,15 +181,14 @@ def _place_open(open_bodies: list[int], links: Sequence[AssemblyJoint], follow: 
 
 def _link(start: Start, index: Mapping[str, int], poses: Array) -> AssemblyJoint:
     joint, asked = start
-    body1, body2 = index[joint.body1], index[joint.body2]
-    frame1, frame2, coordinates = joint.frame1, joint.frame2, asked.coordinates
-    if not asked.in_bodies:
-        frame1 = SE3.compose(SE3.inverse(pose_at(poses, body1)), frame1)
-        frame2 = SE3.compose(SE3.inverse(pose_at(poses, body2)), frame2)
-        coordinates = np.zeros(joint.dim)
-    return AssemblyJoint(
-        joint.name, body1, body2, frame1, frame2, coupling_of(joint), coordinates, asked.rate, first_rate(joint.motion)
-    )  # fmt: skip
+    link = AssemblyJoint.of(joint, index, coordinates=asked.coordinates, rate=asked.rate)
+    if asked.in_bodies:
+        return link
+    frames = {
+        key: SE3.compose(SE3.inverse(pose_at(poses, body)), frame)
+        for key, body, frame in (("frame1", link.body1, link.frame1), ("frame2", link.body2, link.frame2))
+    }
+    return replace(link, coordinates=np.zeros(joint.dim), **frames)
 
 
 def gyration(bodies: Iterable[tuple[float, Array]]) -> float:

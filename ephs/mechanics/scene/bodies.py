@@ -12,8 +12,7 @@ from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, frozen
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import Fault
-from ephs.mechanics.scene.homogeneous import mass_and_moments
-from ephs.mechanics.scene.inertia import mass_and_inertia
+from ephs.mechanics.scene.inertia import mass_and_inertia, mass_and_moments
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import (
     EntryTable,

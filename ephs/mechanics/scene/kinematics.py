@@ -6,17 +6,22 @@ The joint relation is ``q1 o1 I(x) = q2 o2``, and of twists ``Ad(o2⁻¹) u2 = A
 Source: Lohmayer, Capobianco, Leyendecker, "Exergetic Port-Hamiltonian Systems for Multibody Dynamics".
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import final
+from collections import deque
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.geometry import JointCoupling
-from ephs.mechanics.scene.model import IDENTITY_POSE
+from ephs.mechanics.scene.bodies import IDENTITY_POSE
+from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
+
+if TYPE_CHECKING:
+    from ephs.mechanics.scene.joints import Joint
 
 
 @final
@@ -74,6 +79,15 @@ class AssemblyJoint:
     rate: Array | None = None
     motion: float | None = None
     near: Array | None = None
+
+    @staticmethod
+    def of(joint: "Joint", index: Mapping[str, int], **more: Any) -> "AssemblyJoint":
+        """A scene's joint between bodies of these numbers, its start not given; ``more`` are other attributes."""
+        found = AssemblyJoint(
+            joint.name, index[joint.body1], index[joint.body2], joint.frame1, joint.frame2, coupling_of(joint),
+            motion=None if joint.motion is None else joint.motion.rate(0.0),
+        )  # fmt: skip
+        return replace(found, **more)
 
     def first(self, poses: Array) -> Array:
         """The pose of C1 in the world."""
@@ -179,3 +193,45 @@ def largest_slip(links: Sequence[AssemblyJoint], twists: Array, xs: Sequence[Arr
             spin, speed = float(np.linalg.norm(off[:3])), float(np.linalg.norm(off[3:]))
             found = max(found, spin / scale.rate, speed / (scale.length * scale.rate))
     return found
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Hop:
+    """One step outwards: through link number ``link`` (of this name) to ``body``."""
+
+    link: int
+    name: str
+    body: int
+
+
+def spanning_hops(links: Sequence[AssemblyJoint], count: int, preferred: Container[str]) -> list[Hop]:
+    """The steps of a spanning forest, from the ground outwards: each of ``count`` bodies once, from one reached before.
+
+    Named links come into the tree before others, then those in front. A group of bodies without a way to
+    the ground is reached from its first body, which no step leads to.
+    """
+    sets = DisjointSets[int]()
+    neighbours: dict[int, list[int]] = {body: [] for body in range(-1, count)}
+    for number in sorted(range(len(links)), key=lambda i: links[i].name not in preferred):
+        if sets.join(links[number].body1, links[number].body2):
+            neighbours[links[number].body1].append(number)
+            neighbours[links[number].body2].append(number)
+
+    hops: list[Hop] = []
+    reached: set[int] = set()
+    for root in range(-1, count):
+        if root in reached:
+            continue
+        reached.add(root)
+        queue = deque([root])
+        while queue:
+            here = queue.popleft()
+            for number in neighbours[here]:
+                link = links[number]
+                there = link.other(here)
+                if there not in reached:
+                    reached.add(there)
+                    queue.append(there)
+                    hops.append(Hop(number, link.name, there))
+    return hops

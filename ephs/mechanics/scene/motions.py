@@ -50,11 +50,6 @@ def law_of(table: Checked[MotionEntry]) -> MotionLaw:
         return STILL
 
 
-def first_rate(law: MotionLaw | None) -> float | None:
-    """The rate of a motion law at the start; None without."""
-    return None if law is None else law.rate(0.0)
-
-
 def changed(of: MotionLaw | None, key: str, value: float) -> MotionLaw:
     """The motion law with another one of its `numbers`; a constant rate has no others."""
     return replace(of, **{key: value}) if isinstance(of, HarmonicMotion) else PolynomialMotion((value,))

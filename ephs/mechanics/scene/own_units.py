@@ -190,13 +190,10 @@ _SCALARS: Mapping[str, NumberForm] = {
 
 def _stats(stats: Mapping[str, Any], units: OwnUnits, factors: Mapping[Path, Array]) -> dict[str, Any]:
     out = dict(stats)
-    for key in ("step", "shortest_step", "longest_step"):
+    times = dict.fromkeys(("step", "shortest_step", "longest_step", "work_apart_at"), units.time)
+    for key, unit in (times | dict.fromkeys(("least_production", "work_apart"), units.energy)).items():
         if out.get(key) is not None:
-            out[key] *= units.time
-    if "least_production" in out:
-        out["least_production"] *= units.energy
-    if "work_apart" in out:
-        out["work_apart"], out["work_apart_at"] = out["work_apart"] * units.energy, out["work_apart_at"] * units.time
+            out[key] *= unit
     if "plain_defect" in out:
         factor = {"sum": units.energy, "largest": units.energy, "at": units.time}
         out["plain_defect"] = {key: value * factor[key] for key, value in out["plain_defect"].items()}

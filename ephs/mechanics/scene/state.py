@@ -15,14 +15,12 @@ from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.following import stretched, tied
 from ephs.mechanics.scene.gears import Gear
-from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.joints import Asked
-from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap, largest_slip, spanning_hops
 from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen, mapped
-from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.shells import ShellSheet
-from ephs.mechanics.scene.tree import spanning_hops
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -62,21 +60,7 @@ class Snapshot:
             tuple(name for name, _ in pairs),
             bodies,
             tuple(joints),
-            tuple(
-                AssemblyJoint(
-                    j.name,
-                    index[j.body1],
-                    index[j.body2],
-                    j.frame1,
-                    j.frame2,
-                    coupling_of(j),
-                    None,
-                    None,
-                    first_rate(j.motion),
-                    np.array(j.coordinate),
-                )
-                for j in joints
-            ),
+            tuple(AssemblyJoint.of(j, index, near=np.array(j.coordinate)) for j in joints),
             np.array([body.pose for body in bodies]).reshape(-1, 7),
             np.array([body.twist for body in bodies]).reshape(-1, 6),
         )
