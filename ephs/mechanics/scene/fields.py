@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.inertia import impossible, moments_text
 from ephs.mechanics.scene.layers import LAYER_NUMBERS, layer_number
 from ephs.mechanics.scene.model import (
     ATTACHED,
@@ -135,18 +136,10 @@ def _inertia(body: Body, values: Array) -> Body:
 def _body_faults(scene: Scene, name: str, before: Scene) -> list[Fault]:
     """An inertia that no mass distribution has."""
     body, key = scene.body(name), f"bodies.{name}.inertia"
-    moments = symmetric_eigenvalues(body.inertia)
-    slack = INERTIA * float(np.abs(moments).max())
-    text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
-    if body.mass == 0.0 and body.inertia.any():
-        return [fault("massless", key, text)]
-    if moments[0] < -slack:
-        return [fault("inertia indefinite", key, text)]
-    old = symmetric_eigenvalues(before.body(name).inertia)
-    sound = old[2] <= old[0] + old[1] + INERTIA * float(np.abs(old).max())
-    if sound and moments[2] > moments[0] + moments[1] + slack:
-        return [fault("inertia triangle", key, text)]
-    return []
+    wrong = "massless" if body.mass == 0.0 and body.inertia.any() else impossible(body.inertia)
+    if not wrong or (wrong == "inertia triangle" and impossible(before.body(name).inertia)):
+        return []
+    return [fault(wrong, key, moments_text(body.inertia))]
 
 
 def _put_position(scene: Scene, name: str, values: Array) -> Scene:

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen, symmetric_eigenvalues
+from ephs.semantics.spaces.rank import INERTIA
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 if TYPE_CHECKING:
@@ -48,21 +48,21 @@ def mass_and_inertia(
         return mass, tensor
     if not tensor.any() and mass == 0.0:
         return mass, tensor
-    principal = symmetric_eigenvalues(tensor)
-    wrong = _wrong(principal)
+    wrong = impossible(tensor)
     if strict:
+        principal = symmetric_eigenvalues(tensor)
         if not wrong and principal[0] <= 0.1 * TINY * principal[2]:
             wrong = "inertia singular"
         if wrong:
-            table.fault(wrong, "inertia", _text(principal))
+            table.fault(wrong, "inertia", moments_text(tensor))
         return mass, tensor
     if wrong and mode == "nearest":
-        tensor = nearest_inertia(tensor)
-        odd.append(fault("inertia nearest", where, _text(principal), taken=_text(symmetric_eigenvalues(tensor))))
+        nearest = nearest_inertia(tensor)
+        odd.append(fault("inertia nearest", where, moments_text(tensor), taken=moments_text(nearest)))
+        tensor = nearest
     mass, tensor = _regular(mass, tensor, table.key, odd)
-    principal = symmetric_eigenvalues(tensor)
-    if mode == "warn" and _wrong(principal):
-        odd.append(fault("inertia kept", where, _text(principal)))
+    if mode == "warn" and impossible(tensor):
+        odd.append(fault("inertia kept", where, moments_text(tensor)))
     return mass, tensor
 
 
@@ -77,8 +77,10 @@ def nearest_inertia(tensor: Array) -> Array:
     return np.trace(second) * np.eye(3) - second
 
 
-def _wrong(moments: NDArray[Any]) -> str:
-    slack = TOLERANCE * float(np.abs(moments).max())
+def impossible(tensor: Array) -> str:
+    """Code of the fault of an inertia (3, 3) that no distribution of mass has; empty where one has it."""
+    moments = symmetric_eigenvalues(tensor)
+    slack = INERTIA * float(np.abs(moments).max())
     if moments[0] < -slack:
         return "inertia indefinite"
     return "inertia triangle" if moments[2] > moments[0] + moments[1] + slack else ""
@@ -96,14 +98,15 @@ def _regular(mass: float, tensor: Array, key: str, odd: list[Fault]) -> tuple[fl
         return mass, tensor
     small = np.abs(moments) < least
     if small.any():
-        odd.append(fault("inertia zero", f"{key}.inertia", _text(moments), least=least))
+        odd.append(fault("inertia zero", f"{key}.inertia", moments_text(tensor), least=least))
         tensor = (axes * np.where(small, least, moments)) @ axes.T
         tensor = 0.5 * (tensor + tensor.T)
     return mass, tensor
 
 
-def _text(moments: NDArray[Any]) -> str:
-    return "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
+def moments_text(tensor: Array) -> str:
+    """The principal moments of an inertia (3, 3) in words."""
+    return "principal moments " + ", ".join(f"{moment:.6g}" for moment in symmetric_eigenvalues(tensor))
 
 
 # ---- homogeneous shapes ----------------------------------------------------------------------------------------------

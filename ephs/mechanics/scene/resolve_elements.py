@@ -89,13 +89,13 @@ def with_contacts(scene: Scene, faults: list[Fault]) -> Scene:
     sheets = {name: each.settled(Site(scene, each)) for name, each in scene.shells.items()}
     scene = with_sections(scene, {"shells": sheets})
     for each in (*sheets.values(), *scene.surfaces.values()):  # what carries contacts
-        faults += broken(Checked(each, f"{each.section}.{each.name}"), Site(scene, each))
+        faults += _broken_at(scene, each)
     if faults:
         return scene
     found = given or {each.name: each for each in meeting(scene)}
-    for name, each in found.items():
-        key = f"contacts.{name}" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
-        faults += islice(broken(Checked(each, key), Site(scene, each)), 1)
+    for each in found.values():
+        key = "" if given else " and ".join(f"surfaces.{surface}" for surface in each.surfaces)
+        faults += islice(_broken_at(scene, each, key), 1)
     return replace(scene, contacts=found)
 
 
@@ -129,12 +129,17 @@ def broken(table: Checked[Element], *site: Site, adjusted: bool = False) -> Iter
                 yield Fault(*map(legible, (f"{table.key}.{at}".rstrip("."), found, *texts)))
 
 
+def _broken_at(scene: Scene, element: Element, key: str = "", *, adjusted: bool = False) -> Iterator[Fault]:
+    """The faults of rules that do not hold where an element is; ``key`` is another name of its table."""
+    table = Checked(element, key or f"{element.section}.{element.name}")
+    return broken(table, Site(scene, element), adjusted=adjusted)
+
+
 def placed_faults(scene: Scene, *, adjusted: bool = False) -> list[Fault]:
     """Faults of the elements of a level, parts apart, that depend on where bodies and joints are."""
     own = list(elements_of(scene))
     if adjusted:
-        sites = [(Checked(x, f"{x.section}.{x.name}"), Site(scene, x)) for x in own]
-        return [each for table, site in sites for each in broken(table, site, adjusted=True)]
+        return [each for element in own for each in _broken_at(scene, element, adjusted=True)]
     faults = [each for element in own for each in _placed(scene, element)]
     if not faults and any(scene.elements.values()):  # those that users wrote may not be built
         try:
@@ -151,7 +156,7 @@ def _placed(scene: Scene, element: Element) -> Iterator[Fault]:
             joint, what = scene.joint(name), "motor joint" if kind == AXIS else "gear freedoms"
             if joint.dim != 1 or (kind == AXIS and joint.motion is not None):
                 table.fault(what, place, f"{name}, {joint.kind}")
-    yield from table.faults or broken(table, Site(scene, element))
+    yield from table.faults or _broken_at(scene, element)
 
 
 def _unbuilt(scene: Scene, element: Element) -> Iterator[Fault]:
