@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.element import JOINTS, SceneElement
+from ephs.mechanics.scene.element import JOINTS, POSE, SceneElement
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.semantics.bundles.bundle import Array
@@ -26,7 +26,7 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
 
     registered = {section for _, level in scene.levels() for section in level.elements}
     changes = dict.fromkeys((*ELEMENTS, *registered), other)
-    pose = np.array([1.0] * 4 + [length] * 3)
+    pose = POSE.unit(*units, ())
     return mapped(scene, changes, scene.world.rescaled(*units), origin=lambda there: frozen(there * pose))
 
 
