@@ -13,12 +13,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ephs.mechanics.scene.bodies import BodyDraft
+from ephs.mechanics.scene.bodies import BodyStart
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.joints import Asked
 from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, pose_at
-from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -30,26 +30,27 @@ Start: TypeAlias = tuple[Joint, Asked]
 
 
 def assemble(
-    drafts: Sequence[BodyDraft], joints: Sequence[Start], parts: Mapping[str, Scene], gravity: Array
+    drafts: Sequence[tuple[Body, BodyStart]], joints: Sequence[Start], parts: Mapping[str, Scene], gravity: Array
 ) -> tuple[Bodies, Joints, list[Fault]]:
     """Bodies and joints in the initial state, and a fault for each joint that does not hold there.
 
     The bodies of ``parts`` are where they are; joints may name them.
     """
     others = [(f"{part}.{name}", body) for part, scene in parts.items() for name, body in scene.all_bodies()]
-    names = [draft.name for draft in drafts] + [name for name, _ in others]
+    everyone = [*((body.name, body) for body, _ in drafts), *others]
+    names = [name for name, _ in everyone]
     index = {name: i for i, name in enumerate(names)} | {GROUND: -1}
-    poses = _place(drafts, joints, index, [body.pose for _, body in others])
+    starts = [start for _, start in drafts]
+    poses = _place(starts, joints, index, np.array([body.pose for _, body in everyone]).reshape(-1, 7))
     links = [_link(start, index, poses) for start in joints]
     xs = [link.element(poses) for link in links]
-    twists = _move(drafts, joints, links, xs, poses, [body.twist for _, body in others])
+    twists = _move(starts, joints, links, xs, poses, np.array([body.twist for _, body in everyone]).reshape(-1, 6))
     bodies = {
-        d.name: Body(d.name, d.mass, frozen(d.inertia), frozen(poses[i]), frozen(twists[i]), d.shape, d.shapes)
-        for i, d in enumerate(drafts)
+        body.name: replace(body, pose=frozen(poses[i]), twist=frozen(twists[i])) for i, (body, _) in enumerate(drafts)
     }
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
-    masses = [(d.mass, d.inertia) for d in drafts] + [(body.mass, body.inertia) for _, body in others]
-    scale = Scale.of(links, poses, twists, gyration(masses), gravity)
+    radius = gyration((body.mass, body.inertia) for _, body in everyone)
+    scale = Scale.of(links, poses, twists, radius, gravity)
     placed = {
         joint.name: replace(
             joint,
@@ -100,11 +101,8 @@ def measure(
     return faults
 
 
-def _place(
-    drafts: Sequence[BodyDraft], joints: Sequence[Start], index: Mapping[str, int], rest: Sequence[Array]
-) -> Array:
-    poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(-1, 7)
-    open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
+def _place(starts: Sequence[BodyStart], joints: Sequence[Start], index: Mapping[str, int], poses: Array) -> Array:
+    open_bodies = [i for i, start in enumerate(starts) if not start.placed]
     if not open_bodies:
         return poses
     links = {start[0].name: _link(start, index, poses) for start in joints if start[1].in_bodies}
@@ -119,19 +117,16 @@ def _place(
 
 
 def _move(
-    drafts: Sequence[BodyDraft],
+    starts: Sequence[BodyStart],
     joints: Sequence[Start],
     links: Sequence[AssemblyJoint],
     xs: Sequence[Array],
     poses: Array,
-    rest: Sequence[Array],
+    twists: Array,
 ) -> Array:
-    twists = np.zeros((len(poses), 6))
-    for i, d in enumerate(drafts):
-        if d.velocity is not None and d.angular_velocity is not None:
-            twists[i] = body_twist(poses[i], d.velocity, d.angular_velocity)
-    if rest:
-        twists[len(drafts) :] = rest
+    for i, start in enumerate(starts):
+        if start.velocities is not None:
+            twists[i] = body_twist(poses[i], *start.velocities)
     elements = {link.name: x for link, x in zip(links, xs, strict=True)}
     by_name = {link.name: link for link in links}
 
@@ -146,7 +141,7 @@ def _move(
         for (_, asked), link in zip(joints, links, strict=True)
         if asked.in_bodies or (asked.rate is not None and asked.rate.any())
     ]
-    _place_open([i for i, d in enumerate(drafts) if d.velocity is None], leading, follow)
+    _place_open([i for i, start in enumerate(starts) if start.velocities is None], leading, follow)
     return twists
 
 
