@@ -11,6 +11,7 @@ from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
 from ephs.mechanics.scene.inertia import impossible, moments_text
+from ephs.mechanics.scene.joints import DryEntry
 from ephs.mechanics.scene.layers import LAYER_NUMBERS, layer_number
 from ephs.mechanics.scene.model import (
     ATTACHED,
@@ -296,7 +297,7 @@ FIELDS: Mapping[str, Mapping[str, NumberField]] = {
     "joints": {
         "pitch": _attribute("joints", "pitch", moves="frame"),
         "friction": _attribute("joints", "friction", spread=True, faults=_friction_faults),
-        **{f"dry.{key}": _law("dry", key, _rubbed) for key in ("coulomb", "static", "stribeck", "slip")},
+        **{f"dry.{key}": _law("dry", key, _rubbed) for key in DryEntry.model_fields},
         "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
         "rest": _attribute("joints", "rest", faults=_stiffness_faults),
         "drive": _attribute("joints", "drive"),

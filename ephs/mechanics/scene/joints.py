@@ -264,7 +264,7 @@ def _dry(table: Checked[JointEntry], d: int) -> Dry | None:
     if found.static is not None and found.static < found.coulomb:
         table.fault("dry static", "dry.static", coulomb=found.coulomb)
         return None
-    return Dry(found.coulomb, found.static, found.stribeck, found.slip)
+    return Dry(**dict(found))
 
 
 def _motion(table: Checked[JointEntry], d: int, drive: Array) -> MotionLaw | None:
