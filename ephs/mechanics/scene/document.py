@@ -71,17 +71,17 @@ def _rows(value: Any) -> Any:
 
 def _made(types: tuple[Any, ...], value: Any) -> Any:
     """A value of one of these types."""
-    kind, inner = get_origin(types[0]) or types[0], get_args(types[0])
-    if value is None or kind is Any:
+    if PolynomialMotion in types and isinstance(value, int | float):  # of older files
+        value = {"coefficients": [value]}
+    if not isinstance(value, Mapping | list) or types[0] is Any:
         return value
+    kind, inner = get_origin(types[0]) or types[0], get_args(types[0])
     if kind is np.ndarray:
         return frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
     if kind is tuple:
         return tuple(_made(_types(inner[0]), each) for each in value)
     if kind is Mapping:
         return {name: _made(_types(inner[1]), each) for name, each in value.items()}
-    if PolynomialMotion in types and isinstance(value, int | float):  # of older files
-        value = {"coefficients": [value]}
     if not isinstance(value, Mapping):
         return value
     if issubclass(kind, Element):

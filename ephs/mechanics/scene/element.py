@@ -186,8 +186,9 @@ class SceneElement(ABC):
             given = getattr(self, key)
             if given is None:
                 continue
-            if number.others:
-                number = replace(number, each=len(coordinates) - len(np.atleast_1d(given)))
+            first = len(coordinates) - len(np.atleast_1d(given))
+            if number.others and number.each != first:
+                number = replace(number, each=first)
             found = np.asarray(given, dtype=float) * number.unit(length, mass, time, coordinates)
             changes[key] = frozen(found) if isinstance(given, np.ndarray) else found.tolist()
         return self.changed(**changes)

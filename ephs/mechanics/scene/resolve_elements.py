@@ -51,9 +51,10 @@ class ReferableNames:
         own = [*HOLDERS[kind], *(["beams"] if kind == "side" else [])]
         if kind == "carrier" and all(name in self.known[section] for section in own):
             table.fault("collision", at, f'"{name}", a body and a shell', other="a body")
-        known = set[str]().union(*(self.known[section] for section in own))
-        if name in OUTSIDE[kind] or name in known or name.split(".")[0] in self.unknown_parts:
+        there = any(name in self.known[section] for section in own)
+        if there or name in OUTSIDE[kind] or name.split(".")[0] in self.unknown_parts:
             return
+        known = set[str]().union(*(self.known[section] for section in own))
         hint = did_you_mean(name, [*known, *OUTSIDE[kind] - {FREE_END}], f"there are: {listing(known)}")
         table.fault(f"unknown {_NOUNS.get(own[0], own[0].removesuffix('s'))}", at, f'"{name}"', hint=hint)
 

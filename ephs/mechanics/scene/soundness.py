@@ -46,8 +46,8 @@ def check_scene(scene: Scene) -> None:
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
     for kind, name in named:
-        first, *others = HOLDERS[kind]
-        if name not in OUTSIDE[kind].union(there[first], *(there[other] for other in others)):
+        if name not in OUTSIDE[kind] and not any(name in there[section] for section in HOLDERS[kind]):
+            first = HOLDERS[kind][0]
             what = {"bodies": "body", "thermal": "thermal node"}.get(first, first.removesuffix("s"))
             raise ValueError(f"there is no {what} {legible(str(name))}")
 
