@@ -73,7 +73,7 @@ def _made(types: tuple[Any, ...], value: Any) -> Any:
     """A value of one of these types."""
     if PolynomialMotion in types and isinstance(value, int | float):  # of older files
         value = {"coefficients": [value]}
-    if not isinstance(value, Mapping | list) or types[0] is Any:
+    if value is None or isinstance(value, str | float | int) or types[0] is Any:
         return value
     kind, inner = get_origin(types[0]) or types[0], get_args(types[0])
     if kind is np.ndarray:
