@@ -1,5 +1,6 @@
 """Motions that are prescribed as functions of time: laws, closed forms by every method, loops, what is refused."""
 
+import json
 import tempfile
 from dataclasses import replace
 from itertools import pairwise
@@ -229,6 +230,22 @@ def test_text_keeps_the_law(form):
     scene = loaded(CART.replace("{motion}", form))
     again = scene_from_text(scene_to_text(scene))
     assert again.joint("rail").motion == scene.joint("rail").motion == FORMS[form]
+
+
+def test_a_number_in_an_older_text_is_a_constant_rate():
+    data = json.loads(scene_to_text(loaded(CART.replace("{motion}", "{ rate = 0.3 }"))))
+    for rate in (0.3, -2, 0.0):
+        data["joints"]["rail"]["motion"] = rate
+        assert scene_from_text(json.dumps(data)).joint("rail").motion == ephs.PolynomialMotion((float(rate),))
+
+
+@pytest.mark.parametrize("law", [{"coefficients": [0.3], "phase": 0.0}, {"slope": 1.0}, {"times": [0.0]}])
+def test_a_law_that_no_class_has_is_refused(law):
+    data = json.loads(scene_to_text(loaded(CART.replace("{motion}", "{ rate = 0.3 }"))))
+    assert scene_from_text(json.dumps(data)).joint("rail").motion == ephs.PolynomialMotion((0.3,))
+    data["joints"]["rail"]["motion"] = law
+    with pytest.raises((KeyError, TypeError)):
+        scene_from_text(json.dumps(data))
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -14,9 +14,9 @@ from ephs.mechanics.motion.moving import ByPath
 from ephs.mechanics.motion.readout import ends
 from ephs.mechanics.motion.reduced import motion_of
 from ephs.mechanics.motion.shells import LinkedShell, ShellMotion, linked_shell_motion, shells_of_links
-from ephs.mechanics.scene.kinematics import AssemblyJoint
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene, World, frozen
-from ephs.mechanics.scene.tree import Hop, spanning_hops
+from ephs.mechanics.scene.joints import bare_joint
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Hop, spanning_hops
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, World, frozen
 from ephs.mechanics.tree.finding.frames import GROUND as SOLID
 from ephs.mechanics.tree.finding.frames import Frames, LinkJoint
 from ephs.mechanics.tree.finding.tendons import length_errors
@@ -180,7 +180,7 @@ class LinkMotion:
             link = self._assembled[hop.link]
             known, here, there = link.body1, link.frame1, link.frame2
             inside = within[link.name]
-            if not hop.forward:
+            if link.body1 == hop.body:
                 known, here, there, inside = link.body2, there, here, inverse(inside)
             if hop.body not in poses and known in poses:
                 frame = compose(poses[known], np.broadcast_to(here, (n, 7)))
@@ -222,11 +222,8 @@ def _at_frame(twist: Array, frame: Array) -> Array:
 def _drawn(name: str, joint: LinkJoint, ends: list[tuple[str | None, Array]], element: Array) -> Joint:
     """A joint with its location only."""
     (one, at), (other, there) = ends
-    nothing = frozen(np.zeros(joint.pair.dim))
-    return Joint(
-        name, joint.pair.name, str(one), str(other), frozen(at), frozen(there), 0.0,
-        frozen(np.zeros((joint.pair.dim,) * 2)), nothing, nothing, ENVIRONMENT, nothing, None, frozen(element), nothing,
-    )  # fmt: skip
+    rate = frozen(np.zeros(joint.pair.dim))
+    return bare_joint(name, joint.pair.name, (str(one), str(other)), (at, there), frozen(element), rate)
 
 
 def _known(what: str, name: str, known: Mapping[str, object]) -> str:

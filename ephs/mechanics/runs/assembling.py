@@ -16,8 +16,7 @@ from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.scene.adjust import mass_roots
 from ephs.mechanics.scene.assembly import gyration
 from ephs.mechanics.scene.geometry import JointCoupling
-from ephs.mechanics.scene.kinematics import AssemblyJoint, extent
-from ephs.mechanics.scene.tree import spanning_hops
+from ephs.mechanics.scene.kinematics import AssemblyJoint, extent, spanning_hops
 from ephs.mechanics.tree.finding.frames import Frames, frames_of
 from ephs.mechanics.tree.finding.tendons import tendon_lengths
 from ephs.operad import Path
@@ -120,9 +119,9 @@ def assembled(joints: FlatJoints, state: Mapping[Path, Array], given: Collection
     reached = known | {-1, *range(len(poses))} - {hop.body for hop in hops}
     for hop in hops:
         link = joints.links[hop.link]
-        if hop.body not in known and (link.body1 if hop.forward else link.body2) in reached:
+        if hop.body not in known and link.other(hop.body) in reached:
             x = out[joints.relative[hop.link]]
-            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+            poses[hop.body] = link.placed(hop.body, poses, x)
             reached.add(hop.body)
     for path, pose in zip(joints.poses, poses, strict=True):
         if path is not None:
@@ -164,7 +163,7 @@ def _placed(joints: FlatJoints, state: Mapping[Path, Array]) -> Array:
     for hop in spanning_hops(joints.links, len(poses), ()):
         if joints.poses[hop.body] is None:
             link, x = joints.links[hop.link], state[joints.relative[hop.link]]
-            poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+            poses[hop.body] = link.placed(hop.body, poses, x)
     return poses
 
 

@@ -48,7 +48,7 @@ def close_loops(
         xs = elements(free, poses)
         if largest_gap(free, poses, xs, scale) < 0.01 * ASSEMBLY:
             break
-        matrix, errors = _constraints(free, poses, xs, roots, held, scale)
+        matrix, errors = constraints(free, poses, xs, roots, held, scale)
         steps = _steps(roots, _least_change(matrix, -errors))
         # Far from a solution, a full step may go round too far.
         steps /= max(1.0, float(np.abs(steps[:, :3]).max(initial=0.0)))
@@ -92,9 +92,10 @@ def _loose(link: AssemblyJoint, held: frozenset[str]) -> AssemblyJoint:
     return replace(link, coordinates=None, near=link.coupling.element(link.coordinates))
 
 
-def _constraints(
+def constraints(
     links: Sequence[AssemblyJoint], poses: Array, xs: Sequence[Array], roots: Array, held: frozenset[str], scale: Scale
 ) -> tuple[Array, Array]:
+    """Rows of the joints on all bodies' twists by roots, and by how much they are open; ``held`` ones allow nothing."""
     blocks, errors = [], []
     for link, x in zip(links, xs, strict=True):
         forbidden = scale.weights if link.name in held else _across(link, x, scale)

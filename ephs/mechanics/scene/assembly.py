@@ -13,13 +13,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ephs.mechanics.scene.bodies import BodyDraft
+from ephs.mechanics.scene.bodies import BodyStart
 from ephs.mechanics.scene.errors import Fault, fault
-from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.joints import Asked
 from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, pose_at
-from ephs.mechanics.scene.model import GROUND, IDENTITY_POSE, Body, Joint, Scene, frozen
-from ephs.mechanics.scene.motions import first_rate
+from ephs.mechanics.scene.model import GROUND, Body, Joint, Scene, frozen
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rank import ASSEMBLY
@@ -31,26 +30,27 @@ Start: TypeAlias = tuple[Joint, Asked]
 
 
 def assemble(
-    drafts: Sequence[BodyDraft], joints: Sequence[Start], parts: Mapping[str, Scene], gravity: Array
+    drafts: Sequence[tuple[Body, BodyStart]], joints: Sequence[Start], parts: Mapping[str, Scene], gravity: Array
 ) -> tuple[Bodies, Joints, list[Fault]]:
     """Bodies and joints in the initial state, and a fault for each joint that does not hold there.
 
     The bodies of ``parts`` are where they are; joints may name them.
     """
     others = [(f"{part}.{name}", body) for part, scene in parts.items() for name, body in scene.all_bodies()]
-    names = [draft.name for draft in drafts] + [name for name, _ in others]
+    everyone = [*((body.name, body) for body, _ in drafts), *others]
+    names = [name for name, _ in everyone]
     index = {name: i for i, name in enumerate(names)} | {GROUND: -1}
-    poses = _place(drafts, joints, index, [body.pose for _, body in others])
+    starts = [start for _, start in drafts]
+    poses = _place(starts, joints, index, np.array([body.pose for _, body in everyone]).reshape(-1, 7))
     links = [_link(start, index, poses) for start in joints]
     xs = [link.element(poses) for link in links]
-    twists = _move(drafts, joints, links, xs, poses, [body.twist for _, body in others])
+    twists = _move(starts, joints, links, xs, poses, np.array([body.twist for _, body in everyone]).reshape(-1, 6))
     bodies = {
-        d.name: Body(d.name, d.mass, frozen(d.inertia), frozen(poses[i]), frozen(twists[i]), d.shape, d.shapes)
-        for i, d in enumerate(drafts)
+        body.name: replace(body, pose=frozen(poses[i]), twist=frozen(twists[i])) for i, (body, _) in enumerate(drafts)
     }
     slips = [link.slip(twists, x) for link, x in zip(links, xs, strict=True)]
-    masses = [(d.mass, d.inertia) for d in drafts] + [(body.mass, body.inertia) for _, body in others]
-    scale = Scale.of(links, poses, twists, gyration(masses), gravity)
+    radius = gyration((body.mass, body.inertia) for _, body in everyone)
+    scale = Scale.of(links, poses, twists, radius, gravity)
     placed = {
         joint.name: replace(
             joint,
@@ -101,11 +101,8 @@ def measure(
     return faults
 
 
-def _place(
-    drafts: Sequence[BodyDraft], joints: Sequence[Start], index: Mapping[str, int], rest: Sequence[Array]
-) -> Array:
-    poses = np.array([IDENTITY_POSE if d.pose is None else d.pose for d in drafts] + list(rest)).reshape(-1, 7)
-    open_bodies = [i for i, d in enumerate(drafts) if d.pose is None]
+def _place(starts: Sequence[BodyStart], joints: Sequence[Start], index: Mapping[str, int], poses: Array) -> Array:
+    open_bodies = [i for i, start in enumerate(starts) if not start.placed]
     if not open_bodies:
         return poses
     links = {start[0].name: _link(start, index, poses) for start in joints if start[1].in_bodies}
@@ -113,33 +110,30 @@ def _place(
     def follow(body: int, name: str) -> None:
         link = links[name]
         x = link.coupling.identity() if link.coordinates is None else link.coupling.element(link.coordinates)
-        poses[body] = link.place_second(poses, x) if link.body2 == body else link.place_first(poses, x)
+        poses[body] = link.placed(body, poses, x)
 
     _place_open(open_bodies, list(links.values()), follow)
     return poses
 
 
 def _move(
-    drafts: Sequence[BodyDraft],
+    starts: Sequence[BodyStart],
     joints: Sequence[Start],
     links: Sequence[AssemblyJoint],
     xs: Sequence[Array],
     poses: Array,
-    rest: Sequence[Array],
+    twists: Array,
 ) -> Array:
-    twists = np.zeros((len(poses), 6))
-    for i, d in enumerate(drafts):
-        if d.velocity is not None and d.angular_velocity is not None:
-            twists[i] = body_twist(poses[i], d.velocity, d.angular_velocity)
-    if rest:
-        twists[len(drafts) :] = rest
+    for i, start in enumerate(starts):
+        if start.velocities is not None:
+            twists[i] = body_twist(poses[i], *start.velocities)
     elements = {link.name: x for link, x in zip(links, xs, strict=True)}
     by_name = {link.name: link for link in links}
 
     def follow(body: int, name: str) -> None:
         link, x = by_name[name], elements[name]
         rate = np.zeros(link.coupling.dim) if link.rate is None else link.rate
-        twists[body] = link.move_second(twists, x, rate) if link.body2 == body else link.move_first(twists, x, rate)
+        twists[body] = link.moved(body, twists, x, rate)
 
     # A joint with `at` and `axis` moves a body only if its rate is specified.
     leading = [
@@ -147,7 +141,7 @@ def _move(
         for (_, asked), link in zip(joints, links, strict=True)
         if asked.in_bodies or (asked.rate is not None and asked.rate.any())
     ]
-    _place_open([i for i, d in enumerate(drafts) if d.velocity is None], leading, follow)
+    _place_open([i for i, start in enumerate(starts) if start.velocities is None], leading, follow)
     return twists
 
 
@@ -165,14 +159,14 @@ def _place_open(open_bodies: list[int], links: Sequence[AssemblyJoint], follow: 
     waiting = {b: None for b in open_bodies if of[b]}  # in order
     followers: dict[int, list[int]] = {}
     for b in waiting:
-        followers.setdefault(_other(of[b][0], b), []).append(b)
-    ready = deque(b for b in waiting if _other(of[b][0], b) not in waiting)
+        followers.setdefault(of[b][0].other(b), []).append(b)
+    ready = deque(b for b in waiting if of[b][0].other(b) not in waiting)
     while waiting:
         if ready:
             body = ready.popleft()
             link = of[body][0]
         else:
-            ways = ((b, link) for b in waiting for link in of[b] if _other(link, b) not in waiting)
+            ways = ((b, link) for b in waiting for link in of[b] if link.other(b) not in waiting)
             body, link = next(ways, (next(iter(waiting)), None))
         if link is not None:
             follow(body, link.name)
@@ -180,21 +174,16 @@ def _place_open(open_bodies: list[int], links: Sequence[AssemblyJoint], follow: 
         ready.extend(b for b in followers.get(body, []) if b in waiting)
 
 
-def _other(link: AssemblyJoint, body: int) -> int:
-    return link.body1 if link.body2 == body else link.body2
-
-
 def _link(start: Start, index: Mapping[str, int], poses: Array) -> AssemblyJoint:
     joint, asked = start
-    body1, body2 = index[joint.body1], index[joint.body2]
-    frame1, frame2, coordinates = joint.frame1, joint.frame2, asked.coordinates
-    if not asked.in_bodies:
-        frame1 = SE3.compose(SE3.inverse(pose_at(poses, body1)), frame1)
-        frame2 = SE3.compose(SE3.inverse(pose_at(poses, body2)), frame2)
-        coordinates = np.zeros(joint.dim)
-    return AssemblyJoint(
-        joint.name, body1, body2, frame1, frame2, coupling_of(joint), coordinates, asked.rate, first_rate(joint.motion)
-    )  # fmt: skip
+    link = AssemblyJoint.of(joint, index, coordinates=asked.coordinates, rate=asked.rate)
+    if asked.in_bodies:
+        return link
+    frames = {
+        key: SE3.compose(SE3.inverse(pose_at(poses, body)), frame)
+        for key, body, frame in (("frame1", link.body1, link.frame1), ("frame2", link.body2, link.frame2))
+    }
+    return replace(link, coordinates=np.zeros(joint.dim), **frames)
 
 
 def gyration(bodies: Iterable[tuple[float, Array]]) -> float:

@@ -22,7 +22,7 @@ from ephs.mechanics.scene.element import FREE_END
 from ephs.mechanics.scene.errors import shown
 from ephs.mechanics.scene.flexible import Beam, Strain
 from ephs.mechanics.scene.geometry import body_twist
-from ephs.mechanics.scene.joints import Asked, Joint
+from ephs.mechanics.scene.joints import Asked, Joint, bare_joint
 from ephs.mechanics.scene.model import ENVIRONMENT, IDENTITY_POSE, Body, Scene, World, frozen
 from ephs.mechanics.scene.resolve_elements import ReferableNames
 from ephs.mechanics.scene.sections import Section, resolve_section
@@ -65,12 +65,11 @@ def check_beam(table: Checked[Any], names: ReferableNames) -> None:
     if table.sound("heat", "thermal") and entry.thermal is not None and entry.heat != ENVIRONMENT:
         table.fault("beam heat", "heat")
     elif table.sound("heat"):
-        names.check(table, entry.heat, "heat", "thermal")
+        names.check(table, entry.heat, "heat", "node")
     if table.sound("surface") and entry.surface is not None and entry.surface.heat is not None:
-        names.check(table, entry.surface.heat, "surface.heat", "thermal")
+        names.check(table, entry.surface.heat, "surface.heat", "node")
     for i, end in enumerate(entry.ends if table.sound("ends") else ()):
-        if end != FREE_END:
-            names.check(table, end, f"ends[{i}]", "body")
+        names.check(table, end, f"ends[{i}]", "end")
 
 
 def resolve_beam(table: Checked[Any], world: World) -> BeamDraft | None:
@@ -244,10 +243,8 @@ def _joint(
     strain: Strain | None = None,
 ) -> Joint:  # fmt: skip
     """A joint of a beam, its coordinates and rates yet to be measured."""
-    d = {"free": 6, "spherical": 3, "fixed": 0}[kind]
-    none, frames = frozen(np.zeros(d)), (frozen(frame1), frozen(frame2))
-    loss = frozen(np.zeros((d, d)))
-    return Joint(name, kind, *bodies, *frames, 0.0, loss, none, none, heat, none, None, none, none, strain=strain)
+    zero = frozen(np.zeros({"free": 6, "spherical": 3, "fixed": 0}[kind]))
+    return replace(bare_joint(name, kind, bodies, (frame1, frame2), zero, zero), heat=heat, strain=strain)
 
 
 def _settled(strain: Array) -> Array:

@@ -9,11 +9,10 @@ import numpy as np
 
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.checked import Checked
-from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, SceneElement, frozen
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSE, POSITIVE, TWIST, Measured, frozen
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import Fault
-from ephs.mechanics.scene.homogeneous import mass_and_moments
-from ephs.mechanics.scene.inertia import mass_and_inertia
+from ephs.mechanics.scene.inertia import mass_and_inertia, mass_and_moments
 from ephs.mechanics.scene.rotations import Rotation
 from ephs.mechanics.scene.schema_numbers import (
     EntryTable,
@@ -48,7 +47,7 @@ class World(Measured):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Body(SceneElement):
+class Body(Measured):
     """A rigid body.
 
     Attributes
@@ -100,24 +99,17 @@ class BodyEntry(EntryTable):
 
 @final
 @dataclass(frozen=True, slots=True)
-class BodyDraft:
-    """A body whose pose (7,) and velocity may still come from a joint: then they are None.
+class BodyStart:
+    """What a file says of a body's start: whether its pose is given; its velocity (3,) in the world basis and its
+    angular velocity (3,) in body axes, or None of both. What is not given comes from a joint."""
 
-    ``velocity`` is in the world basis, ``angular_velocity`` in body axes; None both, or neither.
-    """
-
-    name: str
-    mass: float
-    inertia: Array
-    pose: Array | None
-    velocity: Array | None
-    angular_velocity: Array | None
-    shape: Mapping[str, Any] | None
-    shapes: tuple[Mapping[str, Any], ...]
+    placed: bool
+    velocities: tuple[Array, Array] | None
 
 
-def resolve_body(table: Checked[BodyEntry], mode: str, folder: Path, odd: list[Fault]) -> BodyDraft:
-    """A body with its inertia checked; deviations that ``mode`` accepts are appended to ``odd``."""
+def resolve_body(table: Checked[BodyEntry], mode: str, folder: Path, odd: list[Fault]) -> tuple[Body, BodyStart]:
+    """A body with its inertia checked, at rest, and its start; deviations that ``mode`` accepts are appended to
+    ``odd``."""
     entry, one = table.entry, table.entry.shape
     mass, tensor = 1.0, np.eye(3)
     if found := mass_and_moments(table):
@@ -130,16 +122,10 @@ def resolve_body(table: Checked[BodyEntry], mode: str, folder: Path, odd: list[F
             table.fault("both shapes", "shape", "shape and shapes")
     placed = entry.position is not None or entry.rotation is not None
     moving = entry.velocity is not None or entry.angular_velocity is not None
-    return BodyDraft(
-        name=table.name,
-        mass=mass,
-        inertia=tensor,
-        pose=values.pose(table) if placed else None,
-        velocity=np.array(entry.velocity or [0.0, 0.0, 0.0]) if moving else None,
-        angular_velocity=np.array(entry.angular_velocity or [0.0, 0.0, 0.0]) if moving else None,
-        shape=shape,
-        shapes=tuple(each for each in shapes if each is not None),
-    )
+    pose = frozen(values.pose(table)) if placed else IDENTITY_POSE
+    given = [np.array(each or [0.0, 0.0, 0.0]) for each in (entry.velocity, entry.angular_velocity)]
+    body = Body(table.name, mass, frozen(tensor), pose, frozen(np.zeros(6)), shape, tuple(filter(None, shapes)))
+    return body, BodyStart(placed, (given[0], given[1]) if moving else None)
 
 
 def _shape(table: Checked[ShapeEntry], folder: Path) -> Mapping[str, Any] | None:

@@ -6,27 +6,31 @@ that expand. A driven joint's momentum is the outer port ``drives.JOINT``. What 
 ``momenta.PART.BODY`` and so on; a part's name is not taken by anything else of its level, so these never clash.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, final
 
 import numpy as np
 
 from ephs.mechanics.elements import components
-from ephs.mechanics.elements.beam import thermoelastic
+from ephs.mechanics.elements.beam import beam_stretch, elastic, thermoelastic
+from ephs.mechanics.elements.bodies import rigid_body
+from ephs.mechanics.elements.joints import between_frames, joint, universal_joint
 from ephs.mechanics.elements.motor import armature
 from ephs.mechanics.scene.contacts import contact_points
-from ephs.mechanics.scene.demands import Demands, demands_on_parts
-from ephs.mechanics.scene.made import SystemCache
-from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Joint, Scene
+from ephs.mechanics.scene.flexible import Strain
+from ephs.mechanics.scene.model import ENVIRONMENT, GROUND, Body, Joint, Scene
 from ephs.mechanics.scene.site import INPUTS, SceneLevel, built, form_of, started
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.operad import Path, Pattern, Quantity, junction, quantity
+from ephs.operad import Junction, Path, Pattern, Quantity, junction, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.kept import once
-from ephs.semantics.systems.system import Filling, System
+from ephs.semantics.systems.system import System
 from ephs.solve.posing.problem import Signal
+
+_RATES = ("p_r",), ("p_r1", "p_r2")
+"""Ports of a driven joint, and of a universal one."""
 
 
 def component_path(kind: str, name: str) -> Path:
@@ -47,10 +51,14 @@ def tension_port(tendon: str) -> Path:
 
 def drive_ports(of: Joint) -> tuple[tuple[Path, slice], ...]:
     """The outer ports of a driven joint, and which of its degrees of freedom each of them moves."""
-    at = _initial_path("drives", of.name)
+    return tuple(_halves(_initial_path("drives", of.name), of))
+
+
+def _halves(path: Path, of: Joint) -> list[tuple[Path, slice]]:
+    """Paths of the pairs of which a joint at a path is made, and the degrees of freedom of each."""
     if of.middle is None:
-        return ((at, slice(0, of.dim)),)
-    return ((at / "first", slice(0, 1)), (at / "second", slice(1, 2)))
+        return [(path, slice(0, of.dim))]
+    return [(path / "first", slice(0, 1)), (path / "second", slice(1, 2))]
 
 
 def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable[str] = ()) -> System:
@@ -68,7 +76,7 @@ def scene_system(scene: Scene, *, driven: Iterable[str] = (), wrenches: Iterable
     form = form_of(scene)
 
     def made() -> System:
-        own = {name for name, j in form.all_joints() if _is_driven(j)}
+        own = frozenset(name for name, j in form.all_joints() if _is_driven(j))
         return _level(form, Demands(pushed, frozenset(), own | asked), top=True)
 
     return once(form, ("system", asked, pushed), made)
@@ -99,11 +107,8 @@ def _initial_state(scene: Scene) -> dict[Path, Array]:
             out[at / "ke" / "p"] = np.concatenate([body.inertia @ body.twist[:3], body.mass * body.twist[3:]])
     for name, j in scene.all_joints():
         at = component_path("joints", name)
-        halves = [(at, np.array(j.coordinate))]
-        if j.middle is not None:
-            halves = [(at / part, j.coordinate[i : i + 1].copy()) for i, part in enumerate(("first", "second"))]
-        for place, value in halves:
-            out[place / "pe" / "q_r"] = value
+        for place, where in _halves(at, j):
+            out[place / "pe" / "q_r"] = np.array(j.coordinate if j.middle is None else j.coordinate[where])
             if j.heat == ENVIRONMENT:
                 out[place / "env" / "s"] = np.zeros(1)
         if j.armature:
@@ -173,8 +178,7 @@ def _scene_names(scene: Scene) -> dict[Path, str]:
         points = range(len(contact_points(scene, c)))
         out |= {component_path("contacts", name) / f"point{i}": name for i in points}
     for name, j in scene.all_joints():
-        at = component_path("joints", name)
-        out |= {part: name for part in ([at] if j.middle is None else [at / "first", at / "second"])}
+        out |= {part: name for part, _ in _halves(component_path("joints", name), j)}
     return out
 
 
@@ -186,102 +190,150 @@ def _initial_path(group: str, name: str) -> Path:
     return Path([group, *name.split(".")])
 
 
-@dataclass(slots=True)
-class _Builder:
-    """Collects the boxes of one level."""
+@final
+@dataclass(frozen=True, slots=True)
+class Demands:
+    """Bodies, thermal nodes and driven joints that the level above connects to, by names of this level."""
 
-    demands: Demands
-    inner: Demands
-    junctions: dict[Path, Any] = field(default_factory=dict)
-    boxes: dict[Path, dict[Any, str]] = field(default_factory=dict)
-    fillings: dict[Path, Filling] = field(default_factory=dict)
-    made: SystemCache = field(default_factory=SystemCache)
+    bodies: frozenset[str]
+    nodes: frozenset[str]
+    joints: frozenset[str]
 
-    def momentum(self, body: str) -> str:
-        """The junction of a body's momentum."""
-        path = _initial_path("momenta", body)
-        self.junctions[path] = junction(quantity.body_momentum, exposed=body in self.demands.bodies)
-        return str(path)
+    def with_own(self, scene: Scene) -> "Demands":
+        """The same with those to which this level's joints and other elements connect."""
+        joints = scene.joints.values()
+        bodies = {name for j in joints for name in (j.body1, j.body2)}
+        nodes = {x.heat for x in joints}
+        turned = {name for name, j in scene.joints.items() if j.armature}
+        for path in built(scene).junctions:
+            of = {"momenta": bodies, "entropies": nodes, "drives": turned}.get(path[0])
+            if of is not None:
+                of.add(".".join(path[1:]))
+        return Demands(self.bodies | bodies, self.nodes | nodes, self.joints | turned)
 
-    def entropy(self, node: str) -> str:
-        """The junction of a thermal node."""
-        path = _initial_path("entropies", node)
-        self.junctions[path] = junction(quantity.entropy, exposed=node in self.demands.nodes)
-        return str(path)
+    def of_part(self, part: str) -> "Demands":
+        """The same, as seen from a part."""
+        start = part + "."
 
-    def lengthening(self, node: str) -> str:
-        """The junction of the lengthening of what expands with a thermal node."""
-        path = _initial_path("lengthenings", node)
-        self.junctions[path] = junction(quantity.displacement)
-        return str(path)
+        def inside(names: frozenset[str]) -> frozenset[str]:
+            return frozenset(name[len(start) :] for name in names if name.startswith(start))
 
-    def drive(self, name: str, path: Path, of: Quantity) -> str:
-        """The junction of a driven joint, exposed at the request of the level above."""
-        self.junctions[path] = junction(of, exposed=name in self.demands.joints)
-        return str(path)
+        return Demands(inside(self.bodies), inside(self.nodes), inside(self.joints))
 
-    def join(self, own: SceneLevel, path: Path) -> None:
-        """A junction of elements."""
+    def exposed(self, path: Path, of: Junction) -> Junction:
+        """A junction, exposed where it is demanded."""
         group, name = path[0], ".".join(path[1:])
-        if group in ("momenta", "entropies"):
-            self.momentum(name) if group == "momenta" else self.entropy(name)
-        elif group != "drives":
-            self.junctions[path] = own.junctions[path]
-
-    def take(self, own: SceneLevel, section: str) -> None:
-        """The boxes of elements of a section, with their junctions: states are in the order of boxes."""
-        for path, ports in own.boxes.items():
-            if path[0] == section:
-                for at in ports.values():
-                    self.join(own, Path.of(at))
-                self.add(path, own.fillings[path], ports)
-
-    def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
-        """A box with its filling."""
-        self.boxes[path], self.fillings[path] = dict(ports), filling
+        match group:
+            case "momenta":
+                asked = name in self.bodies
+            case "entropies":
+                asked = name in self.nodes
+            case "drives":  # of a half of a universal joint, too
+                asked = name in self.joints or name.rpartition(".")[0] in self.joints
+            case _:
+                return of
+        return junction(of.quantity, exposed=asked)
 
 
 def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
-    inner = demands_on_parts(scene, demands)
-    if not top:
-        demands = Demands(demands.bodies | {GROUND}, demands.nodes, demands.joints)
-    b = _Builder(demands, inner)
-    gravity = scene.world.gravity
+    inner, made = demands.with_own(scene), _SystemCache()
+    b, own = SceneLevel(), built(scene)
+
+    def take(path: Path) -> None:
+        for at in own.boxes[path].values():
+            b.junctions.setdefault(Path.of(at), own.junctions[Path.of(at)])
+        b.add(path, own.fillings[path], own.boxes[path])
+
     for name, body in scene.bodies.items():
-        b.add(Path(["bodies", name]), b.made.body(body, gravity), {"p": b.momentum(name)})
+        b.add(Path(["bodies", name]), made.body(body, scene.world.gravity), {"p": b.momentum(name)})
     for name, j in scene.joints.items():
         ports = {"p1": b.momentum(j.body1), "p2": b.momentum(j.body2)}
         if j.heat != ENVIRONMENT:
             ports["s"] = b.entropy(j.heat)
         driven, expands = name in inner.joints, _expands(scene, j)
         if expands:
-            ports["e"] = b.lengthening(j.heat)
-        system = b.made.joint(j, driven=driven, expands=expands)
-        if driven:
-            names = ("p_r",) if j.middle is None else ("p_r1", "p_r2")
-            for port, (path, _) in zip(names, drive_ports(j), strict=True):
-                ports[port] = b.drive(name, path, system.interface[Path.of(port)].quantity)
+            ports["e"] = b.join("lengthenings", j.heat, quantity.displacement)
+        system = made.joint(j, driven=driven, expands=expands)
+        for port, (path, _) in zip(_RATES[j.middle is not None], drive_ports(j), strict=True) if driven else ():
+            ports[port] = b.join("drives", str(Path(path[1:])), system.interface[Path.of(port)].quantity)
         b.add(Path(["joints", name]), system, ports)
         if j.armature:
-            at = _initial_path("drives", name)
-            b.add(Path(["armatures", name]), armature(b.junctions[at].quantity, j.armature), {"p": str(at)})
-    own = built(scene)
-    for section in ("springs", "contacts", "tendons"):
-        b.take(own, section)
+            of = b.junctions[_initial_path("drives", name)].quantity
+            b.add(Path(["armatures", name]), armature(of, j.armature), {"p": ports["p_r"]})
+    for section in ("springs", "contacts", "tendons"):  # states are in the order of boxes
+        for path in own.boxes:
+            if path[0] == section:
+                take(path)
     for name, node in scene.thermal.items():
-        ports = {"s": b.entropy(name)} | ({"e": b.lengthening(name)} if node.pull else {})
+        ports = {"s": b.entropy(name)}
+        if node.pull:
+            ports["e"] = b.join("lengthenings", name, quantity.displacement)
         b.add(Path(["thermal", name]), _storing(node), ports)
     for name, part in scene.parts.items():
         system = _level(part, inner.of_part(name), top=False)
         ports = {port: _joined(b, name, port, system.interface[port].quantity) for port in system.interface}
         b.add(Path(["parts", name]), system, ports)
-    for path in own.junctions:
-        b.join(own, path)
-    b.boxes.update(own.boxes)
-    b.fillings.update(own.fillings)
+    for path, of in own.junctions.items():
+        b.junctions.setdefault(path, of)
+    for path in own.boxes:
+        take(path)
     if top and _initial_path("momenta", GROUND) in b.junctions:
         b.add(Path(["ground"]), components.ground(), {"p": b.momentum(GROUND)})
-    return System.of(Pattern(junctions=b.junctions, boxes=b.boxes), b.fillings)
+    if not top:
+        demands = replace(demands, bodies=demands.bodies | {GROUND})
+    junctions = {path: demands.exposed(path, of) for path, of in b.junctions.items()}
+    return System.of(Pattern(junctions=junctions, boxes=b.boxes), b.fillings)
+
+
+_NOT_OF_SYSTEM = frozenset(
+    {"name", "body1", "body2", "heat", "drive", "motion", "coordinate", "rate", "armature"}
+)  # fmt: skip
+"""Attributes of a joint that its system does not depend on, but for whether there is a place for heat."""
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class _SystemCache:
+    """Cache of systems, by the data that they depend on: of a thousand in a rod most differ by their names only."""
+
+    systems: dict[Hashable, System] = field(default_factory=dict)
+
+    def body(self, of: Body, gravity: Array) -> System:
+        """A body's system."""
+        key = of.mass, of.inertia.tobytes(), gravity.tobytes()
+        if key not in self.systems:
+            # the scene's reader has checked the inertia
+            self.systems[key] = rigid_body(of.mass, of.inertia, gravity, strict=False)
+        return self.systems[key]
+
+    def joint(self, of: Joint, *, driven: bool, expands: bool = False) -> System:
+        """A joint's system; ``driven`` exposes its momentum, ``expands`` the lengthening of a beam's element."""
+        names = (each.name for each in fields(of) if each.name not in _NOT_OF_SYSTEM)
+        key = driven, expands, of.heat != ENVIRONMENT, *(_hashable(getattr(of, name)) for name in names)
+        if key not in self.systems:
+            self.systems[key] = _joint(of, driven=driven, expands=expands)
+        return self.systems[key]
+
+
+def _hashable(value: Any) -> Hashable:
+    if isinstance(value, np.ndarray):
+        return value.tobytes()
+    return tuple(_hashable(getattr(value, each.name)) for each in fields(value)) if isinstance(value, Strain) else value
+
+
+def _joint(j: Joint, *, driven: bool, expands: bool) -> System:
+    heat = j.heat != ENVIRONMENT
+    if j.middle is not None:
+        return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
+    if j.strain is not None:
+        of = j.strain
+        parts = elastic(of.length, of.stiffness, of.rest, of.damping, of.order)
+        stretch = beam_stretch(float(of.length), tuple(of.rest.tolist())) if expands else None
+        return between_frames(j.frame1, j.frame2, *parts, heat=heat, stretch=stretch)
+    return joint(
+        j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
+        limits=j.limits, stop=j.stop, dry=j.dry,
+    )  # fmt: skip
 
 
 def _expands(scene: Scene, joint: Joint) -> bool:
@@ -296,22 +348,11 @@ def _storing(node: ThermalNode) -> Storage:
     return components.thermal_node(node.capacity, node.temperature)
 
 
-def _joined(b: _Builder, part: str, port: Path, of: Quantity) -> str:
+def _joined(b: SceneLevel, part: str, port: Path, of: Quantity) -> str:
     """The junction at this level of a part's outer port."""
-    group, *rest = tuple(port)
-    if rest == [GROUND]:
-        return b.momentum(GROUND)
-    name = ".".join([part, *rest])
-    if group == "momenta":
-        return b.momentum(name)
-    if group == "entropies":
-        return b.entropy(name)
-    path = _outside(port, f"{part}.")
-    if group != "drives":
-        b.junctions[path] = junction(of, exposed=True)
-        return str(path)
-    joint_name = name if name in b.inner.joints else name.rpartition(".")[0]
-    return b.drive(joint_name, path, of)
+    path = port if port[1:] == (GROUND,) else _outside(port, f"{part}.")
+    b.junctions.setdefault(path, junction(of, exposed=True))
+    return str(path)
 
 
 def _outside(port: Path, path: str) -> Path:

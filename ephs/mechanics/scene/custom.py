@@ -7,14 +7,14 @@ part follow from these.
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, final
 
 import numpy as np
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError
 
-from ephs.mechanics.scene.element import GROUND, OUTSIDE, NumberForm
+from ephs.mechanics.scene.element import GROUND, OUTSIDE, NumberForm, SceneElement
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rules import KeyRule
 from ephs.mechanics.scene.schema_numbers import EntryTable
@@ -104,7 +104,7 @@ def _hidden(*given: str) -> Any:
     return _Hidden(*given)
 
 
-class Element(EntryTable):
+class Element(EntryTable, SceneElement):
     """Base of elements of one's own: subclass it with keys, rules and ``build``, and call `register_element`.
 
     The class statement names the section of scene files, and says what stands there:
@@ -121,12 +121,6 @@ class Element(EntryTable):
     model_config = ConfigDict(strict=True, allow_inf_nan=False, ignored_types=(KeyRule,))
     section: ClassVar[str] = ""
     said: ClassVar[str] = ""
-    names: ClassVar[Mapping[str, str]] = {}
-    """Keys that name elements, and of which kind."""
-    numbers: ClassVar[Mapping[str, NumberForm]] = {}
-    """Keys that are numbers, and their dimensions."""
-    frames: ClassVar[Mapping[str, str]] = {}
-    """Keys that are points, and the keys of their bodies."""
     rules: ClassVar[tuple[KeyRule, ...]] = ()
     _name: str = PrivateAttr("")
     _folder: Path = PrivateAttr(Path())
@@ -199,38 +193,14 @@ class Element(EntryTable):
         return found
 
     def changed(self, **keys: Any) -> Self:
-        """Itself with other values at some keys, which are not checked."""
         return self.model_copy(update=keys)
+
+    def _inside(self, path: str) -> Self:
+        return self.called(path + self.name)
 
     def number_values(self) -> dict[str, Any]:
         """Its numbers by key."""
         return {name: getattr(self, name) for name in type(self).numbers}
-
-    def references(self) -> Iterator[tuple[str, str, str]]:
-        """Key, kind and name of all that it names."""
-        for name, kind in type(self).names.items():
-            given = getattr(self, name, None)
-            if isinstance(given, str):
-                yield name, kind, given
-            else:
-                yield from ((f"{name}[{i}]", kind, each) for i, each in enumerate(given or ()))
-
-    def named(self, kind: str) -> tuple[str, ...]:
-        """The names of a kind to which it refers."""
-        return tuple(name for _, of, name in self.references() if of == kind)
-
-    def seen(self, path: str) -> Self:
-        """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
-        if not path:
-            return self
-        changes: dict[str, Any] = {}
-        for name, kind in type(self).names.items():
-            same, given = OUTSIDE[kind], getattr(self, name)
-            if isinstance(given, str):
-                changes[name] = given if given in same else path + given
-            elif given is not None:
-                changes[name] = [each if each in same else path + each for each in given]
-        return self.changed(**changes).called(path + self.name)
 
     def _carriers(self, name: str) -> list[str]:
         """The bodies in whose frames the points at a key are."""
@@ -249,19 +219,6 @@ class Element(EntryTable):
                 if body == GROUND:
                     points[i] = turn @ points[i] + pose[4:]
             changes[name] = np.reshape(points, np.shape(getattr(self, name))).tolist()
-        return self.changed(**changes)
-
-    def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
-        """The same in other units; ``coordinates`` are those of its joints."""
-        changes: dict[str, Any] = {}
-        points = dict.fromkeys(type(self).frames, NumberForm(length=1))
-        for name, number in (points | dict(type(self).numbers)).items():
-            given = getattr(self, name)
-            if given is not None:
-                if number.others:
-                    number = replace(number, each=len(coordinates) - np.size(given))
-                unit = number.unit(length, mass, time, coordinates)
-                changes[name] = (np.asarray(given, dtype=float) * unit).tolist()
         return self.changed(**changes)
 
     def __str__(self) -> str:
@@ -340,7 +297,7 @@ def _check_keys(kind: type[Element]) -> None:
     properties = kind.model_json_schema().get("properties", {})
     for name, field in kind.model_fields.items():
         where = f"{kind.__name__}.{name}"
-        if name in dir(Element) or not _is_name(name):
+        if name in dir(Element) or not is_name(name):
             raise ElementError("reserved", where, f'"{name}"')
         if field.description is None or not isinstance(field.json_schema_extra, _Hidden):
             raise ElementError("key", where, field.description or "no meaning")
@@ -370,7 +327,8 @@ def _forms(schema: Mapping[str, Any]) -> set[str]:
     return {str(schema.get("type", "a table"))}
 
 
-def _is_name(text: str) -> bool:
+def is_name(text: str) -> bool:
+    """Whether a text is one component of a path."""
     try:
         Name([text])
     except PatternError:

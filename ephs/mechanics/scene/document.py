@@ -1,7 +1,10 @@
-"""Scenes as JSON text: every number resolved, exact in a round trip. Solution files carry them."""
+"""Scenes as JSON text: every number resolved, exact in a round trip. Solution files carry them.
+
+What an attribute may be is said by its annotation: it is read by that.
+"""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from types import UnionType
@@ -9,15 +12,13 @@ from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
 
-from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.flexible import Strain
-from ephs.mechanics.scene.model import ELEMENTS, IDENTITY_POSE, Scene, World, frozen
-from ephs.mechanics.scene.motions import law_from
+from ephs.mechanics.scene.model import Scene, frozen
 from ephs.mechanics.scene.registry import elements_from
-from ephs.mechanics.shapes.dry import Dry
-from ephs.mechanics.shapes.impact import Impact
-from ephs.mechanics.shapes.law import ConstitutiveLaw
+from ephs.solve.posing.motion_law import HarmonicMotion, MotionLaw, PolynomialMotion, TabulatedMotion
+
+_ANY_OF = {MotionLaw: (PolynomialMotion, HarmonicMotion, TabulatedMotion), "Scene": (Scene,)}
+"""Annotation -> the classes that it stands for."""
 
 
 def scene_to_text(scene: Scene) -> str:
@@ -27,18 +28,20 @@ def scene_to_text(scene: Scene) -> str:
 
 def scene_from_text(text: str) -> Scene:
     """The scene of `scene_to_text`."""
-    return _scene(json.loads(text))
+    return _made((Scene,), json.loads(text))
 
 
 @cache
-def _kept(of: type[Any]) -> dict[str, set[Any]]:
-    """Attributes of a class that are kept -> the types that each may be, without their parameters."""
+def _kept(of: type[Any]) -> dict[str, tuple[Any, ...]]:
+    """Attributes of a class that are kept -> the types that each may be."""
     return {field.name: _types(field.type) for field in fields(of) if field.init}
 
 
-def _types(annotation: Any) -> set[Any]:
+@cache
+def _types(annotation: Any) -> tuple[Any, ...]:
     plain = annotation.__origin__ if get_origin(annotation) is Annotated else annotation
-    return {get_origin(each) or each for each in (get_args(plain) if isinstance(plain, UnionType) else (plain,))}
+    found = get_args(plain) if isinstance(plain, UnionType) else (plain,)
+    return tuple(each for kind in found for each in _ANY_OF.get(kind, (kind,)))
 
 
 def _plain(value: Any) -> Any:
@@ -60,57 +63,31 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _array(value: Any) -> Any:
-    return None if value is None else frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
-
-
 def _rows(value: Any) -> Any:
     """A value; an array of an older file as nested lists."""
     is_array = isinstance(value, Mapping) and value.keys() == {"shape", "values"}
     return np.reshape(value["values"], value["shape"]).tolist() if is_array else value
 
 
-def _value(cls: Any, data: dict[str, Any]) -> Any:
-    """A value, with its arrays and the laws in it."""
-    if issubclass(cls, Element):
-        return cls.of_table(data["name"], {key: _rows(value) for key, value in data.items()})
-
-    def made(key: str, value: Any) -> Any:
-        if np.ndarray in types[key]:
-            return _array(value)
-        if tuple in types[key]:
-            return tuple(value)
-        return _INSIDE[key](value) if value is not None and key in _INSIDE else value
-
-    types = _kept(cls)
-    return cls(**{key: made(key, value) for key, value in data.items()})
-
-
-def _law(given: dict[str, Any]) -> ConstitutiveLaw | Impact:
-    return ConstitutiveLaw(**given) if "stiffness" in given else Impact(**given)
-
-
-_INSIDE: Mapping[str, Callable[[Any], Any]] = {
-    "motion": law_from,
-    "dry": lambda of: Dry(**of),
-    "stop": _law,
-    "strain": lambda of: _value(Strain, of),
-}
-
-
-def _scene(data: dict[str, Any]) -> Scene:
-    given = dict(data)
-    for key, cls in ELEMENTS.items():  # older files lack some
-        given[key] = {name: _value(cls, entry) for name, entry in given.get(key, {}).items()}
-    given["parts"] = {name: _scene(part) for name, part in given.get("parts", {}).items()}
-    given["world"] = _value(World, given["world"])
-    given["elements"] = elements_from(given.get("elements", {}))
-    given["origin"] = _array(given["origin"]) if "origin" in given else IDENTITY_POSE
-    adjusted = given["adjusted"]
-    if adjusted is not None:
-        moved = tuple(Displacement(**entry) for entry in adjusted["moved"])
-        changed = tuple(
-            Changed(e["joint"], e["what"], tuple(e["given"]), tuple(e["taken"])) for e in adjusted.get("changed", ())
-        )
-        given["adjusted"] = Adjustment(adjusted["gap"], adjusted["slip"], moved, changed)
-    return Scene(**given)
+def _made(types: tuple[Any, ...], value: Any) -> Any:
+    """A value of one of these types."""
+    if PolynomialMotion in types and isinstance(value, int | float):  # of older files
+        value = {"coefficients": [value]}
+    if value is None or isinstance(value, str | float | int) or types[0] is Any:
+        return value
+    kind, inner = get_origin(types[0]) or types[0], get_args(types[0])
+    if kind is np.ndarray:
+        return frozen(np.array(value["values"], dtype=float).reshape(value["shape"]))
+    if kind is tuple:
+        return tuple(_made(_types(inner[0]), each) for each in value)
+    if kind is Mapping:
+        return {name: _made(_types(inner[1]), each) for name, each in value.items()}
+    if not isinstance(value, Mapping):
+        return value
+    if issubclass(kind, Element):
+        return kind.of_table(value["name"], {key: _rows(each) for key, each in value.items()})
+    cls: Any = next((each for each in types if value.keys() <= _kept(each).keys()), kind)
+    return cls(**{
+        key: elements_from(each) if (cls, key) == (Scene, "elements") else _made(_kept(cls)[key], each)
+        for key, each in value.items()
+    })  # fmt: skip

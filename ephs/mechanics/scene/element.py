@@ -5,8 +5,8 @@ their page of documentation, reading and writing, checks, other units, parameter
 part follow. Attributes without a meaning are not keys of scene files.
 """
 
-from abc import ABC
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from inspect import get_annotations
@@ -38,6 +38,15 @@ OUTSIDE: Final[Mapping[str, frozenset[str]]] = {
     "surface": frozenset(),
 }
 """Kind of a name that refers to something -> the names that are the same in all parts."""
+HOLDERS: Final[Mapping[str, tuple[str, ...]]] = {
+    **dict.fromkeys(("body", "end", "side"), ("bodies",)),
+    "carrier": ("bodies", "shells"),
+    "node": ("thermal",),
+    **dict.fromkeys(JOINTS, ("joints",)),
+    "tendon": ("tendons",),
+    "surface": ("surfaces",),
+}
+"""Kind of a name -> the sections that have what it refers to, as scenes do; files may name beams for sides."""
 POSITIVE, NON_NEGATIVE = (0.0, True), (0.0, False)
 """A lower bound, and whether it is excluded."""
 
@@ -120,62 +129,88 @@ POSE: Final = NumberForm(length=1, ahead=4, count=7)
 TWIST: Final = NumberForm(time=-1, length=1, ahead=3, count=6)
 
 
-class Measured(ABC):  # noqa: B024 - what differs are values
-    """Something with numbers.
+class SceneElement(ABC):
+    """Something in a scene: its numbers, and the names to which it refers.
 
     Attributes
     ----------
     numbers, names
-        Attributes with a `NumberForm`; attributes that name elements, and of which kind.
+        Attributes that are numbers, and their dimensions; attributes that name elements, and of which kind.
+    frames
+        Attributes that are points, and the attributes that have their bodies.
     """
 
     __slots__ = ()
     numbers: ClassVar[Mapping[str, NumberForm]] = {}
     names: ClassVar[Mapping[str, str]] = {}
+    frames: ClassVar[Mapping[str, str]] = {}
+
+    @abstractmethod
+    def changed(self, **keys: Any) -> Self:
+        """Itself with other values at some attributes, which are not checked."""
+
+    @abstractmethod
+    def _inside(self, path: str) -> Self:
+        """Itself with a path in front of its own name."""
+
+    def references(self) -> Iterator[tuple[str, str, str]]:
+        """Attribute, kind and name of all that it names."""
+        for key, kind in self.names.items():
+            given: Any = getattr(self, key, None)
+            if isinstance(given, str):
+                yield key, kind, given
+            else:
+                yield from ((f"{key}[{i}]", kind, each) for i, each in enumerate(given or ()))
+
+    def named(self, kind: str) -> tuple[str, ...]:
+        """The names of a kind to which it refers."""
+        return tuple(name for _, of, name in self.references() if of == kind)
+
+    def seen(self, path: str) -> Self:
+        """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
+        if not path:
+            return self
+        changes: dict[str, Any] = {}
+        for key, kind in self.names.items():
+            same, given = OUTSIDE[kind], getattr(self, key)
+            if isinstance(given, str):
+                changes[key] = given if given in same else path + given
+            elif given is not None:
+                changes[key] = type(given)(each if each in same else path + each for each in given)
+        return self.changed(**changes)._inside(path)
+
+    def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
+        """The same in other units; ``coordinates`` are those of its coordinates, or of its joints'."""
+        changes: dict[str, Any] = {}
+        for key, number in (dict.fromkeys(self.frames, NumberForm(length=1)) | dict(self.numbers)).items():
+            given = getattr(self, key)
+            if given is None:
+                continue
+            first = len(coordinates) - len(np.atleast_1d(given))
+            if number.others and number.each != first:
+                number = replace(number, each=first)
+            found = np.asarray(given, dtype=float) * number.unit(length, mass, time, coordinates)
+            changes[key] = frozen(found) if isinstance(given, np.ndarray) else found.tolist()
+        return self.changed(**changes)
+
+
+class Measured(SceneElement):
+    """An element whose attributes are resolved: a dataclass, whose annotations have a `NumberForm` or are `Named`."""
+
+    __slots__ = ()
 
     def __init_subclass__(cls) -> None:
         given = get_annotations(cls).items()
         cls.numbers = {key: of for key, annotation in given if (of := part_of(annotation, NumberForm))}
         cls.names = {key: of.kind for key, annotation in given if (of := part_of(annotation, Named))}
 
+    def changed(self, **keys: Any) -> Self:
+        return replace(self, **keys)  # pyright: ignore[reportArgumentType] - all are dataclasses
+
+    def _inside(self, path: str) -> Self:
+        return self.changed(name=path + getattr(self, "name"))  # noqa: B009 - all that have names are in sections
+
     def values(self, coordinates: int = 0) -> dict[str, tuple[Any, tuple[int, ...]]]:
         """Its numbers with their required shapes, without omitted ones."""
         given = {key: (getattr(self, key), number.shape(coordinates)) for key, number in self.numbers.items()}
         return {key: pair for key, pair in given.items() if pair[0] is not None}
-
-    def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
-        """The same in other units; ``coordinates`` are those of its coordinates, or of its joints'."""
-        changed: dict[str, Any] = {}
-        for key, (value, _) in self.values().items():
-            found = value * self.numbers[key].unit(length, mass, time, coordinates)
-            changed[key] = frozen(found) if isinstance(value, np.ndarray) else float(found)
-        return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all are dataclasses
-
-
-class SceneElement(Measured):
-    """Something in a scene that has a name."""
-
-    __slots__ = ()
-    name: str
-
-    def named(self, kind: str) -> tuple[str, ...]:
-        """The names of a kind to which it refers."""
-        given: list[str | tuple[str, ...] | None] = [getattr(self, key) for key, of in self.names.items() if of == kind]
-        return tuple(name for one in given for name in ((one,) if isinstance(one, str) else one or ()))
-
-    def seen(self, path: str) -> Self:
-        """Itself with names as seen from outside of the part at a path, which ends in a dot; itself at none."""
-        if not path:
-            return self
-        if not self.names:
-            return replace(self, name=path + self.name)  # pyright: ignore[reportArgumentType] - all are dataclasses
-
-        def dotted(name: str, kind: str) -> str:
-            return name if name in OUTSIDE[kind] else path + name
-
-        changed: dict[str, Any] = {"name": path + self.name}
-        for key, kind in self.names.items():
-            own: str | tuple[str, ...] | None = getattr(self, key)
-            if own is not None:
-                changed[key] = dotted(own, kind) if isinstance(own, str) else tuple(dotted(name, kind) for name in own)
-        return replace(self, **changed)  # pyright: ignore[reportArgumentType] - all are dataclasses

@@ -5,7 +5,7 @@ remembered as spoiled, so that the checks after this one can look at the rest of
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, final, get_args
 
@@ -33,26 +33,26 @@ _NEUTRAL: dict[str, Any] = {
     "section": SectionEntry(),
 }
 
-_EXPECTED: dict[str, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
-    "float_type": lambda ctx: ("type", "a number"),
-    "int_type": lambda ctx: ("type", "a whole number"),
-    "string_type": lambda ctx: ("type", "a text in quotes"),
-    "string_too_short": lambda ctx: ("range", "a text that is not empty"),
-    "bool_type": lambda ctx: ("type", "true or false"),
-    "list_type": lambda ctx: ("type", "a list"),
-    "numbers": lambda ctx: ("type", "a number or a list of numbers"),
-    "limits": lambda ctx: ("range", "[lower, upper], lower < upper, nan for none"),
-    "ordered": lambda ctx: ("range", "[lower, upper], lower ≤ upper"),
-    "inertia_length": lambda ctx: ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
-    "rotation": lambda ctx: ("range", FORMS),
-    "rotation_type": lambda ctx: ("type", f"a unit quaternion [w, x, y, z], or a table with {FORMS}"),
-    "points_length": lambda ctx: ("length", f"4 to {ctx['most']} points"),
-    "too_short": lambda ctx: ("length", f"{ctx['min_length']} entries"),
-    "too_long": lambda ctx: ("length", f"{ctx['max_length']} entries"),
-    "greater_than": lambda ctx: ("range", f"a number above {ctx['gt']:g}"),
-    "greater_than_equal": lambda ctx: ("range", f"a number not below {ctx['ge']:g}"),
-    "less_than_equal": lambda ctx: ("range", f"a number not above {ctx['le']:g}"),
-    "literal_error": lambda ctx: ("range", str(ctx["expected"])),
+_EXPECTED: Mapping[str, tuple[str, str]] = {
+    "float_type": ("type", "a number"),
+    "int_type": ("type", "a whole number"),
+    "string_type": ("type", "a text in quotes"),
+    "string_too_short": ("range", "a text that is not empty"),
+    "bool_type": ("type", "true or false"),
+    "list_type": ("type", "a list"),
+    "numbers": ("type", "a number or a list of numbers"),
+    "limits": ("range", "[lower, upper], lower < upper, nan for none"),
+    "ordered": ("range", "[lower, upper], lower ≤ upper"),
+    "inertia_length": ("length", "3 or 6 numbers: xx yy zz [xy xz yz]"),
+    "rotation": ("range", FORMS),
+    "rotation_type": ("type", f"a unit quaternion [w, x, y, z], or a table with {FORMS}"),
+    "points_length": ("length", "4 to {most} points"),
+    "too_short": ("length", "{min_length} entries"),
+    "too_long": ("length", "{max_length} entries"),
+    "greater_than": ("range", "a number above {gt:g}"),
+    "greater_than_equal": ("range", "a number not below {ge:g}"),
+    "less_than_equal": ("range", "a number not above {le:g}"),
+    "literal_error": ("range", "{expected}"),
 }
 
 
@@ -151,8 +151,8 @@ def _translate(model: type[EntryTable], key: str, item: Any) -> Fault:
     if code in ("model_type", "dict_type", "model_attributes_type"):
         return fault("table", path, found)
     if code in _EXPECTED:
-        text, what = _EXPECTED[code](context)
-        return fault(text, path, found, what=what)
+        text, what = _EXPECTED[code]
+        return fault(text, path, found, what=what.format_map(context))
     return fault("type", path, found, what=item["msg"])
 
 

@@ -361,13 +361,6 @@ def listing(names: Iterable[str], limit: int = 12) -> str:
     return ", ".join(known[:limit]) + (", …" if len(known) > limit else "") if known else "nothing"
 
 
-def unknown(kind: str, key: str, name: str, known: Iterable[str]) -> Fault:
-    """The fault of a reference to an element that is not there."""
-    names = list(known)
-    hint = did_you_mean(name, names, f"there are: {listing(names)}")
-    return fault(f"unknown {kind}", key, f'"{name}"', hint=hint)
-
-
 def unknown_name(what: str, name: str, known: Iterable[str], scene: str = "scene") -> SceneError:
     """The error for an unknown body or joint of a scene."""
     names = list(known)

@@ -5,10 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.inertia import impossible, moments_text
+from ephs.mechanics.scene.joints import DryEntry
 from ephs.mechanics.scene.layers import LAYER_NUMBERS, layer_number
 from ephs.mechanics.scene.model import (
     ATTACHED,
@@ -16,6 +19,7 @@ from ephs.mechanics.scene.model import (
     GROUND,
     IDENTITY_POSE,
     KINDS,
+    Body,
     Joint,
     Scene,
     World,
@@ -25,15 +29,12 @@ from ephs.mechanics.scene.model import (
 )
 from ephs.mechanics.scene.motions import changed
 from ephs.mechanics.scene.registry import REGISTERED
+from ephs.mechanics.scene.shells import ShellSheet
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.decompositions import symmetric_eigenvalues
 from ephs.semantics.spaces.rank import INERTIA
-
-
-def _sound(_scene: Scene, _name: str, _before: Scene) -> list[Fault]:
-    return []
 
 
 @final
@@ -62,7 +63,7 @@ class NumberField:
     least: tuple[float, bool] | None = None
     spread: bool = False
     moves: str = ""
-    faults: Callable[[Scene, str, Scene], list[Fault]] = _sound
+    faults: Callable[[Scene, str, Scene], list[Fault]] = lambda *_: []
     table: bool = False
 
 
@@ -72,12 +73,14 @@ def placed(scene: Scene, before: Scene, coordinates: Mapping[str, Array], rates:
     joints = dict(before.all_joints())
     for name, joint in joints.items():
         kept = {"coordinate": joint.coordinate, "rate": joint.rate}
-        scene = _edited(scene, "joints", name, lambda j, kept=kept: replace(j, **kept))
+        scene = _edited(scene, "joints", name, lambda j, kept=kept: j.changed(**kept))
     return scene.with_state(coordinates, rates, adjust=True)
 
 
 def _edited(scene: Scene, kind: str, name: str, change: Callable[[Any], Any]) -> Scene:
-    """The scene with one of its elements changed, in any part."""
+    """The scene with one of its elements changed, in any part; its world in all."""
+    if kind == "world":
+        return mapped(scene, {}, change(scene.world))
     own = scene.section(kind)
     if name in own:
         return with_sections(scene, {kind: {**own, name: change(own[name])}})
@@ -86,6 +89,9 @@ def _edited(scene: Scene, kind: str, name: str, change: Callable[[Any], Any]) ->
 
 
 def _element(scene: Scene, kind: str, name: str) -> Any:
+    """An element of any part, its names as seen from there; the world."""
+    if kind == "world":
+        return scene.world
     own = scene.section(kind)
     if name in own:
         return own[name]
@@ -93,33 +99,29 @@ def _element(scene: Scene, kind: str, name: str) -> Any:
     return _element(scene.parts[part], kind, rest)
 
 
+def _within(
+    kind: str, read: Callable[[Any], ArrayLike], write: Callable[[Any, Array], Any], **more: Any
+) -> NumberField:
+    """Numbers of an element that depend on it alone: read from it, and written to it."""
+    return NumberField(
+        lambda scene, name: np.array(read(_element(scene, kind, name)), dtype=float),
+        lambda scene, name, values: _edited(scene, kind, name, lambda of: write(of, values)),
+        **more,
+    )
+
+
 def _attribute(kind: str, key: str, **more: Any) -> NumberField:
     """A number or an array that is an attribute."""
 
-    def get(scene: Scene, name: str) -> Array:
-        value = getattr(_element(scene, kind, name), key)
-        return np.zeros(0) if value is None else np.asarray(value, dtype=float)
+    def read(of: Any) -> Any:
+        value = getattr(of, key)
+        return () if value is None else value
 
-    def replaced(scene: Scene, name: str, values: Array) -> Scene:
-        def edited(thing: Any) -> Any:
-            if isinstance(thing, Element):
-                return thing.changed(**{key: values.tolist()})
-            return replace(thing, **{key: frozen(values) if values.ndim else float(values)})
+    def write(of: Any, values: Array) -> Any:
+        return of.changed(**{key: frozen(values) if isinstance(getattr(of, key), np.ndarray) else values.tolist()})
 
-        return _edited(scene, kind, name, edited)
-
-    return NumberField(get, replaced, {**ELEMENTS, **REGISTERED}[kind].numbers[key].least, **more)
-
-
-def _world(key: str) -> NumberField:
-    """A number of the world, which is the same in all parts."""
-
-    def replaced(scene: Scene, _: str, values: Array) -> Scene:
-        return mapped(scene, {}, replace(scene.world, **{key: frozen(values) if values.ndim else float(values)}))
-
-    return NumberField(
-        lambda scene, _: np.asarray(getattr(scene.world, key), dtype=float), replaced, World.numbers[key].least
-    )
+    numbers = ({"world": World} | dict(ELEMENTS) | REGISTERED)[kind].numbers
+    return _within(kind, read, write, least=numbers[key].least, **more)
 
 
 # ---- bodies ------------------------------------------------------------------------------------------------------
@@ -127,31 +129,18 @@ def _world(key: str) -> NumberField:
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-def _inertia(scene: Scene, name: str) -> Array:
-    return np.array([_element(scene, "bodies", name).inertia[at] for at in _SIX])
-
-
-def _put_inertia(scene: Scene, name: str, values: Array) -> Scene:
+def _inertia(body: Body, values: Array) -> Body:
     xx, yy, zz, xy, xz, yz = values.tolist()
-    tensor = frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return _edited(scene, "bodies", name, lambda body: replace(body, inertia=tensor))
+    return body.changed(inertia=frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
 def _body_faults(scene: Scene, name: str, before: Scene) -> list[Fault]:
     """An inertia that no mass distribution has."""
     body, key = scene.body(name), f"bodies.{name}.inertia"
-    moments = symmetric_eigenvalues(body.inertia)
-    slack = INERTIA * float(np.abs(moments).max())
-    text = "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
-    if body.mass == 0.0 and body.inertia.any():
-        return [fault("massless", key, text)]
-    if moments[0] < -slack:
-        return [fault("inertia indefinite", key, text)]
-    old = symmetric_eigenvalues(before.body(name).inertia)
-    sound = old[2] <= old[0] + old[1] + INERTIA * float(np.abs(old).max())
-    if sound and moments[2] > moments[0] + moments[1] + slack:
-        return [fault("inertia triangle", key, text)]
-    return []
+    wrong = "massless" if body.mass == 0.0 and body.inertia.any() else impossible(body.inertia)
+    if not wrong or (wrong == "inertia triangle" and impossible(before.body(name).inertia)):
+        return []
+    return [fault(wrong, key, moments_text(body.inertia))]
 
 
 def _put_position(scene: Scene, name: str, values: Array) -> Scene:
@@ -163,7 +152,7 @@ def _put_position(scene: Scene, name: str, values: Array) -> Scene:
     twist = np.array(body.twist)
     if joints:
         twist[3:] += np.cross(twist[:3], shift)
-    scene = _edited(scene, "bodies", name, lambda b: replace(b, pose=frozen(pose), twist=frozen(twist)))
+    scene = _edited(scene, "bodies", name, lambda b: b.changed(pose=frozen(pose), twist=frozen(twist)))
     back = np.concatenate([IDENTITY_POSE[:4], -shift])
     for joint in joints:
         frames = {
@@ -171,24 +160,8 @@ def _put_position(scene: Scene, name: str, values: Array) -> Scene:
             for key, at in (("frame1", joint.body1), ("frame2", joint.body2))
             if at == name
         }
-        scene = _edited(scene, "joints", joint.name, lambda j, frames=frames: replace(j, **frames))
+        scene = _edited(scene, "joints", joint.name, lambda j, frames=frames: j.changed(**frames))
     return scene
-
-
-def _velocity(scene: Scene, name: str) -> Array:
-    body = scene.body(name)
-    return so3.quaternion_to_matrix(body.pose[:4]) @ body.twist[3:]
-
-
-def _put_velocity(scene: Scene, name: str, values: Array) -> Scene:
-    body = scene.body(name)
-    twist = frozen(body_twist(body.pose, values, body.twist[:3]))
-    return _edited(scene, "bodies", name, lambda b: replace(b, twist=twist))
-
-
-def _put_spin(scene: Scene, name: str, values: Array) -> Scene:
-    twist = frozen(np.concatenate([values, scene.body(name).twist[3:]]))
-    return _edited(scene, "bodies", name, lambda b: replace(b, twist=twist))
 
 
 def _free_only(key: str) -> Callable[[Scene, str, Scene], list[Fault]]:
@@ -221,49 +194,34 @@ def _put_at(scene: Scene, name: str, values: Array) -> Scene:
         frame = np.array(getattr(joint, key))
         frame[4:] += so3.quaternion_to_matrix(_pose(scene, body)[:4]).T @ by
         frames[key] = frozen(frame)
-    return _edited(scene, "joints", name, lambda j: replace(j, **frames))
+    return _edited(scene, "joints", name, lambda j: j.changed(**frames))
 
 
 def _frame(key: str) -> NumberField:
-    def replaced(scene: Scene, name: str, values: Array) -> Scene:
-        frame = np.concatenate([getattr(scene.joint(name), key)[:4], values])
-        return _edited(scene, "joints", name, lambda j: replace(j, **{key: frozen(frame)}))
+    def write(joint: Joint, values: Array) -> Joint:
+        return joint.changed(**{key: frozen([*getattr(joint, key)[:4], *values])})
 
-    return NumberField(lambda scene, name: np.array(getattr(scene.joint(name), key)[4:]), replaced, moves="frame")
-
-
-def _coordinate(scene: Scene, name: str) -> Array:
-    joint = scene.joint(name)
-    return coupling_of(joint).coordinates(joint.coordinate)
-
-
-def _put_coordinate(scene: Scene, name: str, values: Array) -> Scene:
-    element = frozen(coupling_of(scene.joint(name)).element(values))
-    return _edited(scene, "joints", name, lambda j: replace(j, coordinate=element))
+    return _within("joints", lambda joint: getattr(joint, key)[4:], write, moves="frame")
 
 
 def _law(law: str, key: str, change: Callable[[Joint, str, float], Joint], moves: str = "") -> NumberField:
     """A number of a joint's prescribed motion or dry friction, if there is one."""
 
-    def get(scene: Scene, name: str) -> Array:
-        of: Any = getattr(scene.joint(name), law)
-        number = None if of is None else dict(of.numbers).get(key)
-        return np.zeros(0) if number is None else np.array([number])
+    def read(joint: Joint) -> ArrayLike:
+        of: Any = getattr(joint, law)
+        return [number for name, number in of.numbers if name == key] if of is not None else ()
 
-    def replaced(scene: Scene, name: str, values: Array) -> Scene:
-        return _edited(scene, "joints", name, lambda joint: change(joint, key, float(values[0])))
-
-    return NumberField(get, replaced, moves=moves)
+    return _within("joints", read, lambda joint, values: change(joint, key, float(values[0])), moves=moves)
 
 
 def _led(joint: Joint, key: str, value: float) -> Joint:
     law = changed(joint.motion, key, value)
-    return replace(joint, motion=law, rate=frozen(np.array([law.rate(0.0)])))
+    return joint.changed(motion=law, rate=frozen([law.rate(0.0)]))
 
 
 def _rubbed(joint: Joint, key: str, value: float) -> Joint:
     assert joint.dry is not None
-    return replace(joint, dry=replace(joint.dry, **{key: value}))
+    return joint.changed(dry=replace(joint.dry, **{key: value}))
 
 
 def _stiffness_faults(scene: Scene, name: str, _before: Scene) -> list[Fault]:
@@ -300,19 +258,16 @@ def _registered(kind: type[Element]) -> dict[str, NumberField]:
 def _of_layers(key: str) -> NumberField:
     """A number of each layer of a shell."""
 
-    def get(scene: Scene, name: str) -> Array:
-        return np.array([layer_number(layer, key) for layer in _element(scene, "shells", name).layers or ()])
+    def read(sheet: ShellSheet) -> list[float]:
+        return [layer_number(layer, key) for layer in sheet.layers or ()]
 
-    def replaced(scene: Scene, name: str, values: Array) -> Scene:
-        def edited(sheet: Any) -> Any:
-            pairs = zip(sheet.layers, values.tolist(), strict=True)
-            # what is not given keeps its default, which may be another number of the layer
-            layers = [layer if layer_number(layer, key) == value else {**layer, key: value} for layer, value in pairs]
-            return sheet.changed(layers=layers)
+    def write(sheet: ShellSheet, values: Array) -> ShellSheet:
+        pairs = zip(sheet.layers or (), values.tolist(), strict=True)
+        # what is not given keeps its default, which may be another number of the layer
+        layers = [layer if layer_number(layer, key) == value else {**layer, key: value} for layer, value in pairs]
+        return sheet.changed(layers=layers)
 
-        return _edited(scene, "shells", name, edited)
-
-    return NumberField(get, replaced, faults=_table_faults("shells"), table=True)
+    return _within("shells", read, write, faults=_table_faults("shells"), table=True)
 
 
 def fields_of(kind: str) -> Mapping[str, NumberField]:
@@ -321,24 +276,37 @@ def fields_of(kind: str) -> Mapping[str, NumberField]:
 
 
 FIELDS: Mapping[str, Mapping[str, NumberField]] = {
-    "world": {key: _world(key) for key in World.numbers},
+    "world": {key: _attribute("world", key) for key in World.numbers},
     "bodies": {
         "mass": _attribute("bodies", "mass", faults=_body_faults),
-        "inertia": NumberField(_inertia, _put_inertia, faults=_body_faults),
+        "inertia": _within("bodies", lambda body: [body.inertia[at] for at in _SIX], _inertia, faults=_body_faults),
         "position": NumberField(lambda scene, name: np.array(scene.body(name).pose[4:]), _put_position),
-        "angular_velocity": NumberField(
-            lambda scene, name: np.array(scene.body(name).twist[:3]), _put_spin, faults=_free_only("angular_velocity")
+        "angular_velocity": _within(
+            "bodies",
+            lambda body: body.twist[:3],
+            lambda body, values: body.changed(twist=frozen([*values, *body.twist[3:]])),
+            faults=_free_only("angular_velocity"),
         ),
-        "velocity": NumberField(_velocity, _put_velocity, faults=_free_only("velocity")),
+        "velocity": _within(
+            "bodies",
+            lambda body: so3.quaternion_to_matrix(body.pose[:4]) @ body.twist[3:],
+            lambda body, values: body.changed(twist=frozen(body_twist(body.pose, values, body.twist[:3]))),
+            faults=_free_only("velocity"),
+        ),
     },
     "joints": {
         "pitch": _attribute("joints", "pitch", moves="frame"),
         "friction": _attribute("joints", "friction", spread=True, faults=_friction_faults),
-        **{f"dry.{key}": _law("dry", key, _rubbed) for key in ("coulomb", "static", "stribeck", "slip")},
+        **{f"dry.{key}": _law("dry", key, _rubbed) for key in DryEntry.model_fields},
         "stiffness": _attribute("joints", "stiffness", spread=True, faults=_stiffness_faults),
         "rest": _attribute("joints", "rest", faults=_stiffness_faults),
         "drive": _attribute("joints", "drive"),
-        "coordinate": NumberField(_coordinate, _put_coordinate, moves="state"),
+        "coordinate": _within(
+            "joints",
+            lambda joint: coupling_of(joint).coordinates(joint.coordinate),
+            lambda joint, values: joint.changed(coordinate=frozen(coupling_of(joint).element(values))),
+            moves="state",
+        ),
         **{f"motion.{key}": _law("motion", key, _led, "state") for key in ("rate", "amplitude", "frequency", "phase")},
         "rate": _attribute("joints", "rate", moves="state"),
         "at": NumberField(_joint_origin, _put_at, moves="frame"),

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias, final
 
 from pydantic import Field, create_model
 
-from ephs.mechanics.scene.element import Measured, Named, SceneElement
+from ephs.mechanics.scene.element import ENVIRONMENT, Measured, Named
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.schema_numbers import EntryTable, NonNegative, Number, Positive, Text, Vector, key
 from ephs.mechanics.scene.sections import SectionEntry
@@ -38,7 +38,7 @@ class Strain(Measured):
 
 @final
 @dataclass(frozen=True, slots=True)
-class Beam(SceneElement):
+class Beam(Measured):
     """A rod: its nodes are the bodies ``NAME.0`` … ``NAME.n``, its elements the joints ``NAME-1`` … ``NAME-n``.
 
     Attributes
@@ -83,39 +83,41 @@ class RodSurfaceEntry(ContactLaw):
     radius: Positive | None = key("radius of the surface, m; default: that of a circle or tube", None)
 
 
-_Vector: TypeAlias = Vector | None
-_Points: TypeAlias = Annotated[list[Vector], Field(min_length=2)] | None
-_Count: TypeAlias = Annotated[int, Field(strict=True, ge=1)] | None
-_Strain: TypeAlias = Annotated[list[Number], Field(min_length=6, max_length=6)] | None
-_BEAM: dict[str, Any] = {
-    "from": (_Vector, key("start point, world coordinates, m", None)),
-    "to": (_Vector, key("end point, world coordinates, m", None)),
-    "points": (_Points, key("points on a curve, instead of from and to, with a node at each, m", None)),
-    "up": (_Vector, key("world direction of axis 2 of the section, made normal to the tangent", None)),
-    "elements": (_Count, key("number of elements, the same between any two points; 1 there unless given", None)),
-    "order": (
-        Literal[2, 4],
-        key("order of convergence in the element length, for statics and for the motion of thin beams", 2),
-    ),
-    "rod": (
-        Literal["reissner", "kirchhoff", "string"],
-        key("kirchhoff: inextensible and without shear; string: also without bending and torsion", "reissner"),
-    ),
-    "section": (SectionEntry, key("stiffness and inertia per length")),
-    "strain": (_Strain, key("initial strain: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3", None)),
-    "damping": (NonNegative, key("Kelvin–Voigt damping time, s", 0.0)),
-    "heat": (Text, key("where the heat of damping goes: a thermal name", "environment")),
-    "thermal": (RodHeatEntry | None, key("instead of heat: a thermal node NAME-i for each element", None)),
-    "ends": (
-        Annotated[list[Text], Field(max_length=2)],
-        key('supports of the first and last node: a body to which it is welded, "ground" or "free"', []),
-    ),
-    "surface": (
-        RodSurfaceEntry | None,
-        key("round surface for contact; each node NAME.i has a surface of that name", None),
-    ),
-    "velocity": (_Vector, key("velocity of the first node, world basis, m/s", None)),
-    "angular_velocity": (_Vector, key("angular velocity of the whole beam, world basis, rad/s", None)),
-}
-# A class cannot have `from` as a name.
-BeamEntry: Any = create_model("BeamEntry", __base__=EntryTable, __doc__="``[beams.NAME]``", **_BEAM)
+_Start: TypeAlias = Vector | None
+_FROM: dict[str, Any] = {"from": (_Start, key("start point, world coordinates, m", None))}
+_From: Any = create_model("_From", __base__=EntryTable, **_FROM)
+"""A class statement cannot have `from` as a name."""
+
+
+class BeamEntry(_From):
+    """``[beams.NAME]``"""
+
+    to: Vector | None = key("end point, world coordinates, m", None)
+    points: Annotated[list[Vector], Field(min_length=2)] | None = key(
+        "points on a curve, instead of from and to, with a node at each, m", None
+    )
+    up: Vector | None = key("world direction of axis 2 of the section, made normal to the tangent", None)
+    elements: Annotated[int, Field(strict=True, ge=1)] | None = key(
+        "number of elements, the same between any two points; 1 there unless given", None
+    )
+    order: Literal[2, 4] = key(
+        "order of convergence in the element length, for statics and for the motion of thin beams", 2
+    )
+    rod: Literal["reissner", "kirchhoff", "string"] = key(
+        "kirchhoff: inextensible and without shear; string: also without bending and torsion", "reissner"
+    )
+    section: SectionEntry = key("stiffness and inertia per length")
+    strain: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = key(
+        "initial strain: torsion, bending about 2, 3 in 1/m, stretch, shear along 2, 3", None
+    )
+    damping: NonNegative = key("Kelvin–Voigt damping time, s", 0.0)
+    heat: Text = key("where the heat of damping goes: a thermal name", ENVIRONMENT)
+    thermal: RodHeatEntry | None = key("instead of heat: a thermal node NAME-i for each element", None)
+    ends: Annotated[list[Text], Field(max_length=2)] = key(
+        'supports of the first and last node: a body to which it is welded, "ground" or "free"', []
+    )
+    surface: RodSurfaceEntry | None = key(
+        "round surface for contact; each node NAME.i has a surface of that name", None
+    )
+    velocity: Vector | None = key("velocity of the first node, world basis, m/s", None)
+    angular_velocity: Vector | None = key("angular velocity of the whole beam, world basis, rad/s", None)

@@ -1,18 +1,24 @@
-"""Physically impossible inertia tensors: refused, kept, or corrected.
+"""Mass and inertia of bodies: of homogeneous shapes, and physically impossible ones: refused, kept, or corrected.
 
-Files of real robots have them: rounded, copied, left at zero. Their motion may be determined all the same.
+Files of real robots have impossible ones: rounded, copied, left at zero. Their motion may be determined all the same.
 """
 
-from typing import Any
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.errors import Fault, fault, shown
 from ephs.mechanics.scene.values import TOLERANCE
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen, symmetric_eigenvalues
+from ephs.semantics.spaces.rank import INERTIA
+from ephs.semantics.spaces.rotations import quaternion_to_matrix
+
+if TYPE_CHECKING:
+    from ephs.mechanics.scene.bodies import BodyEntry, ShapeEntry
 
 TINY = 1e-11
 """Kinetic energy is a function of momentum only where no principal moment is zero: one that is counts as this much of
@@ -42,21 +48,21 @@ def mass_and_inertia(
         return mass, tensor
     if not tensor.any() and mass == 0.0:
         return mass, tensor
-    principal = symmetric_eigenvalues(tensor)
-    wrong = _wrong(principal)
+    wrong = impossible(tensor)
     if strict:
+        principal = symmetric_eigenvalues(tensor)
         if not wrong and principal[0] <= 0.1 * TINY * principal[2]:
             wrong = "inertia singular"
         if wrong:
-            table.fault(wrong, "inertia", _text(principal))
+            table.fault(wrong, "inertia", moments_text(tensor))
         return mass, tensor
     if wrong and mode == "nearest":
-        tensor = nearest_inertia(tensor)
-        odd.append(fault("inertia nearest", where, _text(principal), taken=_text(symmetric_eigenvalues(tensor))))
+        nearest = nearest_inertia(tensor)
+        odd.append(fault("inertia nearest", where, moments_text(tensor), taken=moments_text(nearest)))
+        tensor = nearest
     mass, tensor = _regular(mass, tensor, table.key, odd)
-    principal = symmetric_eigenvalues(tensor)
-    if mode == "warn" and _wrong(principal):
-        odd.append(fault("inertia kept", where, _text(principal)))
+    if mode == "warn" and impossible(tensor):
+        odd.append(fault("inertia kept", where, moments_text(tensor)))
     return mass, tensor
 
 
@@ -71,8 +77,10 @@ def nearest_inertia(tensor: Array) -> Array:
     return np.trace(second) * np.eye(3) - second
 
 
-def _wrong(moments: NDArray[Any]) -> str:
-    slack = TOLERANCE * float(np.abs(moments).max())
+def impossible(tensor: Array) -> str:
+    """Code of the fault of an inertia (3, 3) that no distribution of mass has; empty where one has it."""
+    moments = symmetric_eigenvalues(tensor)
+    slack = INERTIA * float(np.abs(moments).max())
     if moments[0] < -slack:
         return "inertia indefinite"
     return "inertia triangle" if moments[2] > moments[0] + moments[1] + slack else ""
@@ -90,11 +98,89 @@ def _regular(mass: float, tensor: Array, key: str, odd: list[Fault]) -> tuple[fl
         return mass, tensor
     small = np.abs(moments) < least
     if small.any():
-        odd.append(fault("inertia zero", f"{key}.inertia", _text(moments), least=least))
+        odd.append(fault("inertia zero", f"{key}.inertia", moments_text(tensor), least=least))
         tensor = (axes * np.where(small, least, moments)) @ axes.T
         tensor = 0.5 * (tensor + tensor.T)
     return mass, tensor
 
 
-def _text(moments: NDArray[Any]) -> str:
-    return "principal moments " + ", ".join(f"{moment:.6g}" for moment in moments)
+def moments_text(tensor: Array) -> str:
+    """The principal moments of an inertia (3, 3) in words."""
+    return "principal moments " + ", ".join(f"{moment:.6g}" for moment in symmetric_eigenvalues(tensor))
+
+
+# ---- homogeneous shapes ----------------------------------------------------------------------------------------------
+
+
+def mass_and_moments(table: "Checked[BodyEntry]") -> tuple[float, list[float]] | None:
+    """Mass, and inertia as xx yy zz [xy xz yz], of a body, specified or by its shapes; None after a fault."""
+    entry = table.entry
+    if not table.sound("inertia", "density", "shape", "shapes"):
+        return None
+    if entry.density is not None:
+        twice = [name for name in ("mass", "inertia") if getattr(entry, name) is not None]
+        if twice:
+            table.fault("density", "density", f"density and {' and '.join(twice)}")
+            return None
+    elif entry.mass is None and table.sound("mass"):
+        _lack(table, "mass")
+        return None
+    mass = entry.mass if table.sound("mass") else 1.0
+    if entry.inertia is not None:
+        return mass or 0.0, entry.inertia
+    shapes = [entry.shape] if entry.shape is not None else entry.shapes or []
+    if not shapes:
+        if entry.density is None:
+            _lack(table, "inertia")
+        else:
+            table.fault("density shape", found="no shape")
+        return None
+    return _homogeneous(table, shapes, mass)
+
+
+def _lack(table: "Checked[BodyEntry]", name: str) -> None:
+    table.fault("missing", name, "nothing", what=type(table.entry).model_fields[name].description)
+
+
+def _homogeneous(
+    table: "Checked[BodyEntry]", shapes: "Sequence[ShapeEntry]", mass: float | None
+) -> tuple[float, list[float]] | None:
+    """The same for the union of disjoint shapes, whose centre of mass must be the origin of the body's frame."""
+    volumes, tensors, places = [], [], []
+    for shape in shapes:
+        found = _solid(shape)
+        if found is None:
+            table.fault("density shape", found="a mesh" if shape.mesh else "an empty shape")
+            return None
+        turn = quaternion_to_matrix(np.array(shape.rotation or [1.0, 0.0, 0.0, 0.0]))
+        volumes.append(found[0])
+        tensors.append(turn @ np.diag(found[1]) @ turn.T)
+        places.append(np.array(shape.position or [0.0, 0.0, 0.0]))
+    total = sum(volumes)
+    density = table.entry.density
+    whole = density * total if density is not None else mass or 0.0
+    shares = np.array(volumes) / total
+    centre = shares @ np.array(places)
+    steiner = [of + (p @ p) * np.eye(3) - np.outer(p, p) for of, p in zip(tensors, places, strict=True)]
+    tensor = np.tensordot(shares, np.array(steiner), 1)
+    if float(np.linalg.norm(centre)) > TOLERANCE * math.sqrt(float(np.trace(tensor))):
+        shift = shown([float(f"{-x:.12g}") for x in centre])
+        table.fault("centre", found=f"a centre of mass at {shown(centre.tolist())}", shift=shift)
+        return None
+    moments = whole * tensor
+    return whole, [float(moments[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+
+
+def _solid(shape: "ShapeEntry") -> tuple[float, Array] | None:
+    """Volume in m³, and principal moments (3,) a unit of mass in m²; None for a mesh."""
+    if shape.box is not None:
+        a, b, c = shape.box
+        return a * b * c, np.array([b * b + c * c, a * a + c * c, a * a + b * b]) / 12.0
+    if shape.sphere is not None:
+        r = shape.sphere
+        return 4.0 / 3.0 * math.pi * r**3, np.full(3, 0.4 * r * r)
+    if shape.cylinder is not None:
+        r, length = shape.cylinder
+        across = (3.0 * r * r + length * length) / 12.0
+        return math.pi * r * r * length, np.array([across, across, 0.5 * r * r])
+    return None

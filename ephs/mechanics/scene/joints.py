@@ -8,7 +8,7 @@ import numpy as np
 from ephs.mechanics.scene import values
 from ephs.mechanics.scene.bodies import IDENTITY_POSE, Body
 from ephs.mechanics.scene.checked import Checked
-from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, NON_NEGATIVE, POSE, Named, SceneElement, frozen
+from ephs.mechanics.scene.element import ENVIRONMENT, GROUND, NON_NEGATIVE, POSE, Measured, Named, frozen
 from ephs.mechanics.scene.element import NumberForm as Measure
 from ephs.mechanics.scene.errors import did_you_mean, shown
 from ephs.mechanics.scene.flexible import Strain
@@ -94,7 +94,7 @@ class JointEntry(EntryTable):
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
-class Joint(SceneElement):
+class Joint(Measured):
     """A joint of body 2 on body 1, through a lower pair or a universal joint.
 
     Attributes
@@ -149,24 +149,16 @@ class Joint(SceneElement):
 def free_joint(body: Body) -> Joint:
     """The implicit free joint of a body that no joint holds: of the ground and the body, both frames the
     identity."""
-    zero = frozen(np.zeros(6))
-    return Joint(
-        name=body.name,
-        kind="free",
-        body1=GROUND,
-        body2=body.name,
-        frame1=IDENTITY_POSE,
-        frame2=IDENTITY_POSE,
-        pitch=0.0,
-        friction=frozen(np.zeros((6, 6))),
-        stiffness=zero,
-        rest=zero,
-        heat=ENVIRONMENT,
-        drive=zero,
-        motion=None,
-        coordinate=body.pose,
-        rate=body.twist,
-    )
+    return bare_joint(body.name, "free", (GROUND, body.name), (IDENTITY_POSE, IDENTITY_POSE), body.pose, body.twist)
+
+
+def bare_joint(
+    name: str, kind: str, bodies: tuple[str, str], frames: tuple[Array, Array], coordinate: Array, rate: Array
+) -> Joint:
+    """A joint without spring, friction and drive: its bodies, its frames (7,) in them, its element and its rate."""
+    d = rate.size
+    zero, loss, places = frozen(np.zeros(d)), frozen(np.zeros((d, d))), (frozen(frames[0]), frozen(frames[1]))
+    return Joint(name, kind, *bodies, *places, 0.0, loss, zero, zero, ENVIRONMENT, zero, None, coordinate, rate)
 
 
 @final
@@ -206,7 +198,7 @@ def resolve_joint(table: Checked[JointEntry], names: "ReferableNames") -> tuple[
         if entry.bodies[0] == entry.bodies[1]:
             table.fault("same body", "bodies", f'"{entry.bodies[0]}" twice')
     if table.sound("heat"):
-        names.check(table, entry.heat, "heat", "thermal")
+        names.check(table, entry.heat, "heat", "node")
     if not table.sound("type"):
         return None
     if entry.type not in joint_types():
@@ -272,7 +264,7 @@ def _dry(table: Checked[JointEntry], d: int) -> Dry | None:
     if found.static is not None and found.static < found.coulomb:
         table.fault("dry static", "dry.static", coulomb=found.coulomb)
         return None
-    return Dry(found.coulomb, found.static, found.stribeck, found.slip)
+    return Dry(**dict(found))
 
 
 def _motion(table: Checked[JointEntry], d: int, drive: Array) -> MotionLaw | None:

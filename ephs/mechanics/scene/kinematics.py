@@ -6,17 +6,22 @@ The joint relation is ``q1 o1 I(x) = q2 o2``, and of twists ``Ad(o2⁻¹) u2 = A
 Source: Lohmayer, Capobianco, Leyendecker, "Exergetic Port-Hamiltonian Systems for Multibody Dynamics".
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import final
+from collections import deque
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.geometry import JointCoupling
-from ephs.mechanics.scene.model import IDENTITY_POSE
+from ephs.mechanics.scene.bodies import IDENTITY_POSE
+from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
+from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
+
+if TYPE_CHECKING:
+    from ephs.mechanics.scene.joints import Joint
 
 
 @final
@@ -75,6 +80,15 @@ class AssemblyJoint:
     motion: float | None = None
     near: Array | None = None
 
+    @staticmethod
+    def of(joint: "Joint", index: Mapping[str, int], **more: Any) -> "AssemblyJoint":
+        """A scene's joint between bodies of these numbers, its start not given; ``more`` are other attributes."""
+        found = AssemblyJoint(
+            joint.name, index[joint.body1], index[joint.body2], joint.frame1, joint.frame2, coupling_of(joint),
+            motion=None if joint.motion is None else joint.motion.rate(0.0),
+        )  # fmt: skip
+        return replace(found, **more)
+
     def first(self, poses: Array) -> Array:
         """The pose of C1 in the world."""
         return SE3.compose(pose_at(poses, self.body1), self.frame1)
@@ -118,28 +132,27 @@ class AssemblyJoint:
         rate = self.coupling.left_inverse(basis) @ relative
         return rate, relative - basis @ rate
 
-    def place_second(self, poses: Array, x: Array) -> Array:
-        """Pose of body 2 from that of body 1 and the joint's element."""
-        return self._place(self.first(poses), self.coupling.include(x), self.frame2)
+    def other(self, body: int) -> int:
+        """The body at its other end."""
+        return self.body1 if self.body2 == body else self.body2
 
-    def place_first(self, poses: Array, x: Array) -> Array:
-        """Pose of body 1 from that of body 2 and the joint's element."""
-        return self._place(self.second(poses), SE3.inverse(self.coupling.include(x)), self.frame1)
+    def placed(self, body: int, poses: Array, x: Array) -> Array:
+        """Pose of one of its bodies from that of the other and the joint's element."""
+        between = self.coupling.include(x)
+        if self.body2 == body:
+            there = SE3.compose(SE3.compose(self.first(poses), between), SE3.inverse(self.frame2))
+        else:
+            there = SE3.compose(SE3.compose(self.second(poses), SE3.inverse(between)), SE3.inverse(self.frame1))
+        return SE3.normalise(there)
 
-    def move_second(self, twists: Array, x: Array, rate: Array) -> Array:
-        """The twist of body 2 from that of body 1 and the joint's rate."""
-        rows1, _ = self.rows(x)
-        return SE3.adjoint(self.frame2) @ (self.coupling.basis(x) @ rate - rows1 @ twist(twists, self.body1))
-
-    def move_first(self, twists: Array, x: Array, rate: Array) -> Array:
-        """The twist of body 1 from that of body 2 and the joint's rate."""
-        _, rows2 = self.rows(x)
+    def moved(self, body: int, twists: Array, x: Array, rate: Array) -> Array:
+        """Twist of one of its bodies from that of the other and the joint's rate."""
+        rows1, rows2 = self.rows(x)
+        own = self.coupling.basis(x) @ rate
+        if self.body2 == body:
+            return SE3.adjoint(self.frame2) @ (own - rows1 @ twist(twists, self.body1))
         to1 = SE3.compose(self.frame1, self.coupling.include(x))
-        return SE3.adjoint(to1) @ (rows2 @ twist(twists, self.body2) - self.coupling.basis(x) @ rate)
-
-    @staticmethod
-    def _place(frame: Array, between: Array, offset: Array) -> Array:
-        return SE3.normalise(SE3.compose(SE3.compose(frame, between), SE3.inverse(offset)))
+        return SE3.adjoint(to1) @ (rows2 @ twist(twists, self.body2) - own)
 
 
 def pose_at(poses: Array, body: int) -> Array:
@@ -180,3 +193,45 @@ def largest_slip(links: Sequence[AssemblyJoint], twists: Array, xs: Sequence[Arr
             spin, speed = float(np.linalg.norm(off[:3])), float(np.linalg.norm(off[3:]))
             found = max(found, spin / scale.rate, speed / (scale.length * scale.rate))
     return found
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Hop:
+    """One step outwards: through link number ``link`` (of this name) to ``body``."""
+
+    link: int
+    name: str
+    body: int
+
+
+def spanning_hops(links: Sequence[AssemblyJoint], count: int, preferred: Container[str]) -> list[Hop]:
+    """The steps of a spanning forest, from the ground outwards: each of ``count`` bodies once, from one reached before.
+
+    Named links come into the tree before others, then those in front. A group of bodies without a way to
+    the ground is reached from its first body, which no step leads to.
+    """
+    sets = DisjointSets[int]()
+    neighbours: dict[int, list[int]] = {body: [] for body in range(-1, count)}
+    for number in sorted(range(len(links)), key=lambda i: links[i].name not in preferred):
+        if sets.join(links[number].body1, links[number].body2):
+            neighbours[links[number].body1].append(number)
+            neighbours[links[number].body2].append(number)
+
+    hops: list[Hop] = []
+    reached: set[int] = set()
+    for root in range(-1, count):
+        if root in reached:
+            continue
+        reached.add(root)
+        queue = deque([root])
+        while queue:
+            here = queue.popleft()
+            for number in neighbours[here]:
+                link = links[number]
+                there = link.other(here)
+                if there not in reached:
+                    reached.add(there)
+                    queue.append(there)
+                    hops.append(Hop(number, link.name, there))
+    return hops

@@ -16,6 +16,7 @@ from ephs.mechanics.scene.assembly import assemble
 from ephs.mechanics.scene.beams import BeamDraft, check_beam, resolve_beam
 from ephs.mechanics.scene.bodies import resolve_body
 from ephs.mechanics.scene.contacts import overlaps
+from ephs.mechanics.scene.custom import is_name
 from ephs.mechanics.scene.entries import Document, read_document
 from ephs.mechanics.scene.errors import (
     Fault,
@@ -30,7 +31,7 @@ from ephs.mechanics.scene.errors import (
 )
 from ephs.mechanics.scene.joints import Asked, resolve_joint
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, with_sections
+from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, frozen, with_sections
 from ephs.mechanics.scene.moving import moved
 from ephs.mechanics.scene.resolve_elements import (
     ReferableNames,
@@ -39,13 +40,10 @@ from ephs.mechanics.scene.resolve_elements import (
     settled,
     with_contacts,
 )
-from ephs.mechanics.scene.schema_elements import attributes
 from ephs.mechanics.scene.state import Snapshot, adjusted
 from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
 from ephs.mechanics.scene.thermal import ThermalNode
-from ephs.operad import Path as Name
-from ephs.operad import PatternError
 from ephs.operad.collector import paused_collector
 
 MODELS = (".urdf", ".xml", ".sdf")
@@ -147,15 +145,14 @@ def _read(path: Path, world: World | None, stack: tuple[Path, ...], r: _FileRead
     rods = _beams(document, world)
     parts |= {name: rod.nodes for name, rod in rods.items()}
     warm = {name for rod in rods.values() for name in rod.thermal}
-    names = _names(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
+    names = ReferableNames.of(document, parts, warm, lost | (set(sections["beams"]) - set(rods)))
     for table in sections["beams"].values():
         check_beam(table, names)
     mode = r.inertia or document.assembly.inertia
     bodies = [resolve_body(table, mode, path.parent, r.odd) for table in sections["bodies"].values()]
     joints = [resolve_joint(table, names) for table in sections["joints"].values()]
-    stores = sections["thermal"].items()
-    thermal = {name: ThermalNode(name=name, **attributes(ThermalNode, table.entry)) for name, table in stores}
-    elements = resolve_elements(document, parts, names, path.parent, faults)
+    thermal = {name: ThermalNode(name, **dict(table.entry)) for name, table in sections["thermal"].items()}
+    elements = resolve_elements(document, names, path.parent, faults)
     if faults:
         return None
     drafts = [*filter(None, joints), *(start for rod in rods.values() for start in rod.joints)]
@@ -225,7 +222,8 @@ def _parse(path: Path, r: _FileReading) -> Mapping[str, Any] | None:
 
 
 def _world(document: Document, wanted: World | None, faults: list[Fault]) -> World:
-    own = None if document.world is None else World(**attributes(World, document.world))
+    given = document.world
+    own = None if given is None else World(frozen(given.gravity), given.temperature, given.pressure)
     if wanted is None:
         return own or World()
     if own is not None and _described(own) != _described(wanted):
@@ -296,28 +294,13 @@ def _seen_from_outside(found: Fault, key: str, file: str) -> Fault:
     return replace(found, key=inner, found=f"{found.found} (in {legible(file)})")
 
 
-def _names(document: Document, parts: Mapping[str, Scene], warm: set[str], lost: set[str]) -> ReferableNames:
-    bodies = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_bodies()}
-    thermal = {f"{part}.{name}" for part, scene in parts.items() for name, _ in scene.all_thermal()}
-    sections = document.sections
-    return ReferableNames(bodies | set(sections["bodies"]), thermal | warm | set(sections["thermal"]), lost)
-
-
-def _is_name(text: str) -> bool:
-    try:
-        Name([text])
-    except PatternError:
-        return False
-    return True
-
-
 def _check_names(document: Document, faults: list[Fault]) -> None:
     """Names are path components, and no path may mean two things."""
     held = {name for table in document.sections["joints"].values() for name in table.entry.bodies}
     for section, tables in document.sections.items():
         for name in tables:
             key = f"{section}.{name}"
-            if not _is_name(name):
+            if not is_name(name):
                 faults.append(fault("name", f'{section}."{name}"', shown(name)))
             elif name in (GROUND, ENVIRONMENT):
                 faults.append(fault("reserved", key, shown(name), reserved=f'"{GROUND}" and "{ENVIRONMENT}"'))

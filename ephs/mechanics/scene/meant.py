@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ephs.mechanics.scene.adjust import across_rows, project_velocities
+from ephs.mechanics.scene.adjust import across_rows, constraints, project_velocities
 from ephs.mechanics.scene.errors import Fault, fault
 from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap
 from ephs.mechanics.scene.model import Scene, frozen, mapped
@@ -101,15 +101,22 @@ def _comes_away(links: Sequence[AssemblyJoint], poses: Array, way: Array, scale:
 
 def _matrix(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Array:
     """Constraint rows of the joints on all bodies' twists, lengths relative to the mechanism's."""
-    return np.vstack([rows for _, rows in _rows(links, poses, scale)])
+    return _equations(links, poses, scale)[0]
+
+
+def _equations(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> tuple[Array, Array]:
+    """The same, and by how much the joints are open."""
+    return constraints(links, poses, elements(links, poses), _roots(poses, scale), frozenset(), scale)
+
+
+def _roots(poses: Array, scale: Scale) -> Array:
+    return np.tile(np.diag([1.0] * 3 + [scale.length] * 3), (len(poses), 1, 1))
 
 
 def _rows(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Iterator[tuple[Array, Array]]:
     """By joint the covectors (6, k) on its relative twist, and their rows on the bodies."""
-    unit = np.diag([1.0] * 3 + [scale.length] * 3)
-    roots = np.tile(unit, (len(poses), 1, 1))
     for link, x in zip(links, elements(links, poses), strict=True):
-        yield across_rows(link, x, roots, scale)
+        yield across_rows(link, x, _roots(poses, scale), scale)
 
 
 def _followed(links: Sequence[AssemblyJoint], poses: Array, way: Array, rank: int, scale: Scale) -> list[Array]:
@@ -140,16 +147,7 @@ def _followed(links: Sequence[AssemblyJoint], poses: Array, way: Array, rank: in
 
 def _solved(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Array:
     """The change that closes joints best, along all that they clearly forbid."""
-    errors = _errors(links, poses, scale)
-    return np.asarray(least_squares(_matrix(links, poses, scale), errors, part=EXPLICIT), dtype=np.float64)
-
-
-def _errors(links: Sequence[AssemblyJoint], poses: Array, scale: Scale) -> Array:
-    xs = elements(links, poses)
-    return np.concatenate([
-        covectors.T @ link.error(poses, x)
-        for link, x, (covectors, _) in zip(links, xs, _rows(links, poses, scale), strict=True)
-    ])  # fmt: skip
+    return np.asarray(least_squares(*_equations(links, poses, scale), part=EXPLICIT), dtype=np.float64)
 
 
 def _stepped(poses: Array, change: Array, scale: Scale) -> Array:
@@ -172,7 +170,7 @@ def _movable(
                 block[:, 6 * j : 6 * j + 6] = covectors.T * unit
                 block[:, 6 * m + 6 * n * k : 6 * m + 6 * n * (k + 1)] = rows
                 blocks.append(block)
-            errors.append(_errors(links, poses, scale))
+            errors.append(_equations(links, poses, scale)[1])
         found = least_squares(np.vstack(blocks), np.concatenate(errors), part=EXPLICIT)
         change: Array = -np.asarray(found, dtype=np.float64)
         links = tuple(

@@ -265,7 +265,7 @@ class Scene:
 
 ATTACHED: Mapping[str, type[Element]] = {of.section: of for of in (Motor, Gear, Cylinder, GasSpring, Actuator)}
 """Attachments of joints, by their sections."""
-ELEMENTS: Mapping[str, type[SceneElement] | type[Element]] = {
+ELEMENTS: Mapping[str, type[SceneElement]] = {
     "bodies": Body,
     "joints": Joint,
     "springs": Spring,
@@ -292,20 +292,25 @@ def elements_of(scene: Scene) -> Iterator[Element]:
 
 
 def mapped(
-    scene: Scene, changes: Mapping[str, Callable[[str, Any], Any]], world: World | None = None, path: str = ""
+    scene: Scene,
+    changes: Mapping[str, Callable[[str, Any], Any]],
+    world: World | None = None,
+    path: str = "",
+    *,
+    origin: Callable[[Array], Array] = frozen,
 ) -> Scene:
     """The scene with its elements changed, parts included, and in another world where one is given.
 
     ``changes`` has, by section, a function that gives the changed element from the path of its level, empty or with a
-    dot at its end, and the element.
+    dot at its end, and the element; ``origin`` gives a level's pose (7,) from what it was.
     """
     made = {
         section: {name: change(path, each) for name, each in own.items()}
         for section, change in changes.items()
         if (own := scene.section(section))
     }
-    parts = {name: mapped(part, changes, world, f"{path}{name}.") for name, part in scene.parts.items()}
-    return with_sections(scene, made, parts=parts, world=world or scene.world)
+    parts = {name: mapped(part, changes, world, f"{path}{name}.", origin=origin) for name, part in scene.parts.items()}
+    return with_sections(scene, made, parts=parts, world=world or scene.world, origin=origin(scene.origin))
 
 
 def with_sections(scene: Scene, sections: Mapping[str, Mapping[str, Any]], **more: Any) -> Scene:

@@ -1,8 +1,8 @@
 """Prescribed motions of a scene file, and their numbers by path."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.errors import shown
@@ -26,52 +26,28 @@ class MotionEntry(EntryTable):
 
 
 STILL: Final = PolynomialMotion((0.0,))
-_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "rate": ("rate",),
-    "polynomial": ("polynomial",),
-    "harmonic": ("amplitude", "frequency", "phase"),
-    "table": ("times", "displacements"),
-}
-"""Form of a motion -> its keys."""
-_OPTIONAL: Final = {"phase"}
-_MAKE: Final[Mapping[str, Callable[[Any], MotionLaw]]] = {
-    "rate": lambda of: PolynomialMotion((of.rate,)),
-    "polynomial": lambda of: PolynomialMotion(tuple(of.polynomial)),
-    "harmonic": lambda of: HarmonicMotion(of.amplitude, of.frequency, of.phase or 0.0),
-    "table": lambda of: TabulatedMotion(tuple(of.times), tuple(of.displacements)),
-}
+_FORMS: Final[tuple[tuple[str, Callable[..., MotionLaw]], ...]] = (
+    ("rate", lambda rate: PolynomialMotion((rate,))),
+    ("polynomial", lambda polynomial: PolynomialMotion(tuple(polynomial))),
+    ("amplitude frequency", HarmonicMotion),
+    ("amplitude frequency phase", HarmonicMotion),
+    ("times displacements", lambda times, displacements: TabulatedMotion(tuple(times), tuple(displacements))),
+)
+"""Keys of a motion, and what they make."""
 
 
 def law_of(table: Checked[MotionEntry]) -> MotionLaw:
     """The motion law of a table; rest, and a fault, if the table is invalid."""
-    entry = table.entry
-    given = {name for name, value in entry if value is not None}
-    forms = [form for form, keys in _KEYS.items() if given <= set(keys) and given >= set(keys) - _OPTIONAL]
-    if not forms:
+    given = {name: value for name, value in table.entry if value is not None}
+    make = next((make for keys, make in _FORMS if {*keys.split()} == given.keys()), None)
+    if make is None:
         table.fault("motion form", found=", ".join(sorted(given)) or "an empty table")
         return STILL
     try:
-        return _MAKE[forms[0]](entry)
+        return make(**given)
     except OptionError as error:
         table.fault("motion number", error.key, shown(error.found), expected=error.expected)
         return STILL
-
-
-def law_from(data: Any) -> MotionLaw | None:
-    """The motion law of the text of a scene: a number, of older files, is a constant rate."""
-    if data is None or isinstance(data, int | float):
-        return None if data is None else PolynomialMotion((float(data),))
-    of: dict[str, Any] = data
-    if "coefficients" in of:
-        return PolynomialMotion(tuple(of["coefficients"]))
-    return (
-        HarmonicMotion(**of) if "amplitude" in of else TabulatedMotion(tuple(of["times"]), tuple(of["displacements"]))
-    )
-
-
-def first_rate(law: MotionLaw | None) -> float | None:
-    """The rate of a motion law at the start; None without."""
-    return None if law is None else law.rate(0.0)
 
 
 def changed(of: MotionLaw | None, key: str, value: float) -> MotionLaw:

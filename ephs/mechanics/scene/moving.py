@@ -17,21 +17,12 @@ def moved(scene: Scene, pose: Array, world: World) -> Scene:
     def frame(body: str, offset: Array) -> Array:
         return frozen(SE3.compose(pose, offset)) if body == GROUND else offset
 
-    return _carried(
-        mapped(
-            scene,
-            {
-                **dict.fromkeys((*KINDS, *REGISTERED), lambda _, x: x.moved(pose)),
-                "bodies": lambda _, b: replace(b, pose=frozen(SE3.normalise(SE3.compose(pose, b.pose)))),
-                "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
-            },
-            world,
-        ),
-        pose,
-    )
+    def carried(there: Array) -> Array:
+        return frozen(SE3.normalise(SE3.compose(pose, there)))
 
-
-def _carried(scene: Scene, pose: Array) -> Scene:
-    """The scene with the origins of all its levels moved by a pose."""
-    parts = {name: _carried(part, pose) for name, part in scene.parts.items()}
-    return replace(scene, parts=parts, origin=frozen(SE3.normalise(SE3.compose(pose, scene.origin))))
+    changes = {
+        **dict.fromkeys((*KINDS, *REGISTERED), lambda _, x: x.moved(pose)),
+        "bodies": lambda _, b: replace(b, pose=carried(b.pose)),
+        "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
+    }
+    return mapped(scene, changes, world, origin=carried)

@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.scene.build import drive_ports, element_signals, scene_system, wrench_port
-from ephs.mechanics.scene.element import NumberForm
+from ephs.mechanics.scene.element import POSE, NumberForm
 from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.rescaled import element_units, freedom_units, rescaled
@@ -165,7 +165,7 @@ def _unit(quantity: Quantity, units: OwnUnits, *, read: bool = False) -> Array:
         unit = np.where(np.any(of.basis[:3], axis=0), 1.0, units.length)
         return unit if read else element_units(space.size, unit, units.length)
     if kind == "pose":
-        return np.array([1.0] * 4 + [units.length] * 3)
+        return POSE.unit(units.length, units.mass, units.time, ())
     if kind == "momentum" and space.name.endswith("*") and space.dim == 1:  # of a joint's rate itself
         turning = np.any(pair(space.name[:-1], **dict(space.parameters)).basis[:3])
         return np.array([momentum * (units.length if turning else 1.0)])
@@ -190,13 +190,10 @@ _SCALARS: Mapping[str, NumberForm] = {
 
 def _stats(stats: Mapping[str, Any], units: OwnUnits, factors: Mapping[Path, Array]) -> dict[str, Any]:
     out = dict(stats)
-    for key in ("step", "shortest_step", "longest_step"):
+    times = dict.fromkeys(("step", "shortest_step", "longest_step", "work_apart_at"), units.time)
+    for key, unit in (times | dict.fromkeys(("least_production", "work_apart"), units.energy)).items():
         if out.get(key) is not None:
-            out[key] *= units.time
-    if "least_production" in out:
-        out["least_production"] *= units.energy
-    if "work_apart" in out:
-        out["work_apart"], out["work_apart_at"] = out["work_apart"] * units.energy, out["work_apart_at"] * units.time
+            out[key] *= unit
     if "plain_defect" in out:
         factor = {"sum": units.energy, "largest": units.energy, "at": units.time}
         out["plain_defect"] = {key: value * factor[key] for key, value in out["plain_defect"].items()}

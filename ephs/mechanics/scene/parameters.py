@@ -23,7 +23,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import AssemblyError
-from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.system import Filling, System
 
 Model = TypeVar("Model", bound=Scene | System)
@@ -210,46 +210,32 @@ def _library() -> dict[str, Callable[..., Filling]]:
 
 def _component(system: System, path: str) -> tuple[Filling, str, float]:
     """The component at a path, the parameter's name and its value."""
-    *box, key = path.split(".")
-    filling: Any = system
-    for word in _boxes(system, box):
-        filling = filling.fillings[word] if isinstance(filling, System) else None
-    if isinstance(filling, Storage | Reversible | Irreversible) and filling.name in _library():
-        parameters: dict[str, Any] = dict(filling.parameters)
-        if key in parameters:
-            return filling, key, float(parameters[key])
+    box, _, key = path.rpartition(".")
+    found = next((filling for at, filling in system.leaves() if str(at) == box and filling.name in _library()), None)
+    parameters: dict[str, Any] = {} if found is None else dict(found.parameters)
+    if found is not None and key in parameters:
+        return found, key, float(parameters[key])
     known = names(system)
     raise AssemblyError("unknown-parameter", path, hint=did_you_mean(path, known, f"there are: {listing(known)}"))
 
 
-def _boxes(system: System, words: list[str]) -> list[Any]:
-    """The boxes from outside to inside on the way that the words name; a box may have a dotted name."""
-    filling: Any = system
-    found: list[Any] = []
-    while words and isinstance(filling, System):
-        box = next((b for b in filling.fillings if [*map(str, b)] == words[: len(tuple(b))]), None)
-        if box is None:
-            return []
-        found.append(box)
-        words, filling = words[len(tuple(box)) :], filling.fillings[box]
-    return [] if words else found
-
-
 def _system(system: System, values: Mapping[str, float]) -> System:
-    found = system
-    changes: dict[tuple[Any, ...], dict[str, float]] = {}
+    changes: dict[str, dict[str, float]] = {}
     for path, value in values.items():
         _component(system, path)
-        *box, key = path.split(".")
-        changes.setdefault(tuple(_boxes(system, box)), {})[key] = float(value)
-    for boxes, parameters in changes.items():
-        found = _refilled(found, boxes, parameters)
-    return found
+        box, _, key = path.rpartition(".")
+        changes.setdefault(box, {})[key] = float(value)
+    return _refilled(system, (), changes)
 
 
-def _refilled(filling: Any, boxes: tuple[Any, ...], parameters: Mapping[str, float]) -> Any:
-    if not boxes:
-        made = _library()[filling.name](**{**dict(filling.parameters), **parameters})
-        return made.with_initial({str(p): x for p, x in filling.initial}) if isinstance(made, Storage) else made
-    inner = _refilled(filling.fillings[boxes[0]], boxes[1:], parameters)
-    return System.of(filling.pattern, {**dict(filling.fillings.items()), boxes[0]: inner})
+def _refilled(filling: Any, at: tuple[str, ...], changes: Mapping[str, Mapping[str, float]]) -> Any:
+    """What fills the box at a path with other parameters, by the paths of components; itself where there are none."""
+    if isinstance(filling, System):
+        inner = {box: _refilled(of, (*at, *box), changes) for box, of in filling.fillings.items()}
+        same = all(of is filling.fillings[box] for box, of in inner.items())
+        return filling if same else System.of(filling.pattern, inner)
+    parameters = changes.get(".".join(at))
+    if parameters is None:
+        return filling
+    made = _library()[filling.name](**{**dict(filling.parameters), **parameters})
+    return made.with_initial({str(p): x for p, x in filling.initial}) if isinstance(made, Storage) else made

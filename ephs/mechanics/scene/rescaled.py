@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import JOINTS, SceneElement
+from ephs.mechanics.scene.element import JOINTS, POSE, SceneElement
 from ephs.mechanics.scene.geometry import JointCoupling, coupling_of
 from ephs.mechanics.scene.model import ELEMENTS, Joint, Scene, frozen, mapped
 from ephs.semantics.bundles.bundle import Array
@@ -19,31 +18,22 @@ def rescaled(scene: Scene, length: float = 1.0, mass: float = 1.0, time: float =
     """
     units = length, mass, time
 
-    def other(path: str, x: SceneElement | Element) -> SceneElement | Element:
-        match x:
-            case Joint():
-                return _joint(x, *units)
-            case Element():
-                tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
-                return x.rescaled(*units, _firsts(tied, length))
-            case _:
-                return x.rescaled(*units)
+    def other(path: str, x: SceneElement) -> SceneElement:
+        if isinstance(x, Joint):
+            return _joint(x, *units)
+        tied = (scene.joint(path + name) for _, kind, name in x.references() if kind in JOINTS)
+        return x.rescaled(*units, _firsts(tied, length))
 
     registered = {section for _, level in scene.levels() for section in level.elements}
     changes = dict.fromkeys((*ELEMENTS, *registered), other)
-    return _moved_apart(mapped(scene, changes, scene.world.rescaled(*units)), length)
+    pose = POSE.unit(*units, ())
+    return mapped(scene, changes, scene.world.rescaled(*units), origin=lambda there: frozen(there * pose))
 
 
 def _firsts(joints: Iterable[Joint], length: float) -> tuple[float, ...]:
     """The unit of the first coordinate of each joint; of none the length."""
     found = [freedom_units(coupling_of(j), j.coordinate, length) for j in joints]
     return tuple(float(unit[0]) if unit.size else 1.0 for unit in found) or (length,)
-
-
-def _moved_apart(scene: Scene, length: float) -> Scene:
-    """The scene with the origins of all its levels in another unit of length."""
-    parts = {name: _moved_apart(part, length) for name, part in scene.parts.items()}
-    return replace(scene, parts=parts, origin=frozen(scene.origin * np.array([1.0] * 4 + [length] * 3)))
 
 
 def _joint(j: Joint, length: float, mass: float, time: float) -> Joint:

@@ -5,18 +5,20 @@ depends on another key (a number, or one per degree of freedom) are taken as num
 by the joint that they are of.
 """
 
-from typing import Any, Literal, TypeAlias
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import create_model
+from pydantic import Field, create_model
 
 from ephs.mechanics.scene.bodies import BodyEntry, World
+from ephs.mechanics.scene.element import NON_NEGATIVE, POSITIVE, Measured, NumberForm, part_of
 from ephs.mechanics.scene.flexible import BeamEntry
 from ephs.mechanics.scene.joints import JointEntry
 from ephs.mechanics.scene.model import ELEMENTS, KINDS
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rotations import Rotation
-from ephs.mechanics.scene.schema_elements import table_of
-from ephs.mechanics.scene.schema_numbers import EntryTable, Flag, Text, Vector, key
+from ephs.mechanics.scene.schema_numbers import EntryTable, Flag, NonNegative, Number, Positive, Text, Vector, key
 from ephs.mechanics.scene.thermal import ThermalNode
 
 
@@ -39,12 +41,29 @@ class PartEntry(EntryTable):
     rotation: Rotation = key("its orientation, [w, x, y, z] or a table", [1.0, 0.0, 0.0, 0.0])
 
 
-WorldEntry: Any = table_of(World, "world")
+_RANGES: Mapping[Any, Any] = {None: Number, POSITIVE: Positive, NON_NEGATIVE: NonNegative}
+
+
+def _table_of(kind: type[Measured], title: str) -> Any:
+    """The model of a table whose keys are an element's numbers that have a meaning."""
+    keys: dict[str, Any] = {}
+    for each in fields(kind):  # pyright: ignore[reportArgumentType] - all are dataclasses
+        number, said = part_of(each.type, NumberForm), part_of(each.type, str)
+        if number and said:
+            form = _RANGES[number.least]
+            if number.count:
+                form = Annotated[list[form], Field(min_length=number.count, max_length=number.count)]
+            default = each.default if each.default_factory is MISSING else each.default_factory().tolist()
+            keys[each.name] = form, key(said, ... if default is MISSING else default)
+    return create_model(f"{kind.__name__}Entry", __base__=EntryTable, __doc__=f"``[{title}]``", **keys)
+
+
+WorldEntry: Any = _table_of(World, "world")
 _TABLES: dict[str, tuple[type[EntryTable], str]] = {
     "bodies": (BodyEntry, "rigid bodies, and massless frames"),
     "joints": (JointEntry, "joints between two bodies, or a body and the ground"),
     "beams": (BeamEntry, "rods that bend, twist and stretch"),
-    "thermal": (table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
+    "thermal": (_table_of(ThermalNode, "thermal.NAME"), "thermal nodes: stores of heat"),
 }
 _SECTIONS = {name: (KINDS[name], KINDS[name].said) if name in KINDS else _TABLES[name] for name in ELEMENTS}
 _SECTIONS["parts"] = PartEntry, "other scene files as subsystems"

@@ -4,7 +4,7 @@ Axis 1 is the tangent of the beam, axis 2 its ``up``. Shear factors: Cowper's fo
 Torsion of rectangles by Saint-Venant's series.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, final
 
@@ -20,7 +20,6 @@ NEEDED = {"reissner": NUMBERS, "kirchhoff": ("GJ", "EI", "rhoA", "rhoI"), "strin
 """Required numbers of each kind of rod; other numbers are optional."""
 IRON = 7870.0
 """Density in kg/m³."""
-SHAPES = ("circle", "tube", "rectangle")
 MATERIAL = ("E", "nu", "rho")
 
 
@@ -82,6 +81,9 @@ def rectangle(b: float, h: float, E: float, nu: float, rho: float) -> Section:
     return _section(b * h, h * b**3 / 12.0, b * h**3 / 12.0, torsion, 5.0 / 6.0, E, nu, rho, (float(h), float(b)))
 
 
+SHAPES: Mapping[str, Callable[..., Section]] = {"circle": circle, "tube": tube, "rectangle": rectangle}
+
+
 def _section(
     area: float, about2: float, about3: float, torsion: float, shear: float,
     young: float, nu: float, rho: float, outline: tuple[float, ...],
@@ -116,16 +118,12 @@ def resolve_section(table: Checked[SectionEntry], rod: str) -> Section | None:
         stiffness = np.array([full["GJ"], *full["EI"], full["EA"], *full["GA"]])
         outline = (_radius(full, rod),)
         return Section(stiffness, full["rhoA"], np.array(full["rhoI"]), outline)
-    material = {name: given[name] for name in MATERIAL}
-    if shapes == ["circle"]:
-        return circle(given["circle"], **material)
-    sizes = given[shapes[0]]
-    if shapes == ["tube"]:
-        if not sizes[1] < sizes[0]:
-            table.fault("tube", "tube")
-            return None
-        return tube(*sizes, **material)
-    return rectangle(*sizes, **material)
+    (shape,) = shapes
+    sizes = np.atleast_1d(given[shape]).tolist()
+    if shape == "tube" and not sizes[1] < sizes[0]:
+        table.fault("tube", "tube")
+        return None
+    return SHAPES[shape](*sizes, **{name: given[name] for name in MATERIAL})
 
 
 def _radius(given: Mapping[str, Any], rod: str) -> float:

@@ -10,7 +10,7 @@ from ephs.mechanics.elements.shell.section import ShellSection
 from ephs.mechanics.elements.shell.shell import Shell
 from ephs.mechanics.elements.shell.system import shell_system
 from ephs.mechanics.scene.custom import Element, key
-from ephs.mechanics.scene.element import ENVIRONMENT, FREE_END, GROUND
+from ephs.mechanics.scene.element import ENVIRONMENT, FREE_END, GROUND, POSE, TWIST
 from ephs.mechanics.scene.errors import TEXTS, shown
 from ephs.mechanics.scene.faces import Faces
 from ephs.mechanics.scene.layers import Layers, laminate, rescaled_layers
@@ -268,9 +268,9 @@ class ShellSheet(Element, section="shells", said="sheets that bend and stretch")
     def rescaled(self, length: float, mass: float, time: float, coordinates: tuple[float, ...] = ()) -> Self:
         found = super().rescaled(length, mass, time, coordinates)
         layers = None if self.layers is None else rescaled_layers(self.layers, length, mass, time)
-        units = {"nodes": [1.0] * 4 + [length] * 3, "twists": [1.0 / time] * 3 + [length / time] * 3}
-        given = {name: getattr(self, name) for name in units}
-        state = {name: rows and (np.array(rows) * units[name]).tolist() for name, rows in given.items()}
+        given = {"nodes": (self.nodes, POSE), "twists": (self.twists, TWIST)}
+        units = length, mass, time, ()
+        state = {name: rows and (np.array(rows) * of.unit(*units)).tolist() for name, (rows, of) in given.items()}
         return found.changed(layers=layers, **state)
 
     def continued(self, states: Mapping[str, Array]) -> Self:

@@ -56,6 +56,24 @@ class SceneLevel:
     starts: "dict[Path, tuple[Element, Start]]" = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
 
+    def join(self, group: str, name: str, of: Quantity, *, exposed: bool = False) -> str:
+        """The junction of a (dotted) name in a group."""
+        path = Path([group, *name.split(".")])
+        self.junctions[path] = junction(of, exposed=exposed)
+        return str(path)
+
+    def momentum(self, body: str) -> str:
+        """The junction of a body's momentum."""
+        return self.join("momenta", body, quantity.body_momentum)
+
+    def entropy(self, node: str) -> str:
+        """The junction of a thermal node, or of the environment."""
+        return self.join("entropies", node, quantity.entropy)
+
+    def add(self, path: Path, filling: Filling, ports: Mapping[Any, str]) -> None:
+        """A box with its filling."""
+        self.boxes[path], self.fillings[path] = dict(ports), filling
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +90,7 @@ class Site:
 
     scene: "Scene"
     element: "Element"
-    _level: SceneLevel
+    _level: SceneLevel = field(default_factory=SceneLevel)
 
     @property
     def _origin(self) -> Array:
@@ -131,17 +149,13 @@ class Site:
         """The junction of the momentum of a body, or of a node of a shell; the ground has one, too."""
         if body != GROUND and body not in nodes_of_shells(self.scene):
             self._known("body", "end", "side", name=body)
-        path = Path(["momenta", *body.split(".")])
-        self._level.junctions[path] = junction(quantity.body_momentum)
-        return str(path)
+        return self._level.momentum(body)
 
     def entropy(self, node: str = ENVIRONMENT) -> str:
         """The junction of a thermal node, or of the environment: heat goes there."""
         if node != ENVIRONMENT:
             self._known("node", name=node)
-        path = Path(["entropies", *node.split(".")])
-        self._level.junctions[path] = junction(quantity.entropy)
-        return str(path)
+        return self._level.entropy(node)
 
     def heated(self, node: str) -> dict[str, str]:
         """The port s of a box at the junction of a thermal node; none at the environment, which such a box contains."""
@@ -150,9 +164,7 @@ class Site:
     def drive(self, joint: str) -> str:
         """The junction of the momentum of a joint that a key of kind ``axis`` names."""
         self._known(AXIS, SINGLE, name=joint)
-        path = Path(["drives", *joint.split(".")])
-        self._level.junctions[path] = junction(self.quantity(joint))
-        return str(path)
+        return self._level.join("drives", joint, self.quantity(joint))
 
     def quantity(self, joint: str) -> Quantity:
         """The quantity at `drive`."""
@@ -160,9 +172,8 @@ class Site:
 
     def inner(self, name: str, of: Quantity) -> str:
         """A junction of its own."""
-        path = self._own(name)
-        self._level.junctions[path] = junction(of)
-        return str(path)
+        section, *own = self._own(name)
+        return self._level.join(section, ".".join(own), of)
 
     def input(
         self,
@@ -186,12 +197,11 @@ class Site:
             Whether runs may drive it; else other elements act there.
         """
         section, *own = self._own(port)
-        path = Path([at, section, *own] if at == INPUTS else [at, *own])
-        self._level.junctions[path] = junction(of, exposed=True)
+        path = self._level.join(at, ".".join([section, *own] if at == INPUTS else own), of, exposed=True)
         given = np.broadcast_to(np.asarray(value, dtype=float), (of.space.dim,)).copy()
         name = str(self._own(port if at == INPUTS else "")) if named else ""
-        self._level.inputs[path] = name, Signal(given, effort=effort)
-        return str(path)
+        self._level.inputs[Path.of(path)] = name, Signal(given, effort=effort)
+        return path
 
     # ---- boxes ---------------------------------------------------------------------------------------------------
 
@@ -221,7 +231,7 @@ class Site:
             initial = started(self.scene, self.element, initial)
         if initial and isinstance(filling, System | Storage):
             filling = filling.with_initial({name: np.asarray(value, dtype=float) for name, value in initial.items()})
-        self._level.boxes[path], self._level.fillings[path] = dict(ports), filling
+        self._level.add(path, filling, ports)
 
     def _own(self, name: str) -> Path:
         return Path([self.element.section, self.element.name, *(name.split(".") if name else ())])
@@ -259,7 +269,7 @@ def nodes_of_shells(scene: "Scene") -> "Mapping[str, Array]":
 
 def started(scene: "Scene", element: "Element", start: Start) -> "Mapping[str, ArrayLike]":
     """States of an element's box at the start, by their paths in the filling."""
-    return start(Site(scene, element, SceneLevel()))
+    return start(Site(scene, element))
 
 
 def moved(scene: "Scene", other: "Scene") -> "Scene":
@@ -305,10 +315,8 @@ def _elements(scene: "Scene") -> SceneLevel:
         level = SceneLevel()
         for of in elements_of(scene):
             of.build(Site(scene, of, level))
-        path = Path(["entropies", ENVIRONMENT])
-        if path in level.junctions:
-            at = Path(["environment"])
-            level.boxes[at], level.fillings[at] = {"s": str(path)}, library.environment()
+        if Path(["entropies", ENVIRONMENT]) in level.junctions:
+            level.add(Path([ENVIRONMENT]), library.environment(), {"s": level.entropy(ENVIRONMENT)})
         return level
 
     return once(scene, "elements", made)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.mechanics.scene.checked import Checked
 from ephs.mechanics.scene.custom import Element
-from ephs.mechanics.scene.element import JOINTS, OUTSIDE, SceneElement
+from ephs.mechanics.scene.element import HOLDERS, OUTSIDE, Measured, SceneElement
 from ephs.mechanics.scene.errors import ModelWarning, legible, warn_caller
 from ephs.mechanics.scene.geometry import UNIVERSAL, coupling, joint_types
 from ephs.mechanics.scene.model import ELEMENTS, Body, Joint, Scene, mapped
@@ -40,29 +40,15 @@ def check_scene(scene: Scene) -> None:
         if isinstance(each, Element) and (wrong := next(broken(Checked(each, name)), None)):
             raise ValueError(str(wrong))
     _check_names(scene)
-    there = {
-        "body": {name for name, _ in scene.all_bodies()},
-        "joint": {name for name, _ in scene.all_joints()},
-        "surface": {name for name, _ in scene.all_surfaces()},
-        "node": {name for name, _ in scene.all_thermal()},
-        "tendon": {name for name, _ in scene.all_tendons()},
-    }
-    there |= {
-        "end": there["body"],
-        "side": there["body"],
-        "carrier": there["body"] | {name for name, _ in scene.all_shells()},
-    }
-    there |= dict.fromkeys(JOINTS, there["joint"])
+    there = {section: {name for name, _ in scene.every(section)} for section in ELEMENTS}
     named = [(kind, name) for _, each in _all(scene) for kind in set(each.names.values()) for name in each.named(kind)]
     beams = [beam for _, beam in scene.all_beams()]
     named += [("body", name) for beam in beams for name in beam.nodes]
     named += [("joint", name) for beam in beams for name in beam.joints]
     for kind, name in named:
-        if name not in OUTSIDE[kind] and name not in there[kind]:
-            what = (
-                {"end": "body", "side": "body", "carrier": "body", "node": "thermal node"}
-                | dict.fromkeys(JOINTS, "joint")
-            ).get(kind, kind)
+        if name not in OUTSIDE[kind] and not any(name in there[section] for section in HOLDERS[kind]):
+            first = HOLDERS[kind][0]
+            what = {"bodies": "body", "thermal": "thermal node"}.get(first, first.removesuffix("s"))
             raise ValueError(f"there is no {what} {legible(str(name))}")
 
 
@@ -89,7 +75,7 @@ def meshes_within(scene: Scene, homes: Iterable[Path]) -> Scene:
     return found if lost else scene
 
 
-def _all(scene: Scene) -> Iterator[tuple[str, SceneElement | Element]]:
+def _all(scene: Scene) -> Iterator[tuple[str, SceneElement]]:
     """Every element of a scene with its dotted name."""
     for section in ELEMENTS:
         yield from scene.every(section)
@@ -104,7 +90,7 @@ def _shapes(scene: Scene) -> Iterator[tuple[str, Sizes]]:
         match each:
             case Joint():
                 yield name, _joint(name, each)
-            case SceneElement():
+            case Measured():
                 yield name, each.values()
 
 

@@ -15,15 +15,13 @@ from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.following import stretched, tied
 from ephs.mechanics.scene.gears import Gear
-from ephs.mechanics.scene.geometry import body_twist, coupling_of
+from ephs.mechanics.scene.geometry import body_twist
 from ephs.mechanics.scene.joints import Asked
-from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap, largest_slip
+from ephs.mechanics.scene.kinematics import AssemblyJoint, Scale, elements, largest_gap, largest_slip, spanning_hops
 from ephs.mechanics.scene.model import GROUND, KINDS, Body, Joint, Scene, frozen, mapped
-from ephs.mechanics.scene.motions import first_rate
 from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.scene.site import moved
-from ephs.mechanics.scene.tree import spanning_hops
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -63,21 +61,7 @@ class Snapshot:
             tuple(name for name, _ in pairs),
             bodies,
             tuple(joints),
-            tuple(
-                AssemblyJoint(
-                    j.name,
-                    index[j.body1],
-                    index[j.body2],
-                    j.frame1,
-                    j.frame2,
-                    coupling_of(j),
-                    None,
-                    None,
-                    first_rate(j.motion),
-                    np.array(j.coordinate),
-                )
-                for j in joints
-            ),
+            tuple(AssemblyJoint.of(j, index, near=np.array(j.coordinate)) for j in joints),
             np.array([body.pose for body in bodies]).reshape(-1, 7),
             np.array([body.twist for body in bodies]).reshape(-1, 6),
         )
@@ -120,7 +104,7 @@ def with_state(
     for hop in spanning_hops(links, len(poses), speeds):
         rate = speeds.get(hop.name, now.joints[hop.link].rate)
         link, x = links[hop.link], xs[hop.link]
-        twists[hop.body] = link.move_second(twists, x, rate) if hop.forward else link.move_first(twists, x, rate)
+        twists[hop.body] = link.moved(hop.body, twists, x, rate)
     scale = replace(now, poses=poses, twists=twists).scale(scene.world.gravity)
     if adjust and largest_slip(links, twists, xs, scale) > ASSEMBLY:
         moved = project_velocities(links, poses, twists, now.roots(), frozenset(speeds), scale)
@@ -296,7 +280,7 @@ def _carry(links: Sequence[AssemblyJoint], poses: Array, before: Sequence[Array]
     for hop in spanning_hops(links, len(poses), named):
         link = links[hop.link]
         x = before[hop.link] if link.coordinates is None else link.coupling.element(link.coordinates)
-        poses[hop.body] = link.place_second(poses, x) if hop.forward else link.place_first(poses, x)
+        poses[hop.body] = link.placed(hop.body, poses, x)
     return poses, elements(links, poses)
 
 

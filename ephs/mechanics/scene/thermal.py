@@ -6,12 +6,12 @@ from typing import Annotated, Any, final
 
 import numpy as np
 
-from ephs.mechanics.scene.element import POSITIVE, NumberForm, SceneElement
+from ephs.mechanics.scene.element import POSITIVE, Measured, NumberForm
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class ThermalNode(SceneElement):
+class ThermalNode(Measured):
     """A body of uniform temperature.
 
     One that expands pulls at the elements of beams that it is the heat of, by ``pull`` (θ₀ − θ), in N/K; θ₀ is the

@@ -8,7 +8,7 @@ import numpy as np
 
 from ephs.mechanics.scene.element import ENVIRONMENT, GROUND
 from ephs.mechanics.scene.model import elements_of
-from ephs.mechanics.scene.site import SceneLevel, Site
+from ephs.mechanics.scene.site import Site
 from ephs.show.motions.motion import Array
 
 
@@ -37,7 +37,7 @@ def lines_of(scene: Any) -> dict[str, BodyLine]:
             found[f"{name}-{k}"] = BodyLine(one, two, here, there, tendon.heat, coiled=False)
     for path, level in scene.levels():
         for element in elements_of(level):
-            site = Site(level, element, SceneLevel())
+            site = Site(level, element)
             for k, (one, here, two, there) in enumerate(element.lines(site), 1):
                 ends = [
                     (body if body == GROUND else path + body, site.point(body, at))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ephs.mechanics.scene.element import GROUND
-from ephs.mechanics.scene.site import SceneLevel, Site
+from ephs.mechanics.scene.site import Site
 from ephs.show.motions.motion import Array, point_of
 
 STILL: Final = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -54,7 +54,7 @@ def sheets_of(scene: Any) -> dict[str, DrawnShell]:
     found: dict[str, DrawnShell] = {}
     for path, level in scene.levels():
         for name, shell in level.shells.items():
-            faces = shell.faces(Site(level, shell, SceneLevel()))
+            faces = shell.faces(Site(level, shell))
             ends = tuple((body if body == GROUND else path + body, at) for body, at in faces.ends)
             sink = shell.heat if shell.heat not in level.thermal else path + shell.heat
             found[path + name] = DrawnShell(ends, faces.cells, frozenset(path + node for node in faces.nodes), sink)

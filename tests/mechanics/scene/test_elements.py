@@ -1,7 +1,8 @@
 """What a scene's elements declare of their numbers and names is all that there is of them."""
 
 import json
-from dataclasses import fields
+from dataclasses import fields, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.element import OUTSIDE
+from ephs.mechanics.scene.element import HOLDERS, OUTSIDE
 from ephs.mechanics.scene.flexible import Strain
 from ephs.mechanics.scene.model import ELEMENTS, KINDS, Joint, World
 from ephs.mechanics.scene.rescaled import rescaled
@@ -38,6 +39,22 @@ def test_every_number_has_a_dimension(kind):
 def test_every_reference_says_of_what(kind):
     assert set(kind.names) <= {each.name for each in fields(kind)} - {"name"}
     assert set(kind.names.values()) <= set(OUTSIDE)
+
+
+def test_every_kind_of_name_leads_to_sections_that_scenes_have():
+    assert set(HOLDERS) == set(OUTSIDE)
+    assert {section for sections in HOLDERS.values() for section in sections} < set(ELEMENTS)
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_names_that_nothing_has_are_found_in_results(path):
+    scene = ephs.load(path)
+    check_scene(scene)
+    wanted = [("body1", "body"), ("heat", "thermal node")]
+    for (name, joint), (key, what) in product(list(scene.joints.items())[:1], wanted):
+        wrong = {**scene.joints, name: joint.changed(**{key: "nobody"})}
+        with pytest.raises(ValueError, match=f"there is no {what} nobody"):
+            check_scene(replace(scene, joints=wrong))
 
 
 def bounds(schema):

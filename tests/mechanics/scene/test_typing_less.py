@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation as Turn
 from ephs.mechanics.scene import SceneError
 from ephs.mechanics.scene.bodies import BodyEntry
 from ephs.mechanics.scene.entries import validate
-from ephs.mechanics.scene.homogeneous import mass_and_moments
+from ephs.mechanics.scene.inertia import mass_and_moments
 from ephs.mechanics.scene.rotations import RotationEntry
 from tests.written import scene_of_text
 

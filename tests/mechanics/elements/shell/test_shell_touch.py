@@ -8,7 +8,7 @@ from ephs.mechanics.scene.contacts import contact_points
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
-from ephs.mechanics.scene.site import SceneLevel, Site
+from ephs.mechanics.scene.site import Site
 from ephs.mechanics.shapes.gap import ramp
 from tests.written import scene_of_text
 
@@ -121,7 +121,7 @@ def test_the_balls_of_a_rigid_sheet_are_those_of_a_rigid_body():
 def pressed(scene):
     """Total elastic force at the start, of the gaps and shares of the points of its only contact."""
     (of,) = scene.contacts.values()
-    site = Site(scene, of, SceneLevel())
+    site = Site(scene, of)
     points = contact_points(scene, of)
     places = [site.between(p.bodies[0], p.frames[0], p.bodies[1], p.frames[1]) for p in points]
     return of.stiffness * sum(p.share * ramp(-p.gap.distance(at)) for p, at in zip(points, places, strict=True))
