@@ -230,6 +230,7 @@ ASKED = {
     "inverse dynamics": lambda model: model.inverse_dynamics(model.state0, {}),
     "a step": lambda model: model.step(model.state0, 1e-3, "rk54"),
     "linearize": lambda model: ephs.linearize(model.scene),
+    "linearize all states": lambda model: ephs.linearize(model.scene, form="paper"),
 }
 
 
