@@ -21,7 +21,12 @@ SAME = 1e-7
 """Differences of runs whose steps differ, over 1 + what is compared: a hundred times what is asked of each step."""
 ALIKE = 1e-3
 """The same where two long bodies of one kind change roles: a rounding of their gaps is that of the first, see `gap`."""
-SEEDS = {"jointed": range(24), "touching": range(16), "sheet": range(6), "hard": range(6)}
+SEEDS = {
+    "jointed": range(24),
+    "touching": range(16),
+    "sheet": range(6),
+    "hard": (0, 1, 2, 4, 5),
+}  # hard 3, of boxes on boxes, is slow
 SHORT = {"jointed": 4, "touching": 3, "sheet": 1, "hard": 1}
 
 
