@@ -39,7 +39,7 @@ def drawn(seed: int) -> dict[str, Any]:
     """
     r = Random(seed)
     u, likely = r.uniform, lambda part: r.random() < part
-    gravity = _vector(r, 9.81)
+    gravity = vector(r, 9.81)
     out: dict[str, Any] = {"world": {"gravity": gravity, "temperature": u(250.0, 350.0)}, "bodies": {}, "joints": {}}
     if likely(0.5):
         out["thermal"] = {name: {"capacity": u(1.0, 5.0), "temperature": u(280.0, 320.0)} for name in ("hot", "cold")}
@@ -55,7 +55,7 @@ def drawn(seed: int) -> dict[str, Any]:
     r.shuffle(single)
 
     def point(body: str) -> list[float]:
-        return _vector(r, 1.0 if body == "ground" else 0.3)
+        return vector(r, 1.0 if body == "ground" else 0.3)
 
     if likely(0.5):
         ends = r.sample(["ground", *bodies], 2)
@@ -72,31 +72,31 @@ def drawn(seed: int) -> dict[str, Any]:
         law = {"stiffness": u(1.0, 20.0), "damping": u(0.0, 1.0)}
         out["tendons"] = {"tendon": {"bodies": on, "points": [point(body) for body in on], **law, **heat()}}
     if likely(0.4):
-        wrench = {"force": _vector(r, 2.0), "moment": _vector(r, 0.3), "follower": likely(0.5)}
+        wrench = {"force": vector(r, 2.0), "moment": vector(r, 0.3), "follower": likely(0.5)}
         out["loads"] = {"load": {"body": r.choice(bodies), **wrench}}
     if likely(0.25):
-        body, start = r.choice(bodies), _vector(r, 0.5)
-        ends = {"from": start, "to": [x + y for x, y in zip(start, _vector(r, 0.5), strict=True)], "ends": [body]}
+        body, start = r.choice(bodies), vector(r, 0.5)
+        ends = {"from": start, "to": [x + y for x, y in zip(start, vector(r, 0.5), strict=True)], "ends": [body]}
         section = {"circle": 0.02, "E": u(3e4, 3e5), "nu": 0.3, "rho": 1000.0}
         out["beams"] = {"rod": {**ends, "elements": 2, "section": section, "damping": u(0.0, 0.02), **heat()}}
         out["assembly"] = {"adjust": True}
     return out
 
 
-def _vector(r: Random, size: float) -> list[float]:
+def vector(r: Random, size: float) -> list[float]:
     return [r.uniform(-size, size) for _ in range(3)]
 
 
 def _add_body(r: Random, out: dict[str, Any], i: int, heat: Any) -> None:
     u, kind, mass = r.uniform, r.choice(list(FREEDOMS)), r.uniform(0.3, 2.0)
-    at, wide = _vector(r, 0.6), [r.uniform(0.3, 1.0) ** 2 for _ in range(3)]
+    at, wide = vector(r, 0.6), [r.uniform(0.3, 1.0) ** 2 for _ in range(3)]
     moments = [0.05 * mass * (sum(wide) - each) for each in wide]
-    out["bodies"][f"b{i}"] = {"mass": mass, "inertia": moments, "position": at, "rotation": {"rpy": _vector(r, 2.0)}}
+    out["bodies"][f"b{i}"] = {"mass": mass, "inertia": moments, "position": at, "rotation": {"rpy": vector(r, 2.0)}}
     on = "ground" if kind == "free" or not i else r.choice(["ground", *(f"b{j}" for j in range(i))])
     ends = [on, f"b{i}"][:: r.choice([1, -1])]
-    place = [x + y for x, y in zip(at, _vector(r, 0.3), strict=True)]
+    place = [x + y for x, y in zip(at, vector(r, 0.3), strict=True)]
     rates = [u(-1.0, 1.0) for _ in range(FREEDOMS[kind])]
-    joint = {"type": kind, "bodies": ends, "at": place, "axis": _vector(r, 1.0)}
+    joint = {"type": kind, "bodies": ends, "at": place, "axis": vector(r, 1.0)}
     joint["rate"] = rates[0] if len(rates) == 1 else rates
     if kind == "universal":
         x, y, z = joint["axis"]

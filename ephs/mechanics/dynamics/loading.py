@@ -6,6 +6,7 @@ from typing import final
 import numpy as np
 
 from ephs.mechanics.dynamics.links import PlacedLinks
+from ephs.mechanics.dynamics.opening import HardContacts
 from ephs.mechanics.dynamics.pressing import PressedSurface
 from ephs.mechanics.dynamics.results import Derivatives
 from ephs.mechanics.scene.build import component_path, wrench_port
@@ -25,10 +26,12 @@ class Loading:
     ----------
     share
         Part of the loads that acts: 1 after their ramps.
+    hard
+        Hard contacts and stops, which have no forces here.
     """
 
     def __init__(self, equations: ReducedEquations, links: PlacedLinks) -> None:
-        self.share = 1.0
+        self.share, self.hard = 1.0, HardContacts(equations)
         self._equations, self._links = equations, links
         scene: Scene | None = equations.problem.scene
         self._loads: dict[str, list[Load]] = {}
@@ -49,7 +52,8 @@ class Loading:
         return bool(self._pushed or self._surfaces)
 
     def place(self, q: Array, r: Array) -> None:
-        """Write the wrenches at a configuration to the equations' inputs."""
+        """Write the wrenches at a configuration to the equations' inputs, where hard contacts are open."""
+        self.hard.check_open(q, r)
         if not self:
             return
         self._links.place(q, r)

@@ -65,7 +65,7 @@ class Dynamics:
         self._links = PlacedLinks(self._equations)
         self.weights = self._links.weights()
         self.loading = Loading(self._equations, self._links)
-        self.placing, self._steps = Placing(self._equations), Steps(self.problem, self._equations)
+        self.placing, self._steps = Placing(self._equations), Steps(self.problem, self._equations, self.loading.hard)
         with failing_at(0.0):
             self.state0 = self._state(self._equations.start(0.0))
 

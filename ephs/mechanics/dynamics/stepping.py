@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ephs.mechanics.dynamics.opening import HardContacts
 from ephs.mechanics.dynamics.placing import ByJoint
 from ephs.mechanics.methods.explicit import Tableau, tableau
 from ephs.mechanics.methods.method import ReducedMethod
@@ -34,8 +35,8 @@ EXPLICIT = ("rk54", "rk87")
 class Steps:
     """Single steps of one mechanism under the present inputs."""
 
-    def __init__(self, problem: Problem, equations: ReducedEquations) -> None:
-        self._problem, self._equations = problem, equations
+    def __init__(self, problem: Problem, equations: ReducedEquations, hard: HardContacts) -> None:
+        self._problem, self._equations, self._hard = problem, equations, hard
 
     def step(
         self, state: ReducedState, h: float, method: "str | Method | MethodEntry", forces: ByJoint | None
@@ -50,6 +51,8 @@ class Steps:
             There is no such method, it takes no constant steps, or h is no length of a step.
         SolveError
             The step has no solution.
+        SimulationError
+            A hard contact is closed before or after an explicit step, which has no impulses.
         """
         h = number_of("h", h)
         if not (np.isfinite(h) and h != 0.0):
@@ -93,9 +96,12 @@ class Steps:
         return replace(self._problem, signals=signals)
 
     def _explicit(self, state: ReducedState, h: float, of: Tableau) -> ReducedState:
-        """A step without error estimate."""
+        """A step without error estimate, between states whose hard contacts are open."""
         eq = self._equations
+        self._hard.check_open(state.q, state.r)
         y0, y1, k = eq.vector(state), np.empty(eq.size), np.zeros((len(of.arrays["a"]), eq.size))
         k[0] = eq.rates(state.t, state.q, y0)
         eq.stages(state, of.arrays, of.c, h, y0, k, y1)
-        return eq.closed(eq.state(state, y1, state.t + h))
+        end = eq.closed(eq.state(state, y1, state.t + h))
+        self._hard.check_open(end.q, end.r)
+        return end

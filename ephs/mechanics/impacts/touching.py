@@ -158,7 +158,7 @@ class Touching:
             if isinstance(point, _Stop):
                 wrenches[0] = point.wrench
             else:
-                normal, at = point.gap.contact(pose)
+                normal, at = point.gap.on_second(pose)
                 second = SE3.identity() if point.bodies[1] == GROUND else residual.pose(point.bodies[1])
                 turn = quaternion_to_matrix(SE3.compose(second, point.offsets[1])[:4])
                 chosen[k] = np.argmin(np.abs(turn @ normal)) if axes is None else axes[k]
@@ -205,7 +205,7 @@ class Touching:
             SE3.compose(SE3.identity() if body == GROUND else self._eq.dense.residual.pose(body), offset)
             for body, offset in zip(spot.bodies, spot.offsets, strict=True)
         )
-        _, at = spot.gap.contact(SE3.compose(SE3.inverse(one), two))
+        _, at = spot.gap.on_second(SE3.compose(SE3.inverse(one), two))
         place = two[4:] + quaternion_to_matrix(two[:4]) @ np.array(at)
         pressed = force @ self.ways(i, axis)
         moment = np.cross(place, pressed)

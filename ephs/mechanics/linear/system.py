@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from ephs.mechanics.linear.pencil import DescriptorParts, Pencil, system_problem
+from ephs.mechanics.linear.pencil import DescriptorParts, Pencil, mechanism_of, system_problem
 from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
@@ -52,6 +52,8 @@ def linear_system(
     if inputs is not None and not isinstance(inputs, Mapping):
         raise OptionError("inputs", inputs, "{port: {'effort': e}} or {port: {'flow': f}}, of a system")
     problem = system_problem(system, states, inputs, reference, name)
+    if problem.descriptor.strikes is not None and (model := mechanism_of(problem)) is not None:
+        model.loading.hard.check_open(model.state0.q, model.state0.r)
     with failing_at(0.0):
         return LinearSystem(problem, problem.descriptor.pack(problem.initial)).whole(outputs)
 

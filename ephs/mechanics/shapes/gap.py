@@ -51,10 +51,10 @@ class Gap:
     distance
         Relative pose (7,) -> gap in m.
     contact
-        Relative pose (7,) -> unit normal from the first surface to the second, and the contact point on the second
-        surface in m, both in the axes and from the origin of C2.
+        Relative pose (7,) -> unit normal from the first surface to the second, and the contact point half-way between
+        both surfaces in m, both in the axes and from the origin of C2.
     radius
-        Radius of curvature of the second surface at the contact in m; 0 of a corner.
+        Radius in m on which the surfaces roll on each other, 1/(1/r₁ + 1/r₂), where a face is flat; 0 of a corner.
     numbers
         Sizes of both surfaces by name, m.
     support
@@ -71,6 +71,12 @@ class Gap:
     numbers: tuple[tuple[str, float], ...]
     support: Support
     thickness: float = np.inf
+
+    def on_second(self, pose: Any) -> tuple[Vector, Vector]:
+        """The normal, and the point of the second surface, which turns with its body: that of hard contacts, which hold
+        several points of a body without strain."""
+        normal, point = self.contact(pose)
+        return normal, moved(point, 0.5 * self.distance(pose), normal)
 
 
 def apart(half1: Vector, half2: Vector, margin: float, middle: float) -> Support:
@@ -111,7 +117,7 @@ def plane_sphere(radius: float) -> Gap:
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         normal = _upwards(pose)
-        return normal, times(-radius, normal)
+        return normal, times(-0.5 * (radius + pose[6]), normal)
 
     numbers = (("radius", radius),)
     return Gap("plane_sphere", lambda pose: pose[6] - radius, contact, radius, numbers, Support(HEIGHT, radius))
@@ -140,8 +146,9 @@ def plane_rim(radius: float) -> Gap:
         return normal, *rounded(normal[0] * normal[0] + normal[1] * normal[1], normal[2] * normal[2])
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
-        normal, out, _ = inclined(pose)
-        return normal, (-radius * out * normal[0], -radius * out * normal[1], 0.0)
+        normal, out, below = inclined(pose)
+        lowest = -radius * out * normal[0], -radius * out * normal[1], 0.0
+        return normal, moved(lowest, 0.5 * (radius * below - pose[6]), normal)
 
     def distance(pose: Any) -> Any:
         return pose[6] - radius * inclined(pose)[2]
@@ -208,14 +215,14 @@ def _capsules(name: str, sizes: tuple[float, float, float, float], parallel: flo
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
         away, length, _, at = least(pose)
-        x, y, z = times(1.0 / length, into(pose, away))
-        return (x, y, z), (-radius2 * x, -radius2 * y, at - radius2 * z)
+        normal = times(1.0 / length, into(pose, away))
+        return normal, moved((0.0, 0.0, at), 0.5 * (radius1 - radius2 - length), normal)
 
     return Gap(
         name,
         distance,
         contact,
-        radius2,
+        radius1 * radius2 / radii,
         (("half1", half1), ("radius1", radius1), ("half2", half2), ("radius2", radius2)),
         apart((0.0, 0.0, half1), (0.0, 0.0, half2), radii, radii),
         2.0 * radii,
@@ -252,14 +259,14 @@ def sphere_rounded_box(radius: float, half: Vector, rounding: float) -> Gap:
     def contact(pose: Any) -> tuple[Vector, Vector]:
         at = centre(pose)
         normal = _normal_of_box(at, half)
-        return times(-1.0, normal), moved(at, rounding - _beyond_box(at, half), normal)
+        return times(-1.0, normal), moved(at, 0.5 * (rounding - radius - _beyond_box(at, half)), normal)
 
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
     return Gap(
         "sphere_rounded_box",
         lambda pose: _beyond_box(centre(pose), half) - (rounding + radius),
         contact,
-        rounding,
+        radius,
         (("radius", radius), *sizes, ("rounding", rounding)),
         apart(CENTRE, half, rounding + radius, min(half) + rounding + radius),
         2.0 * (min(half) + rounding + radius),
@@ -273,15 +280,17 @@ def rounded_box_sphere(half: Vector, rounding: float, radius: float) -> Gap:
     """
 
     def contact(pose: Any) -> tuple[Vector, Vector]:
-        normal = into(pose, _normal_of_box((pose[4], pose[5], pose[6]), half))
-        return normal, times(-radius, normal)
+        at = pose[4], pose[5], pose[6]
+        normal = into(pose, _normal_of_box(at, half))
+        return normal, times(0.5 * (rounding - radius - _beyond_box(at, half)), normal)
 
+    rolling = radius if all(half) else rounding * radius / (rounding + radius)
     sizes = zip(("half_x", "half_y", "half_z"), half, strict=True)
     return Gap(
         "rounded_box_sphere",
         lambda pose: _beyond_box((pose[4], pose[5], pose[6]), half) - (rounding + radius),
         contact,
-        radius,
+        rolling,
         (*sizes, ("rounding", rounding), ("radius", radius)),
         apart(half, CENTRE, rounding + radius, min(half) + rounding + radius),
         2.0 * (min(half) + rounding + radius),

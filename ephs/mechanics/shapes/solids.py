@@ -109,22 +109,16 @@ def meeting(feature: Feature, body: ConvexBody, *, first: bool) -> Gap:
     def contact(pose: Any) -> tuple[Vector, Vector]:
         centre, axis = seen(pose)
         at, _ = feature.spot(centre, axis, body)
-        far = body.distance(at)
         normal = body.normal(at)
-        if first:
-            out = times(body.radius - far, normal)
-            return times(-1.0, normal), (at[0] + out[0], at[1] + out[1], at[2] + out[2])
-        away = into(pose, (at[0] - centre[0], at[1] - centre[1], at[2] - centre[2]))
-        normal = into(pose, normal)
-        on = times(-feature.radius, normal)
-        return normal, (away[0] + on[0], away[1] + on[1], away[2] + on[2])
+        middle = moved(at, 0.5 * (body.radius - feature.radius - body.distance(at)), normal)
+        return (times(-1.0, normal), middle) if first else (into(pose, normal), into(pose, moved(middle, -1.0, centre)))
 
     halves = (feature.halves, body.halves) if first else (body.halves, feature.halves)
     return Gap(
         f"{feature.name}_{body.name}" if first else f"{body.name}_{feature.name}",
         distance,
         contact,
-        body.radius if first else feature.radius,
+        feature.radius,
         (*feature.numbers, *body.numbers),
         apart(*halves, radii, radii if feature.searched and body.pull is not None else 0.5 * body.thickness + radii),
         body.thickness + 2.0 * radii,

@@ -11,6 +11,7 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
+from tests.written import scene_of_text
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 EPS = np.finfo(float).eps
@@ -206,3 +207,46 @@ def test_what_no_mass_determines_is_named(tmp_path):
     model = ephs.dynamics(ephs.load(file))
     with pytest.raises(ephs.SimulationError, match="joint pin, which moves no mass"):
         model.acceleration(model.state0)
+
+
+HARD = """format = 1
+[bodies.ball]
+mass = 1.0
+inertia = [4e-3, 4e-3, 4e-3]
+position = [0.0, 0.0, {height}]
+velocity = [0.0, 0.0, {speed}]
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = 0.1 }}
+restitution = 0.5
+[surfaces.floor]
+body = "ground"
+shape = {{ plane = {{}} }}
+restitution = 0.5
+"""
+ASKED = {
+    "acceleration": lambda model: model.acceleration(model.state0),
+    "derivatives": lambda model: model.derivatives(model.state0),
+    "inverse dynamics": lambda model: model.inverse_dynamics(model.state0, {}),
+    "a step": lambda model: model.step(model.state0, 1e-3, "rk54"),
+    "linearize": lambda model: ephs.linearize(model.scene),
+    "linearize all states": lambda model: ephs.linearize(model.scene, form="paper"),
+}
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_hard_contacts_that_are_closed_have_no_rates_and_are_named(asked):
+    call = ASKED[asked]
+    for height, speed in ((0.2, 0.0), (0.1, 1.0)):  # it falls, or leaves the floor
+        call(ephs.dynamics(scene_of_text(HARD.format(height=height, speed=speed))))
+    closed = ephs.dynamics(scene_of_text(HARD.format(height=0.1, speed=0.0)))
+    with pytest.raises(ephs.SimulationError, match=r"contacts\.ball_floor.*closed"):
+        call(closed)
+    closed.step(closed.state0, 1e-3, "radau")  # whose steps have impulses
+
+
+def test_an_explicit_step_does_not_fall_through_a_hard_floor():
+    model = ephs.dynamics(scene_of_text(HARD.format(height=0.11, speed=-1.0)))
+    model.step(model.state0, 5e-3, "rk54")
+    with pytest.raises(ephs.SimulationError, match=r"contacts\.ball_floor.*closed"):
+        model.step(model.state0, 5e-2, "rk54")

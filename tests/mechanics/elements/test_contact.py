@@ -434,3 +434,52 @@ def test_the_heat_of_a_parts_surface_warms_the_node_of_the_part(tmp_path):
     warmed = 50.0 * (sol.thermal("left.skin").temperature[-1] - 293.15)
     assert sol.heat[-1] > 0.05
     assert warmed == pytest.approx(sol.heat[-1], rel=1e-9)
+
+
+TURNING = """
+[bodies.ball]
+mass = 2.0
+inertia = [8e-3, 8e-3, 8e-3]
+position = [0.0, 0.0, 0.0999]
+angular_velocity = [0.0, 0.0, 3.0]
+[surfaces.ball]
+body = "ball"
+shape = {{ sphere = 0.1 }}
+stiffness = 1e5
+loss = 1.0
+spinning = {arm}
+[surfaces.block]
+body = "ground"
+shape = {{ {shape} }}
+position = [0.0, 0.0, {below}]
+"""
+CUBE = [list(corner) for corner in product((-0.2, 0.2), repeat=3)]
+BLOCKS = {"plane = {}": 0.0, "box = [0.4, 0.4, 0.4]": -0.2, f"points = {CUBE}": -0.2, "cylinder = [0.2, 0.4]": -0.2}
+
+
+def slowed(shape, arm=5e-3):
+    text = HEAD.format(gravity=-9.81) + TURNING.format(shape=shape, below=BLOCKS[shape], arm=arm)
+    return ephs.simulate(scene_of_text(text), 0.1, method="rk87", rtol=1e-9, atol=1e-11).body("ball")
+
+
+@pytest.mark.parametrize("shape", BLOCKS)
+def test_a_ball_that_spins_on_a_face_is_slowed_whatever_has_the_face(shape):
+    """The arm times the mean normal force slows the ball; near the weight, about which the force swings."""
+    spin = slowed(shape).angular_velocity[-1, 2]
+    assert spin == pytest.approx(slowed("plane = {}").angular_velocity[-1, 2], abs=1e-6)
+    assert spin == pytest.approx(3.0 - 5e-3 * 2.0 * 9.81 * 0.1 / 8e-3, abs=0.3)
+    assert slowed(shape, arm=0.0).angular_velocity[-1, 2] == pytest.approx(3.0, abs=1e-6)  # the control
+
+
+@pytest.mark.parametrize("radii", [(0.1, 0.1), (0.1, 0.3)])
+def test_gaps_of_balls_that_change_roles_are_the_same(radii):
+    """Normals are opposite, points the same point in space, and they roll on the same radius."""
+    one, other = (rounded_box_sphere((0.0, 0.0, 0.0), *pair) for pair in (radii, radii[::-1]))
+    pose = np.array([0.8, 0.0, 0.6, 0.0, 0.05, -0.02, 0.99 * sum(radii)])
+    back = SE3.inverse(pose)
+    (normal, place), (opposite, again) = one.contact(pose), other.contact(back)
+    turn = quaternion_to_matrix(pose[:4])
+    np.testing.assert_allclose(turn @ normal, -np.array(opposite), atol=1e-14)
+    np.testing.assert_allclose(pose[4:] + turn @ place, again, atol=1e-14)
+    assert one.radius == pytest.approx(other.radius, rel=1e-14)
+    assert one.distance(pose) == pytest.approx(other.distance(back), abs=1e-14)
