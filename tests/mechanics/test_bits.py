@@ -9,7 +9,6 @@ from functools import cache, partial
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.explicit import tableau
@@ -19,6 +18,7 @@ from ephs.mechanics.tree.engine.residuals import ACTIVE, point_program
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
+from tests.numerics import seeds
 
 pytestmark = pytest.mark.optimised
 
@@ -102,9 +102,6 @@ def drawn(name, seed):
     rng = np.random.default_rng(seed)
     q = eq.moved(start.q, 0.1 * rng.standard_normal(eq.n))
     return eq, q, rng.standard_normal(eq.n), rng
-
-
-seeds = st.integers(0, 2**32 - 1)
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -20,6 +20,7 @@ from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
 from ephs.semantics.systems.laws import Probe, system_law
 from ephs.testing import mechanisms
+from tests.numerics import EPS
 from tests.written import scene_of_text
 
 SCENES = sorted((File(__file__).parents[2] / "scenes").glob("*.toml"))
@@ -121,7 +122,7 @@ def test_every_pair_with_every_method(kind, method):
     if kind == "fixed":  # nothing moves
         assert max(errors) <= 1e-15
         return
-    rounding = 8.0 * np.finfo(float).eps * np.abs(exact).max()
+    rounding = 8.0 * EPS * np.abs(exact).max()
     assert errors[1] <= max(errors[0] / 2.0 ** (order - (0.1 if order <= 4 else 0.5)), rounding)
     # no method is better than it says where errors can be seen
     assert errors[1] >= errors[0] / 2.0 ** (order + 0.25) or errors[0] < 1e-6
@@ -301,7 +302,7 @@ conductance = 100.0
 """
 
 
-ROUNDING = 8 * np.finfo(float).eps * 100.0 * 0.01
+ROUNDING = 8 * EPS * 100.0 * 0.01
 """Of the entropy that a conductance of 100 W/K passes on in a step of 0.01 s, in J/K."""
 
 

@@ -10,6 +10,7 @@ import ephs
 from ephs.mechanics.motion.views import Names
 from ephs.semantics.bundles.errors import AssemblyError
 from tests.mechanics.dynamics.drawn import moving
+from tests.numerics import largest
 from tests.written import scene_of_text
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
@@ -70,7 +71,7 @@ def followers():
 
 
 def same(found, expected):
-    return np.abs(np.asarray(found) - expected).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(expected).max(initial=0.0))
+    return largest(np.asarray(found) - expected, initial=0.0) <= ROUNDING * (1.0 + largest(expected, initial=0.0))
 
 
 def agrees(model, state, of=None):

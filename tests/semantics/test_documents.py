@@ -36,6 +36,7 @@ from ephs.semantics.documents.primitives import AGREEMENT, _evaluations
 from ephs.semantics.documents.systems import SCHEMA_FILE
 from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, WrittenFunction, record, recorded, term_from
 from ephs.testing import systems
+from tests.numerics import largest
 from tests.semantics.test_primitives import ARGUMENTS
 
 SCHEMA = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
@@ -107,7 +108,7 @@ def assert_same(one, two, tolerance=AGREEMENT):
     parts = dict(two.leaves())
     for path, primitive in one.leaves():
         for a, b in zip(_evaluations(primitive, 7), _evaluations(parts[path], 7), strict=True):
-            assert np.allclose(a, b, rtol=tolerance, atol=tolerance * np.abs(a).max(initial=0.0)), path
+            assert np.allclose(a, b, rtol=tolerance, atol=tolerance * largest(a, initial=0.0)), path
 
 
 @settings(deadline=None, max_examples=25)

@@ -18,11 +18,11 @@ from ephs.solve.equations.model import Model, compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import DONE, parts_of
+from tests.numerics import seeds
 
 pytestmark = pytest.mark.optimised
 
 ROOT = Path(__file__).resolve().parents[2]
-seeds = st.integers(0, 2**32 - 1)
 
 
 SCENES = ["heavy-top", "hot-brake"]

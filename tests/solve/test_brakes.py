@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 import ephs
 from ephs.solve.running.control import Symmetric
 from examples.failing import scene
+from tests.numerics import EPS
 
 RATE, ENERGY, WARM = 100.0, 5000.0, 300.0
-EPS = float(np.finfo(float).eps)
 
 
 def brake(friction, capacity=None):

@@ -14,6 +14,7 @@ from ephs import library
 from ephs import quantity as Q
 from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.analysis import dependent_rows, entangled, entries_at, exchanged
+from tests.numerics import EPS, largest, seeds
 
 ROOT = Path(__file__).parents[2]
 BRICARD = ROOT / "scenes/bricard.toml"
@@ -41,17 +42,17 @@ def test_long_steps_of_order_4_carry_a_linkage_of_special_geometry(exact):
     for step in (0.1, 0.05, 0.025, 0.0125):
         sol, found = run("natural4", step=step)
         assert sol.stats["cut_steps"] == 0
-        assert sol.energy_error.max() <= 10.0 * np.sqrt(5.0 / step) * 10.0 * np.finfo(float).eps
+        assert sol.energy_error.max() <= 10.0 * np.sqrt(5.0 / step) * 10.0 * EPS
         # ten roundings a step, times the condition of constraints that nearly repeat each other
-        assert sol.constraint_error.max() <= 10.0 * 100.0 * np.sqrt(5.0 / step) * np.finfo(float).eps
-        errors.append(np.abs(found - exact).max())
+        assert sol.constraint_error.max() <= 10.0 * 100.0 * np.sqrt(5.0 / step) * EPS
+        errors.append(largest(found - exact))
     assert errors[0] <= 1e-5
     assert np.all(np.array(errors[:-1]) >= 40.0 * np.array(errors[1:])), errors
 
 
 def test_chosen_steps_carry_it_too(exact):
     sol, found = run("natural4", rtol=1e-7, atol=1e-7)
-    assert np.abs(found - exact).max() <= 1e-6
+    assert largest(found - exact) <= 1e-6
     assert sol.stats["steps"] <= 100
 
 
@@ -80,7 +81,7 @@ def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishe
     scene = ring(tmp_path)
     for step in (0.01, 0.002):
         sol = ephs.simulate(scene, 1.3, method=method, step=step)
-        rounding = np.sqrt(1.3 / step) * np.finfo(float).eps
+        rounding = np.sqrt(1.3 / step) * EPS
         assert sol.constraint_error.max() <= 10.0 * 100.0 * rounding
         assert sol.energy_error.max() <= 10.0 * 10.0 * rounding
         assert sol.stats["dependent_equations"] == 1
@@ -103,7 +104,7 @@ def test_rank_depends_on_no_step(name, tmp_path):
 
 
 @settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 9), short=st.integers(1, 3))
+@given(seed=seeds, count=st.integers(2, 9), short=st.integers(1, 3))
 def test_what_is_left_out_depends_on_the_rest_and_is_of_the_preferred(seed, count, short):
     """Random rows of rank ``count − short``; the control takes the pivots' own choice, which asks no preference."""
     rng = np.random.default_rng(seed)
@@ -132,7 +133,7 @@ def test_the_control_leaves_out_whatever_the_pivots_say():
 
 
 @settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), loops=st.integers(0, 3))
+@given(seed=seeds, loops=st.integers(0, 3))
 def test_rows_with_an_effort_of_their_own_take_part_in_no_dependence(seed, loops):
     """A chain whose rows have two neighbours' efforts and one of their own, in any order, beside dependent rows."""
     rng = np.random.default_rng(seed)

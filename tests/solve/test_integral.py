@@ -13,8 +13,9 @@ from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.records import IRREVERSIBLE
 from examples import physics
+from tests.numerics import EPS, largest
 
-ROUNDING = float(np.finfo(float).eps)
+ROUNDING = EPS
 SYSTEMS = {"ladder": ladder(4), "grid": grid(9), "motor": physics.motor, "cylinder": physics.cylinder}
 OTHERS = {"springs in series": physics.springs, "a rod": physics.masses, "a lever": physics.lever}
 
@@ -51,7 +52,7 @@ def test_rates_and_all_else_solve_the_general_equations(name, seed):
     ports = spans(t.e_at[makers], t.dims[makers, 0])
     pairs = (found.sums, general.sums), (found.flows[ports], general.flows[ports]), (found.energies, general.energies)
     for one, other in pairs:
-        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13 * np.abs(other).max(initial=0.0))
+        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13 * largest(other, initial=0.0))
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -64,7 +65,7 @@ def test_derivatives_are_those_of_the_rates(name):
         h = 1e-5 * max(abs(x[j]), 1e-2)
         up, down = (own.residuals((x + s * h * unit)[None], none, inputs[None])[0] for s in (1.0, -1.0))
         column = found.states.toarray()[:, j]
-        assert np.abs((up - down) / (2.0 * h) - column).max() <= 1e-6 * max(np.abs(column).max(), 1.0)
+        assert largest((up - down) / (2.0 * h) - column) <= 1e-6 * max(largest(column), 1.0)
     assert np.array_equal(found.unknowns.toarray(), np.eye(x.size))
 
 

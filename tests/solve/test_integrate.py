@@ -13,6 +13,7 @@ from ephs.semantics.meaning.step import step as oracle_step
 from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.running.control import Grid
+from tests.numerics import largest
 
 START = {"osc.pe.q": 1.0}
 
@@ -47,7 +48,7 @@ def test_closed_form_of_the_damped_oscillator_at_order_two(damped):
     errors = []
     for h in (0.04, 0.02, 0.01):
         sol = ephs.simulate(damped, 8.0, initial=START, step=h)
-        errors.append(np.abs(sol["osc.pe.q"] - exact(sol.t)).max())
+        errors.append(largest(sol["osc.pe.q"] - exact(sol.t)))
     assert np.allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, atol=0.02)
 
 
@@ -145,7 +146,7 @@ def test_a_force_works_and_its_work_is_in_the_balance(driven, force):
     """From rest under a constant force: q = F/k (1 − cos ωt)."""
     sol = ephs.simulate(driven, 2.0, step=0.01, inputs={"p": {"flow": force}})
     exact = 0.7 / 1.5 * (1.0 - np.cos(np.sqrt(1.5) * sol.t))
-    assert np.abs(sol["pe.q"] - exact).max() < 1e-4
+    assert largest(sol["pe.q"] - exact) < 1e-4
     assert np.allclose(sol.work, 0.7 * sol["pe.q"], rtol=0.0, atol=1e-13)
     assert sol.energy_error.max() < 1e-13
 
@@ -160,7 +161,7 @@ def test_inputs_of_time_enter_at_order_two(driven):
     errors = []
     for h in (0.04, 0.02, 0.01):
         sol = ephs.simulate(driven, 4.0, step=h, inputs={"p": {"flow": lambda t: np.cos(forced * t)}})
-        errors.append(np.abs(sol["pe.q"] - exact(sol.t)).max())
+        errors.append(largest(sol["pe.q"] - exact(sol.t)))
     assert np.allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, atol=0.05)
 
 
@@ -239,10 +240,10 @@ def test_a_piston_swings_between_two_gases():
     start = {"left.v": 0.8e-3, "right.v": 1.2e-3}
     sol = ephs.simulate(system, 1.0, step=1e-3, initial=start)
     assert sol.energy_error.max() <= 1e-12
-    assert np.abs(sol["left.v"] + sol["right.v"] - 2e-3).max() <= 1e-17
+    assert largest(sol["left.v"] + sol["right.v"] - 2e-3) <= 1e-17
     assert np.all(np.diff(sol.entropy) >= 0.0)
     assert sol.ledger("friction").made[-1] > 0.0
-    assert np.abs(sol["mass.p"][-1]) < 0.01 * np.abs(sol["mass.p"]).max()
+    assert np.abs(sol["mass.p"][-1]) < 0.01 * largest(sol["mass.p"])
 
 
 def test_a_volume_wants_an_initial_value():

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
@@ -15,10 +14,10 @@ from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of
 from ephs.solve.methods.residuals import evaluation_program
 from ephs.solve.methods.scales import SPREAD, TAKES_PART
+from tests.numerics import seeds
 
 CALLS = evaluation_program().compiled()
 ROOT = Path(__file__).resolve().parents[2]
-seeds = st.integers(0, 2**32 - 1)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
+from tests.numerics import EPS, largest
 
 GOOD = 1e-8
 """What extrapolated differences are good for, relative to the largest entry."""
@@ -29,12 +30,12 @@ def difference(function, size, step=1e-3):
 
 def close(found, expected, tolerance=GOOD):
     assert found.shape == expected.shape
-    assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max(initial=0.0))
+    assert largest(found - expected, initial=0.0) <= tolerance * max(1.0, largest(expected, initial=0.0))
 
 
 def assert_near(found, expected, rates):
     """Equal to rounding of what is quadratic in rates, of lengths of a few metres."""
-    assert np.abs(found - expected).max(initial=0.0) <= 1e-12 * (1.0 + float(rates @ rates))
+    assert largest(found - expected, initial=0.0) <= 1e-12 * (1.0 + float(rates @ rates))
 
 
 def shifted(model, state, part, by):
@@ -103,7 +104,7 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
         return
     exact = model.derivatives(state)
     mass = model.mass_matrix(state)
-    tolerance = 10.0 * np.finfo(float).eps * np.linalg.cond(mass)
+    tolerance = 10.0 * EPS * np.linalg.cond(mass)
     for forward, inverse in (
         (exact.acceleration_q, exact.force_q),
         (exact.acceleration_r, exact.force_r),
@@ -111,7 +112,7 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
     ):
         expected = -np.linalg.solve(mass, inverse)
         size = np.abs(np.linalg.inv(mass)) @ np.abs(inverse)
-        assert np.abs(forward - expected).max() <= tolerance * max(1.0, size.max())
+        assert largest(forward - expected) <= tolerance * max(1.0, size.max())
 
 
 @settings(max_examples=30)
@@ -186,8 +187,8 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
     linear.inverse(q, r, s, a)
     inverse, mass = linear.columns(solve=False), equations.mass(q, r)
     assert np.array_equal(forward[n:], inverse[n:])
-    size = max(1.0, np.abs(inverse).max(), np.abs(mass).max() * np.abs(forward[:n]).max())
-    assert np.abs(mass @ forward[:n] + inverse[:n]).max() <= 10 * np.finfo(float).eps * np.linalg.cond(mass) * size
+    size = max(1.0, largest(inverse), largest(mass) * largest(forward[:n]))
+    assert largest(mass @ forward[:n] + inverse[:n]) <= 10 * EPS * np.linalg.cond(mass) * size
 
 
 @settings(max_examples=10)

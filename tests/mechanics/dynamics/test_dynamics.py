@@ -11,9 +11,9 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
+from tests.numerics import EPS, largest
 
 SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
-EPS = np.finfo(float).eps
 
 
 def whole(model, by_joint):
@@ -43,8 +43,8 @@ def test_accelerations_solve_the_equations_of_motion(drawn):
     expected = free + np.linalg.solve(root.T, correction)
     found = whole(model, model.acceleration(state, model.layout.by_joint(forces)))
     terms = np.abs(np.linalg.inv(mass)) @ (np.abs(pushed) + np.abs(model.bias(state)))
-    tolerance = 100.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), np.abs(expected).max())
-    assert np.abs(found[:n] - expected).max(initial=0.0) <= tolerance / (EXPLICIT if k else 1.0)
+    tolerance = 100.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), largest(expected))
+    assert largest(found[:n] - expected, initial=0.0) <= tolerance / (EXPLICIT if k else 1.0)
 
 
 @settings(max_examples=50)
@@ -57,8 +57,8 @@ def test_inverse_dynamics_inverts_accelerations(drawn):
     forces = model.inverse_dynamics(state, reached)
     again = model.acceleration(state, forces)
     condition = np.linalg.cond(model.mass_matrix(state))
-    size = max(1.0, np.abs(whole(model, reached)).max(), np.abs(model.bias(state)).max(initial=0.0) * condition)
-    assert np.abs(whole(model, again) - whole(model, reached)).max() <= 1e3 * condition * EPS * size
+    size = max(1.0, largest(whole(model, reached)), largest(model.bias(state), initial=0.0) * condition)
+    assert largest(whole(model, again) - whole(model, reached)) <= 1e3 * condition * EPS * size
     assert all(not forces[name].any() for name in model.cut if not (model.layout.freedoms[name] < n).any())
 
 
@@ -69,10 +69,10 @@ def test_jacobians_carry_rates_to_bodies(drawn):
     rates = whole(model, state.rates)[: model.layout.n]
     at = rng.standard_normal(3)
     for name, body in model.bodies(state).items():
-        scale = 100.0 * EPS * max(1.0, np.abs(model.jacobian(state, name)).max() * np.abs(rates).sum())
-        assert np.abs(model.jacobian(state, name) @ rates - body.twist).max() <= scale
+        scale = 100.0 * EPS * max(1.0, largest(model.jacobian(state, name)) * np.abs(rates).sum())
+        assert largest(model.jacobian(state, name) @ rates - body.twist) <= scale
         velocity = body.point(at)[1]
-        assert np.abs(model.jacobian(state, name, at) @ rates - velocity).max() <= 10.0 * scale
+        assert largest(model.jacobian(state, name, at) @ rates - velocity) <= 10.0 * scale
     kinetic = 0.5 * rates @ model.mass_matrix(state) @ rates
     assert model.energies(state).kinetic == pytest.approx(kinetic, rel=1e-12, abs=1e-12)
 
@@ -104,7 +104,7 @@ def test_accelerations_are_how_rates_change(drawn):
     a = whole(model, model.acceleration(state))
     after = [whole(model, x.rates) for x in steps]
     forward = (4.0 * (after[0] - rates) - (after[1] - rates)) / (2.0 * h)
-    assert np.abs(forward - a).max() <= 1e-3 * max(1.0, np.abs(a).max())
+    assert largest(forward - a) <= 1e-3 * max(1.0, largest(a))
 
 
 @settings(max_examples=25)
@@ -119,8 +119,8 @@ def test_a_step_is_the_first_of_a_simulation_and_changes_no_state(drawn, method)
     assert np.array_equal(state.array, before)
     sol = ephs.simulate(scene, h, method=method, step=h)
     for name, body in model.bodies(step).items():
-        assert np.abs(sol.body(name).position[-1] - body.position).max() <= 1e-9 * max(1.0, np.abs(body.position).max())
-        assert np.abs(sol.body(name).velocity[-1] - body.velocity).max() <= 1e-9 * max(1.0, np.abs(body.velocity).max())
+        assert largest(sol.body(name).position[-1] - body.position) <= 1e-9 * max(1.0, largest(body.position))
+        assert largest(sol.body(name).velocity[-1] - body.velocity) <= 1e-9 * max(1.0, largest(body.velocity))
 
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)

@@ -22,6 +22,7 @@ from ephs.solve.methods.continuous import Continuous
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
+from tests.numerics import largest
 
 
 def extrapolated(function, h=1e-2):
@@ -65,9 +66,9 @@ def test_a_moving_loop_linearises_as_differences_say(name, joint, other, body, s
         return np.concatenate([model.acceleration(state)[joint], *seen])
 
     expected = np.column_stack([extrapolated(lambda d: at(d, 0.0)), extrapolated(lambda d: at(0.0, d))])
-    assert np.abs(found.A[0, :2] - [0.0, 1.0]).max() < 1e-12
-    assert np.abs(found.A[1, :2] - expected[0]).max() < 1e-8 * np.abs(expected[0]).max()
-    assert np.abs(found.C[:, :2] - expected[1:]).max() < 1e-8 * max(1.0, np.abs(expected).max())
+    assert largest(found.A[0, :2] - [0.0, 1.0]) < 1e-12
+    assert largest(found.A[1, :2] - expected[0]) < 1e-8 * largest(expected[0])
+    assert largest(found.C[:, :2] - expected[1:]) < 1e-8 * max(1.0, largest(expected))
 
 
 def spinning_rod():
@@ -117,7 +118,7 @@ def turns_with_the_loop(model, state):
 
     for j in range(k):
         expected = extrapolated(lambda h, j=j: rates(h * Z[:, j]))
-        assert np.abs(Y[:, j] - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
+        assert largest(Y[:, j] - expected) < 1e-6 * max(1.0, largest(expected))
 
 
 @settings(max_examples=10)
@@ -157,7 +158,7 @@ def test_a_moving_tree_linearises_as_its_flow_does(drawn):
 
     rough = [(flow(h) - flow(-h)) / (2.0 * h) for h in (4e-3, 2e-3)]
     expected = (4.0 * rough[1] - rough[0]) / 3.0
-    assert np.abs(found.A - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
+    assert largest(found.A - expected) < 1e-6 * max(1.0, largest(expected))
 
 
 @pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
@@ -189,7 +190,7 @@ def test_mujoco_differentiates_a_robot_alike():
     for expected, matrix in zip(
         blocks, (found.A[np.ix_(rates, order)], found.A[np.ix_(rates, rates)], found.B[rates]), strict=True
     ):
-        assert np.abs(matrix - expected).max() < 1e-7 * np.abs(expected).max()
+        assert largest(matrix - expected) < 1e-7 * largest(expected)
 
 
 def test_forces_wrenches_and_markers_push_as_the_motion_says():
@@ -238,7 +239,7 @@ def test_a_heavy_body_on_a_ball_joint_swings_like_a_pendulum():
     omega = np.sqrt(body.mass * 9.81 * arm / (body.inertia[0, 0] + body.mass * arm**2))
     values = ephs.linearize(scene).eigenvalues
     swinging = values[np.abs(values) > 1e-6]
-    assert np.abs(np.abs(swinging.imag) - omega).max() < 1e-9 * omega and np.all(swinging.real == 0.0)
+    assert largest(np.abs(swinging.imag) - omega) < 1e-9 * omega and np.all(swinging.real == 0.0)
 
 
 # ---- laws --------------------------------------------------------------------------------------------------------
@@ -253,7 +254,7 @@ def test_at_an_equilibrium_the_laws_hold(scene):
         assert "no state found in which nothing moves" in str(error)
         return
     model = ephs.dynamics(rest.model)
-    assert max((np.abs(a).max(initial=0.0) for a in model.acceleration(model.state0).values()), default=0.0) < 1e-6
+    assert max((largest(a, initial=0.0) for a in model.acceleration(model.state0).values()), default=0.0) < 1e-6
     found = ephs.linearize(rest.model)
     assert found.structure is not None, found.reason
     for law in found.laws:
@@ -283,7 +284,7 @@ def test_joint_coordinates_and_the_papers_states_have_the_same_modes(name):
     paper = ephs.linearize(rest, form="paper").eigenvalues
     moving = paper[np.abs(paper) > 1e-4 * np.abs(found).min()]
     assert moving.size == found.size
-    assert np.abs(np.sort_complex(moving) - np.sort_complex(found)).max() < 1e-6 * np.abs(found).max()
+    assert largest(np.sort_complex(moving) - np.sort_complex(found)) < 1e-6 * largest(found)
 
 
 @pytest.mark.parametrize("name", ["heavy-top", "chain", "bricard"])
@@ -298,7 +299,7 @@ def test_derivatives_by_states_are_those_of_the_equations_where_mechanisms_turn(
     steps = 1e-6 * np.eye(d.rate_size)
     ends = [[equations.residual(d.advance(x, by), z, inputs) for by in (step, -step)] for step in steps]
     near = np.array([(after - before) / 2e-6 for after, before in ends]).T
-    assert np.abs(found - near).max() <= 1e-8 * np.abs(found).max()
+    assert largest(found - near) <= 1e-8 * largest(found)
 
 
 def test_the_papers_states_of_a_fast_crank_are_linearised():

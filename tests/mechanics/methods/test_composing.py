@@ -5,12 +5,12 @@ part by part from those that look at the energy of the whole. What else composin
 nesting and elimination, is measured of `natural` in `tests/semantics/test_naturality.py`.
 """
 
-import numpy as np
 import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from tests.mechanics.plain import uncorrected
+from tests.numerics import largest
 
 ROUNDING = 1e-12
 """Of ten steps whose equations are solved to rounding, with a condition of some hundreds."""
@@ -60,7 +60,7 @@ def missed(folder, method):
     run = {"method": method, "step": step, "audit": "off"}
     whole = ephs.simulate(both, 10 * step, **run)
     apart = [
-        np.abs(whole.body(name).position - ephs.simulate(scene, 10 * step, **run).body(name).position).max()
+        largest(whole.body(name).position - ephs.simulate(scene, 10 * step, **run).body(name).position)
         for name, scene in parts.items()
     ]
     return max(apart), whole.energy_error.max()

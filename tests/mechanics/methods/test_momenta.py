@@ -14,6 +14,7 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.running import loop
 from tests.mechanics.momenta import floating, momenta
+from tests.numerics import largest
 from tests.written import scene_of_text
 
 SCENES = Path(__file__).parents[3] / "scenes"
@@ -37,7 +38,7 @@ def drift(scene, sol, columns=slice(None)):
     for name, body in scene.all_bodies():
         motion = sol.body(name)
         far = 1.0 + np.linalg.norm(motion.position, axis=1).max()
-        size += body.mass * far * (np.abs(motion.velocity).max() + np.abs(motion.angular_velocity).max())
+        size += body.mass * far * (largest(motion.velocity) + largest(motion.angular_velocity))
     return float(np.abs(found - found[0])[:, columns].max() / size)
 
 
@@ -102,9 +103,7 @@ def test_keeping_momenta_leaves_the_order_as_it_is(method, order):
     exact = ephs.simulate(scene, 0.8, method="rk87", rtol=1e-13, atol=1e-13)
     for step in (0.1, 0.05):
         sol = ephs.simulate(scene, 0.8, method=method, step=step, options=BOTH, audit="off")
-        ends.append(
-            max(np.abs(sol.body(b).position[-1] - exact.body(b).position[-1]).max() for b, _ in scene.all_bodies())
-        )
+        ends.append(max(largest(sol.body(b).position[-1] - exact.body(b).position[-1]) for b, _ in scene.all_bodies()))
     assert np.log2(ends[0] / ends[1]) > order - 0.6
 
 

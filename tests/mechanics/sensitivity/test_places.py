@@ -8,6 +8,7 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent, _whole
 from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, ParameterFamily
+from tests.numerics import EPS, largest
 
 HUNG = """
 format = 1
@@ -54,8 +55,8 @@ def test_two_neighbours_tell_what_six_do(name, monkeypatch):
                 near = stepper._by(j, read)
             six = other._by(j, read)
             sizes = np.abs(read(*stepper._other(j, OUTER[1][0] * stepper.family.parameters[j].step)[1:]))
-            rounding = 8.0 * np.finfo(float).eps * sizes.max() / stepper.family.parameters[j].step
-            assert np.abs(near - six).max() <= rounding
+            rounding = 8.0 * EPS * sizes.max() / stepper.family.parameters[j].step
+            assert largest(near - six) <= rounding
 
 
 def test_what_is_of_no_low_degree_takes_six(tmp_path):

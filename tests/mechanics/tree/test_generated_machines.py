@@ -2,7 +2,6 @@
 
 import numpy as np
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, junction
@@ -16,6 +15,7 @@ from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import nested, problem_of
 from tests.mechanics.tree.general import held_to_the_general_form
+from tests.numerics import seeds
 
 THETA = 293.15
 
@@ -125,7 +125,7 @@ class Bench:
 
 
 @settings(max_examples=20, deadline=None)
-@given(mechanisms(max_bodies=3), st.integers(0, 2**32 - 1))
+@given(mechanisms(max_bodies=3), seeds)
 def test_joint_coordinates_and_the_general_form_are_one(scene, seed):
     problem = Bench(scene, np.random.default_rng(seed)).problem()
     eq = ReducedEquations(problem, 0.0)

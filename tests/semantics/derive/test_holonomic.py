@@ -14,8 +14,8 @@ from ephs.semantics.derive.relations import compiled, program, sizes
 from ephs.semantics.primitives.pullback import Map, pull_back, pulled_ports
 from ephs.semantics.spaces import PAIRS, SE3, pair
 from ephs.semantics.verdicts.checks import random_efforts, random_point
+from tests.numerics import EPS
 
-EPS = np.finfo(float).eps
 MOMENTUM = PortType(Q.body_momentum, True)
 seeds = st.integers(0, 2**20)
 MAPS = {

@@ -21,8 +21,8 @@ from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.stage import PLAIN
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
+from tests.numerics import EPS, largest
 
-EPS = np.finfo(float).eps
 seeds = st.integers(0, 2**20)
 
 
@@ -133,7 +133,7 @@ def test_the_ends_of_a_step_may_be_exchanged(name, seed):
     v = 0.15 * rng.standard_normal(storage.bundle.size)
     there, _ = moved(storage, point, v)
     one, two = storage.discrete_gradient(point, v), storage.discrete_gradient(there, -v)
-    assert np.abs(one - two).max() <= 1e4 * EPS * (1.0 + np.abs(one).max())
+    assert largest(one - two) <= 1e4 * EPS * (1.0 + largest(one))
 
 
 SINGLE = [*FUNCTIONS, "tan", "asin", "acos"]
@@ -221,7 +221,7 @@ def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, seed):
     assert found == status
     values = ("e", "c") if primitive.kind == "storage" else ("f", "c")
     for argument in values:
-        size = 8.0 * EPS * (1.0 + np.abs(over[argument]).max(initial=0.0))
+        size = 8.0 * EPS * (1.0 + largest(over[argument], initial=0.0))
         assert over[argument] == pytest.approx(rest[argument], rel=0.0, abs=size), argument
 
 
@@ -249,7 +249,7 @@ def test_jacobians_are_derivatives(name, seed):
         values[i] = kept
         slope = (8.0 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12.0 * h)
         # a difference carries ε/h of the values, and h⁴ of fifth derivatives: near half a turn the third ones are large
-        assert np.abs(found[:, j] - slope).max() <= 1e-9 * (1.0 + np.abs(ends[0]).max() + np.abs(found).max())
+        assert largest(found[:, j] - slope) <= 1e-9 * (1.0 + largest(ends[0]) + largest(found))
 
 
 @pytest.mark.parametrize("name", ["drag", "conduction"])
@@ -292,7 +292,7 @@ def test_points_over_a_step_are_those_of_the_groups(code, seed, length):
     rng = np.random.default_rng(seed)
     x, v = space.random(rng), length * rng.standard_normal(space.dim)
     numbers = over(PLAIN, code, list(x), list(v), 0)
-    size = 1.0 + np.abs(x).max()
+    size = 1.0 + largest(x)
     there = space.retract(x, v)
     if code != codes.SE2 and there[:4] @ [float(number.end) for number in numbers[:4]] < 0.0:
         there[:4] *= -1.0  # the same rotation

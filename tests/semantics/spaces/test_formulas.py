@@ -10,9 +10,8 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.spaces.staged_groups import STAGED, included
 from ephs.semantics.spaces.vectors import symmetric_inverse, upper
 from ephs.semantics.stage import PLAIN, Entry, Program, vector
+from tests.numerics import EPS, largest, seeds
 
-EPS = np.finfo(float).eps
-seeds = st.integers(0, 2**32 - 1)
 GROUPS = {codes.VECTOR: vector_space("real", 3), codes.SO3: SO3, codes.SE2: SE2, codes.SE3: SE3, codes.SO3xR3: SO3xR3}
 
 
@@ -106,8 +105,8 @@ def test_a_formula_is_what_the_group_says(name, seed, size):
     assert np.array_equal(found, machine)
     k = QUATERNIONS.get(name, 0)
     found[:k] *= np.sign(found[:k] @ expected[:k]) if k else 1.0
-    scale = max(1.0, *(np.abs(x).max() for x in inputs)) ** 2
-    assert np.abs(found - expected).max() <= 100 * EPS * scale * max(1.0, np.abs(expected).max())
+    scale = max(1.0, *(largest(x) for x in inputs)) ** 2
+    assert largest(found - expected) <= 100 * EPS * scale * max(1.0, largest(expected))
 
 
 @pytest.mark.parametrize("code", STAGED)
@@ -132,7 +131,7 @@ def test_the_frame_of_a_joint_is_its_pose(name, seed):
     rotation, place = included(PLAIN, joint.code, joint.basis.T.tolist(), list(x))
     pose = joint.include(x)
     assert np.allclose(rotation, quaternion_to_matrix(pose[:4]), atol=1e-14)
-    assert np.allclose(place, pose[4:], atol=1e-14 * max(1.0, np.abs(x).max(initial=0.0)))
+    assert np.allclose(place, pose[4:], atol=1e-14 * max(1.0, largest(x, initial=0.0)))
 
 
 @pytest.mark.parametrize("size", range(1, 7))
@@ -146,6 +145,6 @@ def test_a_symmetric_matrix_is_inverted_where_it_is_positive(size, seed):
     condition = values.max() / values.min()
     assert sound
     assert np.array_equal(upper(inverse), upper(np.transpose(inverse)))
-    assert np.abs(np.array(inverse) - exact).max() <= 100 * EPS * condition * np.abs(exact).max()
+    assert largest(np.array(inverse) - exact) <= 100 * EPS * condition * largest(exact)
     values[rng.integers(size)] *= -1.0
     assert not symmetric_inverse(PLAIN, (turn * values @ turn.T).tolist())[1]

@@ -26,8 +26,9 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.duals import StagedDual
 from ephs.semantics.stage.evaluator import FUNCTIONS
+from tests.numerics import EPS
 
-EPSILON = np.finfo(float).eps
+EPSILON = EPS
 COMPLEX = {
     "sqrt": cmath.sqrt,
     "absolute": lambda x: x if x.real > 0 else -x,

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ephs.semantics.stage import Entry, Program, Record, function, indices, integer, real, signature_of, table, vector
 from ephs.semantics.stage.gradients import Gradients
 from ephs.semantics.stage.taped import COUNT
+from tests.numerics import largest, seeds
 
 NEAR = 1e-13
 """Part of the largest derivative: some hundred terms of either way round."""
@@ -74,7 +74,7 @@ def columns(seed):
 
 @pytest.mark.parametrize("compiled", [True, False])
 @settings(max_examples=5)
-@given(seed=st.integers(0, 2**32 - 1))
+@given(seed=seeds)
 def test_a_tape_says_what_tangents_say(compiled, seed):
     expected = columns(seed)
     made = Gradients(WINDINGS, compiled=compiled, **drawn(seed))
@@ -82,7 +82,7 @@ def test_a_tape_says_what_tangents_say(compiled, seed):
     for row, share in zip(expected, np.eye(2), strict=True):
         found = made.pull({"out": share})
         mine = np.concatenate([found["springs"], found["x"]])
-        assert np.abs(mine - row).max() <= NEAR * max(1.0, np.abs(expected).max())
+        assert largest(mine - row) <= NEAR * max(1.0, largest(expected))
 
 
 def test_a_tape_that_is_too_short_grows():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ephs
+from tests.numerics import largest
 
 ROOT = Path(__file__).resolve().parents[3]
 SHARP = {"method": "rk87", "rtol": 1e-11, "atol": 1e-13}
@@ -28,11 +29,11 @@ def test_exported_and_read_back_it_moves_as_here(tmp_path, name, joint, size):
     held = {f"joints.{joint}": ephs.Sampled(period, force)}
     sol = ephs.simulate(scene, until, inputs=held, save_at=found.t, **SHARP)
     free = ephs.Exchange({"unit": unit}, period).run(until)
-    scale = np.abs(sol.joint(joint).rate).max()
+    scale = largest(sol.joint(joint).rate)
     for what in ("coordinate", "rate"):
         here = getattr(sol.joint(joint), what)[:, 0]
-        assert np.abs(found[f"unit.joints.{joint}.{what}"] - here).max() <= 1e-9 * scale
-        assert np.abs(free[f"unit.joints.{joint}.{what}"] - here).max() > 1e-3 * scale, "the control"
+        assert largest(found[f"unit.joints.{joint}.{what}"] - here) <= 1e-9 * scale
+        assert largest(free[f"unit.joints.{joint}.{what}"] - here) > 1e-3 * scale, "the control"
 
 
 def test_signals_go_from_unit_to_unit(springs, carts):

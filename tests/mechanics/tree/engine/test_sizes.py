@@ -15,8 +15,7 @@ from ephs.semantics.stage import Program, real, vector
 from ephs.solve.march.account import ROUNDING
 from ephs.testing import mechanisms
 from tests.mechanics.tree.engine.test_engine import SCENES
-
-EPS = float(np.finfo(float).eps)
+from tests.numerics import EPS, largest
 
 
 def sized(on, motion, y0, y1, out):
@@ -81,4 +80,4 @@ def test_totals_count_from_wherever_a_step_finds_them(name, seed):
     end, shift = start + 1e-3 * rng.random(start.size), np.zeros(start.size)
     shift[at:] = rng.standard_normal(start.size - at)
     one, other = eq.settled(start, end.copy()), eq.settled(start + shift, end + shift)
-    assert np.abs(other - shift - one).max() <= 64.0 * EPS * (1.0 + np.abs(one).max() + np.abs(shift).max())
+    assert largest(other - shift - one) <= 64.0 * EPS * (1.0 + largest(one) + largest(shift))
