@@ -15,6 +15,7 @@ from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
 from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
 METHODS = ("natural", "natural4")
 
@@ -71,7 +72,7 @@ def test_checks_say_how_far_joints_are_closed():
 
 
 def test_the_system_of_a_scene_starts_as_the_scene_and_what_is_given_moves_the_rest():
-    scene = ephs.load(Path(__file__).parents[2] / "scenes" / "chain.toml")
+    scene = shipped("chain")
     system = scene.system()
     run = {"until": 0.1, "method": "rk54", "step": 0.01}
     one, two = ephs.simulate(system, **run), ephs.simulate(scene, **run)
@@ -87,14 +88,14 @@ def test_the_system_of_a_scene_starts_as_the_scene_and_what_is_given_moves_the_r
 
 @pytest.mark.parametrize("method", ["auto", "rk87", "natural"])
 def test_an_input_that_is_missing_is_named(method):
-    system = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml").system()
+    system = shipped("four-bar").system()
     with pytest.raises(AssemblyError, match=r"^drives\.main: .* give inputs=\{'drives\.main'"):
         ephs.simulate(system, 0.1, method=method)
 
 
 @pytest.mark.parametrize("name", ["four-bar", "chain", "universal"])
 def test_velocity_residuals_are_measured_as_of_scenes(name, monkeypatch):
-    scene = ephs.load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
+    scene = shipped(name)
     inputs = {str(path): {"flow": one.value} for path, one in scene_inputs(scene).items()}
     run = {"until": 0.02, "method": "rk54", "step": 2e-3, "audit": "off"}
     sol = ephs.simulate(scene.system(), inputs=inputs, **run)
@@ -163,7 +164,7 @@ def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method, 
 @pytest.mark.parametrize("method", ["rk54", "natural"])
 def test_ports_of_a_system_are_those_of_its_scene(method):
     """By natural, momenta between steps are off the joints by its error; ports are asked at momenta on them."""
-    scene = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
+    scene = shipped("four-bar")
     run = {"until": 0.1, "method": method, "step": 0.02, "audit": "off"}
     inputs = {str(path): {"flow": one.value} for path, one in scene_inputs(scene).items()}
     one, two = ephs.simulate(scene, **run), ephs.simulate(scene.system(), inputs=inputs, **run)

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-import ephs
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.sensitivity.family import relation_of
 from ephs.mechanics.tree.engine.residuals import ACTIVE, point_program
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
 from tests.numerics import seeds
+from tests.scenes import equations_of, shipped
 
 pytestmark = pytest.mark.optimised
 
@@ -35,7 +33,7 @@ ALIASES = {
 
 @cache
 def equations(name):
-    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     return eq, eq.start(0.0)
 
 

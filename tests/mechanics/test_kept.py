@@ -10,14 +10,13 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.operad import Path, Pattern, junction
 from ephs.operad import quantity as Q
 from ephs.solve.equations.model import compile_model
 from tests.mechanics.tree import machines
+from tests.scenes import equations_of
 
 FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 
@@ -43,23 +42,23 @@ def digest(equations):
 @pytest.mark.parametrize("method", METHODS)
 def test_the_next_run_has_the_digits_of_the_first(method):
     scene = ephs.load(FOUR_BAR)
-    first, kept = ran(scene, method), ReducedEquations(problem_of_scene(scene), 0.0)
+    first, kept = ran(scene, method), equations_of(scene)
     before = digest(kept)
     assert same(ran(scene, method), first)
     assert same(ran(ephs.load(FOUR_BAR), method), first)
-    assert digest(ReducedEquations(problem_of_scene(scene), 0.0)) == before
+    assert digest(equations_of(scene)) == before
     kept.reduced.tables.inertia[0] *= 1.5  # written where all read: seen in the digest and in the next run
-    assert digest(ReducedEquations(problem_of_scene(scene), 0.0)) != before
+    assert digest(equations_of(scene)) != before
 
 
 def test_what_is_found_is_found_once():
     scene = ephs.load(FOUR_BAR)
-    one, other = (ReducedEquations(problem_of_scene(scene), 0.0) for _ in range(2))
+    one, other = (equations_of(scene) for _ in range(2))
     assert one.reduced is other.reduced
     assert one.model.tables is other.model.tables
     assert one.problem.system is other.problem.system
     assert one.engine.work["force"] is not other.engine.work["force"]
-    assert ReducedEquations(problem_of_scene(ephs.load(FOUR_BAR)), 0.0).reduced is not one.reduced
+    assert equations_of(ephs.load(FOUR_BAR)).reduced is not one.reduced
 
 
 @pytest.mark.parametrize("method", ["rk87", "natural"])
@@ -96,10 +95,10 @@ def test_runs_side_by_side_share_what_is_kept():
 
 def test_a_sweep_leaves_the_scene_as_it_is():
     scene = ephs.load(FOUR_BAR)
-    before = ran(scene, "rk87"), digest(ReducedEquations(problem_of_scene(scene), 0.0))
+    before = ran(scene, "rk87"), digest(equations_of(scene))
     ephs.sweep(scene, {"bodies.crank.mass": [1.0, 2.0, 5.0]}, 0.01, method="rk87")
     assert same(ran(scene, "rk87"), before[0])
-    assert digest(ReducedEquations(problem_of_scene(scene), 0.0)) == before[1]
+    assert digest(equations_of(scene)) == before[1]
 
 
 def test_tables_call_the_functions_of_their_own_run():

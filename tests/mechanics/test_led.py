@@ -9,6 +9,7 @@ import ephs
 from benchmarks.hard.dead_centre import RATE, folding, gained
 from ephs import PolynomialMotion
 from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
 UNTIL = 4.9
 SHAFT = """
@@ -80,7 +81,7 @@ def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier(tmp_path):
 @pytest.mark.parametrize("method", ["natural", "natural4"])
 def test_a_loop_that_is_held_at_rest_takes_few_iterations(method):
     """All velocities are rounding: residuals of constraints have no scale of their own, and none is made of it."""
-    scene = ephs.load("scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     scene = replace(
         scene,
         bodies={name: replace(body, twist=np.zeros(6)) for name, body in scene.bodies.items()},

@@ -1,7 +1,5 @@
 """What all methods share: control of the step, events, time backwards, registration; and what each one promises."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,9 +14,9 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.solve.running.stepping import Attempt
 from tests.numerics import largest
+from tests.scenes import shipped
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[2]
 BY_NAME = {case.name: case for case in CASES}
 OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(
     pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
@@ -56,7 +54,7 @@ def test_events_are_located_on_the_oscillator(method):
 
 @pytest.mark.parametrize("method", OF_SCENES)
 def test_an_event_stops_a_scene_where_it_happens(method):
-    scene = ephs.load(ROOT / "scenes/chain.toml")
+    scene = shipped("chain")
     name = next(n for n, _ in scene.all_bodies())
     path = f"bodies.{name}.pe.q"
     full = ephs.simulate(scene, 0.4, **setting(method, 0.01))
@@ -81,7 +79,7 @@ def test_directions_of_events(level, direction):
 
 
 def test_events_survive_a_file(tmp_path):
-    scene = ephs.load(ROOT / "scenes/heavy-top.toml")
+    scene = shipped("heavy-top")
 
     def quarter(t, state):
         return t - 0.25
@@ -118,7 +116,7 @@ def test_there_and_back_again(method):
 
 def test_friction_does_not_run_backward():
     with pytest.raises(ephs.OptionError, match=r"until is -1.*mf produces entropy"):
-        ephs.simulate(ephs.load(ROOT / "scenes/mbs.toml"), -1.0)
+        ephs.simulate(shipped("mbs"), -1.0)
 
 
 # ---- steps ----------------------------------------------------------------------------------------------------------
@@ -147,7 +145,7 @@ def test_steps_keep_their_limits(method):
 
 
 def test_a_tolerance_for_one_joint_steers_by_it():
-    scene = ephs.load(ROOT / "scenes/chain.toml")
+    scene = shipped("chain")
     joint = next(n for n, _ in scene.all_joints())
     loose = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol=1e-3)
     tight = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol={"*": 1e-3, f"joints.{joint}": 1e-9})
@@ -199,7 +197,7 @@ def test_systems_without_bodies_are_left_to_radau():
 
 @pytest.mark.parametrize("method", OF_SCENES)
 def test_initial_states_off_the_joints_are_refused(method):
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     first = ephs.simulate(scene, 1e-3)
     moved = np.array(first["bodies.crank.pe.q"][0])
     moved[4] += 0.01
@@ -247,13 +245,13 @@ def test_a_force_that_is_zero_but_for_rounding_stops_no_step(method):
 @pytest.mark.parametrize("step", [2e-3, 1e-3])
 def test_what_repeats_by_build_stays_left_out(step):
     """Bricard's loop is closed once too often wherever it is; rounding in what is left out must not count as rank."""
-    sol = ephs.simulate(ephs.load(ROOT / "scenes/bricard.toml"), 1.0, method="natural", step=step)
+    sol = ephs.simulate(shipped("bricard"), 1.0, method="natural", step=step)
     assert sol.energy_error.max() <= 1e-12 and sol.constraint_error.max() <= 1e-12
     assert sol.stats["dependent_equations"] == 1
 
 
 def test_natural4_is_of_order_four_with_friction_heat_and_loops():
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     exact = bodies(ephs.simulate(scene, 0.3, method="rk87", rtol=1e-13, atol=1e-13), -1)
     errors = [largest(bodies(ephs.simulate(scene, 0.3, method="natural4", step=h), -1) - exact) for h in (0.02, 0.01)]
     assert np.log2(errors[0] / errors[1]) >= 3.9

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -21,9 +20,9 @@ from ephs.semantics.spaces import PAIRS
 from ephs.semantics.systems.laws import Probe, system_law
 from ephs.testing import mechanisms
 from tests.numerics import EPS
+from tests.scenes import SCENES
 from tests.written import scene_of_text
 
-SCENES = sorted((File(__file__).parents[2] / "scenes").glob("*.toml"))
 # what is slow is compiled once: the first example
 # Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
 calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])

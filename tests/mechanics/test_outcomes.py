@@ -2,7 +2,6 @@
 
 import re
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +17,8 @@ from ephs.solve.running import loop
 from examples.failing import oscillator, pendulum, scene
 from examples.failures import ALL, CASES, ELSEWHERE, Case, pushed, runs
 from tests.numerics import largest
+from tests.scenes import ROOT
 from tests.written import scene_of_text
-
-ROOT = Path(__file__).parents[2]
 
 
 def named(error: ephs.SimulationError) -> bool:

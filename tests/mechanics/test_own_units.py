@@ -1,7 +1,5 @@
 """A run knows no unit: in other units of length, mass and time the same mechanism moves the same, by every method."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -12,8 +10,9 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.own_units import NEAR, SI, OwnUnits, mobility_of
 from ephs.mechanics.scene.rescaled import rescaled
+from tests.scenes import shipped
 
-FOUR_BAR = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
+FOUR_BAR = shipped("four-bar")
 SPAN, STEP = 0.125, 2.0**-6
 NAMES = [name for name, method in METHODS.items() if method.scenes]
 EXPONENTS = st.tuples(*[st.integers(-30, 30)] * 3)

@@ -1,7 +1,5 @@
 """A run that starts from the end of another one goes on as if that had not stopped."""
 
-from pathlib import Path
-
 import pytest
 
 import ephs
@@ -10,8 +8,8 @@ from ephs.mechanics.scene.build import scene_inputs
 from ephs.solve.running.control import RTOL
 from tests.mechanics.test_twins import PIN, SCENE, TWINS, load  # noqa: F401 - a fixture
 from tests.numerics import EPS, largest
+from tests.scenes import SCENES
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 STEP, STEPS = 1e-3, 10
 ONWARDS = ("natural",)
 """Its steps depend on more than a scene's state: on momenta that leave the joints by the method's error."""

@@ -1,15 +1,13 @@
 """A system has the findings of the scene that it is built from: none asks whether there is a scene."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import ephs
 from ephs.mechanics.scene.build import scene_inputs
 from ephs.mechanics.scene.rescaled import rescaled
+from tests.scenes import shipped
 
-SCENES = Path(__file__).parents[2] / "scenes"
 NAMES = ("biped", "body", "cardan-shaft", "chain", "dzhanibekov", "four-bar", "heavy-top", "hot-brake", "slider-crank")
 SETTINGS = (
     {"method": "natural", "step": 0.05},
@@ -30,7 +28,7 @@ def findings(model, setting, inputs=None):
 
 def both(name, setting):
     """Findings of a scene and of its system."""
-    scene = ephs.load(SCENES / f"{name}.toml")
+    scene = shipped(name)
     inputs = {str(p): {"effort" if x.effort else "flow": x.value} for p, x in scene_inputs(scene).items()}
     return findings(scene, setting), findings(scene.system(), setting, inputs)
 

@@ -17,12 +17,12 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
-from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.collocation import radau as coefficients
 from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.numerics import largest
+from tests.scenes import model_of
 
 J, K, D = 0.5, 3.0, 0.4
 ANGLE, RATE = 0.3, -1.1
@@ -175,7 +175,7 @@ def test_systems_take_the_same_steps(method, system, more, matrix):
 
 def test_methods_have_the_orders_that_are_said_of_them():
     problem = problem_of_system(SYSTEM, START)
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     for name in ("natural", "natural4"):
         assert METHODS[name].undamped(model).order == METHODS[name].order
 

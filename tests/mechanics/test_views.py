@@ -1,7 +1,5 @@
 """Functions of inputs and events read states by the names of `Solution`, and read the same numbers."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,9 +9,9 @@ from ephs.mechanics.motion.views import Names
 from ephs.semantics.bundles.errors import AssemblyError
 from tests.mechanics.dynamics.drawn import moving
 from tests.numerics import largest
+from tests.scenes import SCENES
 from tests.written import scene_of_text
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 ROUNDING = 1e-11
 """10 κ ε: twists are read back from momenta, and rates of cut joints from twists."""
 FOLLOWERS = """

@@ -2,14 +2,12 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.differentials import DIMENSIONS, differentials
@@ -19,10 +17,9 @@ from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.newton import natural_program
 from ephs.solve.methods.records import DONE, parts_of
 from tests.numerics import seeds
+from tests.scenes import shipped
 
 pytestmark = pytest.mark.optimised
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 SCENES = ["heavy-top", "hot-brake"]
@@ -31,7 +28,7 @@ SCENES = ["heavy-top", "hot-brake"]
 
 @cache
 def model_of(name: str) -> tuple[Model, np.ndarray]:
-    problem = problem_of_scene(ephs.load(ROOT / f"scenes/{name}.toml"))
+    problem = problem_of_scene(shipped(name))
     made = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     return made, problem.descriptor.pack(problem.initial)
 

@@ -12,11 +12,10 @@ from scipy.sparse import csr_array
 import ephs
 from ephs import library
 from ephs import quantity as Q
-from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.analysis import dependent_rows, entangled, entries_at, exchanged
 from tests.numerics import EPS, largest, seeds
+from tests.scenes import ROOT, model_of, shipped
 
-ROOT = Path(__file__).parents[2]
 BRICARD = ROOT / "scenes/bricard.toml"
 NAMES = ("a", "b", "c", "d", "e")
 
@@ -90,10 +89,10 @@ def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishe
 @pytest.mark.parametrize("name", ["ring", "bricard", "four-bar", "n-four-bar", "slider-crank"])
 def test_rank_depends_on_no_step(name, tmp_path):
     """Within a step that is not solved, loops are open by its third power: equations that depend seem not to."""
-    scene = ring(tmp_path) if name == "ring" else ephs.load(ROOT / f"scenes/{name}.toml")
+    scene = ring(tmp_path) if name == "ring" else shipped(name)
     sol = ephs.simulate(scene, 0.5, method="natural4", step=0.01, save_at=np.linspace(0.0, 0.5, 6))
     problem = sol.problem
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     rng, found = np.random.default_rng(7), set()
     for k in range(1, len(sol)):
         x = problem.descriptor.pack(sol.state_at(k))

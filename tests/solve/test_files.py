@@ -16,6 +16,7 @@ from ephs.solve.result import file, guard
 from ephs.solve.result.labels import freedoms, labels_of
 from ephs.testing import mechanisms, systems
 from tests.numerics import largest
+from tests.scenes import shipped
 
 TOTALS = {"kinetic", "potential", "thermal", "environment", "exergy", "entropy", "heat", "work", "supplied", "made"}
 TOTALS |= {"least", "storages", "makers", "entropies", "volumes", "momenta", "exergies"}
@@ -68,7 +69,7 @@ def test_a_solution_without_instants_comes_back(tmp_path, damped):
 
 
 def test_every_variable_has_a_unit_and_every_axis_names():
-    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.01, step=0.001, inputs={"joints.bearing": np.sin})
+    sol = ephs.simulate(shipped("slider-crank"), 0.01, step=0.001, inputs={"joints.bearing": np.sin})
     data = sol.to_xarray()
     for name, variable in data.variables.items():
         if variable.dtype != object:
@@ -86,7 +87,7 @@ def test_every_variable_has_a_unit_and_every_axis_names():
 
 
 def test_others_read_the_file_with_xarray_alone(tmp_path):
-    sol = ephs.simulate(ephs.load("scenes/four-bar.toml"), 0.01, step=0.001)
+    sol = ephs.simulate(shipped("four-bar"), 0.01, step=0.001)
     sol.save(tmp_path / "sol.nc", wrenches=True)
     with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
         name = next(iter(sol.scene.bodies))
@@ -95,7 +96,7 @@ def test_others_read_the_file_with_xarray_alone(tmp_path):
 
 
 def test_a_file_that_xarray_writes_again_holds_the_same_solution(tmp_path, damped):
-    for model, options in ((damped, {"initial": {"osc.pe.q": 1.0}}), (ephs.load("scenes/slider-crank.toml"), {})):
+    for model, options in ((damped, {"initial": {"osc.pe.q": 1.0}}), (shipped("slider-crank"), {})):
         sol = ephs.simulate(model, 0.5, rtol=1e-6, **options)
         sol.save(tmp_path / "sol.nc")
         with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
@@ -125,7 +126,7 @@ def test_packed_numbers_are_refused(tmp_path, damped):
 
 def test_files_of_format_2_are_read(tmp_path):
     """They had states without names, no units of states, and events as packed states."""
-    scene = ephs.load("scenes/heavy-top.toml")
+    scene = shipped("heavy-top")
     event = ephs.Event(lambda t, state: t - 0.015, "late")
     sol = ephs.simulate(scene, 0.03, step=0.01, events=[event], audit="off")  # a coarse step
     data = sol.to_xarray()
@@ -291,7 +292,7 @@ def test_freedoms_have_the_names_of_the_contract():
 
 
 def test_a_slice_is_the_solution_at_these_instants():
-    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.05, step=0.001, inputs={"joints.bearing": np.sin})
+    sol = ephs.simulate(shipped("slider-crank"), 0.05, step=0.001, inputs={"joints.bearing": np.sin})
     few = sol[10::5]
     assert np.array_equal(few.t, sol.t[10::5]) and few.t.size == 9
     assert np.array_equal(few["bodies.rod.pe.q"], sol["bodies.rod.pe.q"][10::5])
@@ -315,7 +316,7 @@ def test_what_is_not_there_is_answered_with_what_is_near(damped, asked, words):
 
 def test_outer_ports_carry_in_the_file_what_they_carried(tmp_path):
     inputs = {"bodies.rod": lambda t: np.array([0.0, np.cos(50.0 * t), 0.0, 1.0, 0.0, t])}
-    sol = ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.004, step=0.001, inputs=inputs)
+    sol = ephs.simulate(shipped("slider-crank"), 0.004, step=0.001, inputs=inputs)
     again = through_a_file(sol, tmp_path)
     for port in ("momenta.rod", "drives.bearing"):
         one, other = again.port(port), sol.port(port)

@@ -1,7 +1,5 @@
 """Counts of motions and redundant constraints: along the constraints as on one dense matrix."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given, settings
 
@@ -10,9 +8,9 @@ from benchmarks import families
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
+from tests.scenes import ROOT, shipped
 from tests.solve.dense import dense_mobility
 
-ROOT = Path(__file__).parents[2]
 FILES = sorted([*ROOT.glob("scenes/*.toml"), *ROOT.glob("benchmarks/scenes/*.toml")])
 
 
@@ -67,5 +65,5 @@ def test_counts_of_large_mechanisms(family, size, expected):
 
 
 def test_currents_and_rotors_on_gears_are_no_motions():
-    motor, bare = (both(ephs.load(ROOT / "scenes" / f"{name}.toml"))[0] for name in ("motor-four-bar", "four-bar"))
+    motor, bare = (both(shipped(name))[0] for name in ("motor-four-bar", "four-bar"))
     assert motor == bare

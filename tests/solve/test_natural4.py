@@ -1,7 +1,5 @@
 """Natural steps of several stages: energy, closed joints, angular momentum about the vertical, and their order."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,8 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
 from tests.numerics import EPS, largest
+from tests.scenes import ROOT, model_of
 
-ROOT = Path(__file__).resolve().parents[2]
 TOP = """format = 1
 name = "top"
 
@@ -39,7 +37,7 @@ def top(tmp_path_factory):
     file = tmp_path_factory.mktemp("top") / "top.toml"
     file.write_text(TOP, encoding="utf-8")
     problem = problem_of_scene(ephs.load(file))
-    return problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    return problem, model_of(problem)
 
 
 def end(top, h, steps, stages=3):
@@ -90,7 +88,7 @@ def test_momentum_about_the_vertical_is_kept_to_the_order(top):
 @pytest.fixture(scope="module")
 def chain():
     problem = problem_of_scene(ephs.load(ROOT / "benchmarks/scenes/spherical-chain-2.toml"))
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     return problem, model, moved(problem, model, 3, 320)
 
 

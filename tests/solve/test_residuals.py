@@ -1,30 +1,26 @@
 """What residuals of the natural method are measured by, against the same over whole matrices."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 
-import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.stage import Entry, Evaluator, Program, Vector, vector
-from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of
 from ephs.solve.methods.residuals import evaluation_program
 from ephs.solve.methods.scales import SPREAD, TAKES_PART
 from tests.numerics import seeds
+from tests.scenes import model_of, shipped
 
 CALLS = evaluation_program().compiled()
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
 def model():
     """Joints with friction and with springs, heat, and a motor's torque."""
-    problem = problem_of_scene(ephs.load(ROOT / "scenes/slider-crank.toml"))
-    return compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    problem = problem_of_scene(shipped("slider-crank"))
+    return model_of(problem)
 
 
 def measure(t, z, dropped, memory):

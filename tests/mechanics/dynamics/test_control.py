@@ -9,6 +9,7 @@ import ephs
 from ephs.solve.posing.errors import OptionError
 from tests.mechanics.dynamics.drawn import moving
 from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
 
 def near(found, expected, model, state, forces):
@@ -97,7 +98,7 @@ def test_a_task_has_the_acceleration_that_its_forces_are_for(found, turning):
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "natural"])
 def test_a_step_under_forces_is_a_run_under_the_same_inputs(method):
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     model = ephs.dynamics(scene)
     push = np.array([0.4, -0.3, 0.2, 0.1])
     inputs = {f"joints.{name}": push[where] for name, where in model.freedoms.items()}
@@ -112,14 +113,14 @@ def test_a_step_under_forces_is_a_run_under_the_same_inputs(method):
 
 
 def test_what_is_no_tree_is_refused_and_so_are_too_many_directions():
-    loop = ephs.dynamics(ephs.load("scenes/four-bar.toml"))
+    loop = ephs.dynamics(shipped("four-bar"))
     for call in (
         lambda: loop.computed_torque(loop.state0, loop.state0, stiffness=1.0, damping=1.0),
         lambda: loop.task(loop.state0, "coupler"),
     ):
         with pytest.raises(OptionError, match="a tree, without loops"):
             call()
-    chain = ephs.dynamics(ephs.load("scenes/chain.toml"))
+    chain = ephs.dynamics(shipped("chain"))
     body = next(iter(chain.scene.bodies))
     with pytest.raises(OptionError, match="at once"):
         chain.task(chain.state0, body)

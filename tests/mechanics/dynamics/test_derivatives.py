@@ -13,6 +13,7 @@ from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 from tests.numerics import EPS, largest
+from tests.scenes import equations_of
 
 GOOD = 1e-8
 """What extrapolated differences are good for, relative to the largest entry."""
@@ -119,7 +120,7 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
 @given(drawn=moving())
 def test_the_jacobian_of_a_step_is_that_of_its_right_hand_side(drawn):
     scene, model, state, _ = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     q, r, s = model.layout.split(state.array)
     here = replace(equations.start(0.0), q=q, r=r, heats=equations.heats.energies(s))
     jacobian = Jacobian(equations)
@@ -159,7 +160,7 @@ def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
 @given(drawn=moving())
 def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
     scene, model, state, _ = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     q, r, s = model.layout.split(state.array)
     n = equations.n
     linear = Linearised(equations)
@@ -178,7 +179,7 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
 def test_forward_columns_are_inverse_columns_solved(drawn):
     """Two ways to one Jacobian, both exact: to rounding times the condition of the mass matrix."""
     scene, model, state, _ = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     n = equations.n
     assume(n and not model.cut and not equations.driven.size)
@@ -196,7 +197,7 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
 def test_columns_add_up_along_any_direction(drawn):
     """Several directions at a time, and single ones."""
     scene, model, state, rng = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
     slopes = equations.dense.residual.slopes()

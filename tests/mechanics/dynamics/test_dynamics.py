@@ -1,7 +1,5 @@
 """The functions of a scene's state agree with one another, with plain NumPy, and with what simulations do."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,8 +10,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
 from tests.numerics import EPS, largest
-
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
+from tests.scenes import SCENES, shipped
 
 
 def whole(model, by_joint):
@@ -184,7 +181,7 @@ def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way, tmp_
     ],
 )
 def test_bad_arguments_are_named(call, message):
-    model = ephs.dynamics(ephs.load(SCENES[0].parent / "four-bar.toml"))
+    model = ephs.dynamics(shipped("four-bar"))
     with pytest.raises(ephs.OptionError, match=message):
         call(model)
 

@@ -19,6 +19,7 @@ from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
 from tests.numerics import EPS, seeds
+from tests.scenes import equations_of
 from tests.written import scene_of_text
 
 entry = st.floats(-1.0, 1.0)
@@ -167,7 +168,7 @@ def test_a_body_on_tendons_alone_moves_as_a_free_one():
         text += f"[tendons.t{k}]\nbodies = ['ground', 'ball']\nstiffness = 10.0\n"
         text += f"points = [[{x}, {y}, 0.3], [{0.1 * x}, {0.1 * y}, 0.0]]\nlength = 1.0\n"
     scene = scene_of_text(text).with_state(rates={"ball": [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]})
-    eq = ReducedEquations(problem_of_scene(scene), 0.0)
+    eq = equations_of(scene)
     assert eq.layout.joints == ("ball",)
     assert eq.reduced.tables.rows.sum() == 0
     one, other = (ephs.simulate(scene, 0.5, method=m, rtol=1e-10, audit="off") for m in ("rk87", "radau"))

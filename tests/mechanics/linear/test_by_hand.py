@@ -13,6 +13,7 @@ from ephs.semantics.spaces import SE3
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.methods.test_by_hand import four_bar
 from tests.numerics import largest
+from tests.scenes import shipped
 
 EPS = 2.2e-16
 
@@ -40,7 +41,7 @@ def test_a_system_has_the_linear_system_of_its_scene(drawn):
 
 @pytest.mark.parametrize("name", ["bricard", "motor-four-bar", "hot-brake", "screw-press", "cardan-shaft"])
 def test_a_system_has_the_eigenvalues_of_its_scene(name):
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     one, two = ephs.linearize(scene), ephs.linearize(scene.system(), inputs=given_at_ports(scene))
     assert np.array_equal(one.A, two.A)
     assert [state.replace("joints.", "joints.joints.") for state in one.states if state.startswith("joints.")] == [
@@ -80,7 +81,7 @@ def test_ports_of_joints_are_the_forces_on_them():
 
 def test_a_voltage_drives_the_current_that_it_sees():
     """Of the coil b' = u − …, i = b/l, by hand-made attachments in all states of the system."""
-    scene = ephs.load("scenes/motor-four-bar.toml")
+    scene = shipped("motor-four-bar")
     states = ["motors.drive.coil.b", "bodies.rocker.pe.q", "bodies.crank.ke.p"]
     found = ephs.linearize(scene.system(), inputs=given_at_ports(scene), outputs=["voltages.drive", *states])
     assert found.inputs == ("voltages.drive",)

@@ -23,6 +23,7 @@ from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
 from tests.numerics import largest
+from tests.scenes import shipped
 
 
 def extrapolated(function, h=1e-2):
@@ -52,7 +53,7 @@ def without_a_log_file():
 )
 def test_a_moving_loop_linearises_as_differences_say(name, joint, other, body, start):
     """Of accelerations and of all that is put out, over states with the loop closed; one has a ball in its loop."""
-    scene = ephs.load(f"scenes/{name}.toml").with_state({joint: start[0]}, {joint: start[1]}, adjust=True)
+    scene = shipped(name).with_state({joint: start[0]}, {joint: start[1]}, adjust=True)
     outputs = [f"joints.{joint}", f"joints.{other}", f"joints.{joint}.coordinate", f"bodies.{body}"]
     found = ephs.linearize(scene, outputs=[*outputs, f"bodies.{body}.position"])
     assert found.states[:2] == (f"joints.{joint}.coordinate", f"joints.{joint}.rate")
@@ -73,7 +74,7 @@ def test_a_moving_loop_linearises_as_differences_say(name, joint, other, body, s
 
 def spinning_rod():
     """A slider-crank whose rod is held by two balls, so that it may spin about itself: two freedoms, turning."""
-    scene = ephs.load("scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     zero = np.zeros(3)
     ball = replace(
         scene.joints["wrist"], kind="spherical", friction=np.zeros((3, 3)), stiffness=zero, rest=zero, drive=zero,
@@ -194,7 +195,7 @@ def test_mujoco_differentiates_a_robot_alike():
 
 
 def test_forces_wrenches_and_markers_push_as_the_motion_says():
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     scene = replace(scene, markers={"tip": Marker(body="coupler", at=[0.1, 0.2, 0.0]).called("tip")})
     found = ephs.linearize(scene, inputs=["joints.pivot", "joints.knee", "bodies.coupler", "markers.tip"])
     model = ephs.dynamics(scene)
@@ -216,7 +217,7 @@ def test_forces_wrenches_and_markers_push_as_the_motion_says():
 
 def test_a_spring_loaded_four_bar_swings_as_its_energy_says():
     """ω² = V''/M along the single freedom, from energies alone."""
-    scene = varied(ephs.load("scenes/four-bar.toml"), {"joints.main.drive": 0.0, "joints.main.friction": 0.0,
+    scene = varied(shipped("four-bar"), {"joints.main.drive": 0.0, "joints.main.friction": 0.0,
                    "joints.pivot.friction": 0.0, "joints.knee.stiffness": 30.0})  # fmt: skip
     rest = ephs.equilibrium(scene).model
     found = ephs.linearize(rest, inputs=["joints.main"])
@@ -234,7 +235,7 @@ def test_a_spring_loaded_four_bar_swings_as_its_energy_says():
 
 
 def test_a_heavy_body_on_a_ball_joint_swings_like_a_pendulum():
-    scene = ephs.equilibrium(ephs.load("scenes/heavy-top.toml")).model
+    scene = ephs.equilibrium(shipped("heavy-top")).model
     body, arm = scene.body("top"), np.linalg.norm(scene.joint("tip").frame2[4:])
     omega = np.sqrt(body.mass * 9.81 * arm / (body.inertia[0, 0] + body.mass * arm**2))
     values = ephs.linearize(scene).eigenvalues
@@ -269,7 +270,7 @@ def test_at_an_equilibrium_the_laws_hold(scene):
 
 @pytest.mark.parametrize("name", ["chain", "heavy-top"])
 def test_without_friction_nothing_decays(name):
-    found = ephs.linearize(ephs.equilibrium(ephs.load(f"scenes/{name}.toml")).model)
+    found = ephs.linearize(ephs.equilibrium(shipped(name)).model)
     assert not found.R.any()
     assert np.all(found.eigenvalues.real == 0.0)
 
@@ -277,7 +278,7 @@ def test_without_friction_nothing_decays(name):
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank"])
 def test_joint_coordinates_and_the_papers_states_have_the_same_modes(name):
     """What the paper's states have beside them is constant: the constraints' integrals."""
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     driven = next(joint for joint in scene.joints if np.any(scene.joint(joint).drive))
     rest = ephs.equilibrium(varied(scene, {f"joints.{driven}.drive": 0.0})).model
     found = ephs.linearize(rest).eigenvalues
@@ -290,7 +291,7 @@ def test_joint_coordinates_and_the_papers_states_have_the_same_modes(name):
 @pytest.mark.parametrize("name", ["heavy-top", "chain", "bricard"])
 def test_derivatives_by_states_are_those_of_the_equations_where_mechanisms_turn(name):
     """Against central differences, of 1e-8 at best; the top spins at 150 rad/s."""
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     problem = problem_of_system(scene.system(), {str(path): value for path, value in initial_state(scene).items()})
     d, equations = problem.descriptor, Continuous(compile_model(problem.descriptor, problem.reference, {}))
     x, inputs = d.pack(problem.initial), equations.model.input_values()
@@ -304,11 +305,11 @@ def test_derivatives_by_states_are_those_of_the_equations_where_mechanisms_turn(
 
 def test_the_papers_states_of_a_fast_crank_are_linearised():
     """It turns by more than a whole turn a second, at which derivatives over a step of a second were asked for."""
-    assert len(ephs.linearize(ephs.load("scenes/slider-crank.toml"), form="paper").eigenvalues) == 27
+    assert len(ephs.linearize(shipped("slider-crank"), form="paper").eigenvalues) == 27
 
 
 def test_a_state_that_is_no_equilibrium_says_why_it_has_no_structure():
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     assert "not balanced" in ephs.linearize(scene).reason
     moving = scene.with_state({}, {"main": 1.0}, adjust=True)
     assert "moves" in ephs.linearize(moving).reason
@@ -318,7 +319,7 @@ def test_a_state_that_is_no_equilibrium_says_why_it_has_no_structure():
 
 
 def test_a_mode_plays_as_a_film_with_loops_closed():
-    rest = ephs.equilibrium(ephs.load("scenes/four-bar.toml")).model
+    rest = ephs.equilibrium(shipped("four-bar")).model
     found = ephs.linearize(rest)
     film = found.film(0, amplitude=0.2, frames=21)
     swing = np.ptp(film.joint("main").coordinate)
@@ -333,7 +334,7 @@ def test_a_mode_plays_as_a_film_with_loops_closed():
 
 @pytest.mark.parametrize("suffix", ["json", "npz", "nc"])
 def test_matrices_are_saved(tmp_path, suffix):
-    found = ephs.linearize(ephs.equilibrium(ephs.load("scenes/chain.toml")).model)
+    found = ephs.linearize(ephs.equilibrium(shipped("chain")).model)
     file = tmp_path / f"chain.{suffix}"
     found.save(file)
     if suffix == "json":
@@ -356,9 +357,9 @@ def test_matrices_are_saved(tmp_path, suffix):
 )  # fmt: skip
 def test_what_cannot_be_is_named(keys, what):
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.linearize(ephs.load("scenes/four-bar.toml"), **keys)
+        ephs.linearize(shipped("four-bar"), **keys)
 
 
 def test_what_turns_for_ever_has_no_equilibrium():
     with pytest.raises(ephs.SimulationError, match="constant drive"):
-        ephs.equilibrium(ephs.load("scenes/slider-crank.toml"))
+        ephs.equilibrium(shipped("slider-crank"))

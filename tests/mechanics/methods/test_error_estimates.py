@@ -9,13 +9,12 @@ import pytest
 from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.methods.collocation import radau
 from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.numerics import largest
+from tests.scenes import equations_of
 from tests.written import scene_of_text
 
 J, K, RATE = 0.5, 3.0, -1.1
@@ -35,7 +34,7 @@ def plain():
 @pytest.fixture(scope="module")
 def equations():
     scene = scene_of_text(SCENE)
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    return equations_of(scene)
 
 
 def stepper(equations, method, **options):

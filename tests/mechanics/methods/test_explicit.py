@@ -1,7 +1,5 @@
 """Explicit methods on the reduced form: references by others, the natural method's limit, orders, loops, inputs."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,12 +9,11 @@ from benchmarks.cases import CASES
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.finding.mechanism import reduce_system
-from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
 from tests.numerics import largest
+from tests.scenes import SCENES, model_of, shipped
 from tests.written import scene_of_text
 
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 BY_NAME = {case.name: case for case in CASES}
 TIGHT = {"method": "rk87", "rtol": 1e-10, "atol": 1e-10}
 
@@ -156,9 +153,9 @@ def test_inputs_of_time_and_state_act_and_are_counted():
 
 
 def test_few_unknowns_are_left():
-    scene = ephs.load(SCENES[0].parent / "four-bar.toml")
+    scene = shipped("four-bar")
     problem = problem_of_scene(scene)
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     reduced = reduce_system(problem, model)
     assert reduced.freedoms == 3
     assert len(reduced.cut) == 1

@@ -13,6 +13,7 @@ from ephs.mechanics.tree.equations.led import Led
 from ephs.semantics.linear.sums import grown
 from ephs.solve.posing.errors import Outcome
 from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
 BALANCE = 1e-12
 """Of the gross energies."""
@@ -28,7 +29,7 @@ def uncorrected(monkeypatch):
 
 
 def run(scene, method, **options):
-    return ephs.simulate(ephs.load(f"scenes/{scene}.toml"), 0.5, method=method, audit="warn", **options)
+    return ephs.simulate(shipped(scene), 0.5, method=method, audit="warn", **options)
 
 
 def rounding(sol):
@@ -89,7 +90,7 @@ def test_orders_stay(scene, method, order, step, uncorrected):
 
 
 def test_ten_thousand_steps_do_not_drift(uncorrected):
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
 
     def error():
         sol = ephs.simulate(scene, 50.0, method="rk54", step=5e-3, save_at=np.linspace(0.0, 50.0, 101), audit="off")

@@ -5,9 +5,8 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from tests.numerics import largest
+from tests.scenes import equations_of
 
 BODY = """
 [bodies.{name}]
@@ -49,7 +48,7 @@ def five_bar(folder, mass=1.0):
 
 
 def equations(scene):
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    return equations_of(scene)
 
 
 @pytest.fixture(scope="module")

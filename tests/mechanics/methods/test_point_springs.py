@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from tests.numerics import largest
+from tests.scenes import equations_of
 from tests.written import scene_of_text
 
 K, LENGTH, D = 50.0, 0.4, 3.0
@@ -44,7 +43,7 @@ def scene_of(one, two):
 )
 def test_bodies_are_pulled_together(one, two):
     scene = scene_of(one, two)
-    eq = ReducedEquations(problem_of_scene(scene), 0.0)
+    eq = equations_of(scene)
     state = eq.start(0.0)
     along = PLACES[two] - PLACES[one]
     distance = np.linalg.norm(along)

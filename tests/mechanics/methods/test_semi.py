@@ -10,16 +10,15 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.drags import Drags, resisting
 from ephs.mechanics.tree.engine.programs import of_motion
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, Real, Vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
 from tests.numerics import largest
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
@@ -70,7 +69,7 @@ class Stage:
     """One stage of a scene's equations at its start, with other rates."""
 
     def __init__(self, scene, seed):
-        self.eq = eq = ReducedEquations(problem_of_scene(scene), 0.0)
+        self.eq = eq = equations_of(scene)
         self.state = eq.start(0.0)
         self.y = eq.vector(self.state)
         self.rates = slice(eq.nv, eq.nv + eq.n)
@@ -236,7 +235,7 @@ def test_so_they_do_with_loops_and_prescribed_motions(closed):
 
 
 def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
-    scene = ephs.load(SCENES / "four-bar.toml")
+    scene = shipped("four-bar")
     inputs = {"joints.main": lambda t, state: 4.0 * np.sin(20.0 * t) - 0.1 * state.joints["main"].rate[0]}
 
     def end(**how):
@@ -252,7 +251,7 @@ def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
 @pytest.mark.parametrize("name", ["four-bar", "hot-brake", "biped"])
 @pytest.mark.parametrize("how", [{"step": 2e-3}, {"rtol": 1e-4, "atol": 1e-5}])
 def test_single_steps_are_those_of_compiled_runs(name, how):
-    scene, times = ephs.load(SCENES / f"{name}.toml"), np.linspace(0.0, 0.1, 8)
+    scene, times = shipped(name), np.linspace(0.0, 0.1, 8)
     looked_at = {"events": [ephs.Event(lambda t, state: 1.0 + t, "never", stop=False)]}
     whole, single = (
         ephs.simulate(scene, 0.1, method="semi", save_at=times, audit="off", **how, **more)

@@ -8,10 +8,9 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS, Setting
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.running.control import Control, Tolerance
 from tests.numerics import largest
+from tests.scenes import equations_of
 from tests.written import scene_of_text
 
 SCENE = """format = 1
@@ -47,7 +46,7 @@ stiffness = {stiffness}
 
 def equations(gravity, stiffness):
     scene = scene_of_text(SCENE.format(gravity=gravity, stiffness=stiffness))
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    return equations_of(scene)
 
 
 def stepper(eq, name):

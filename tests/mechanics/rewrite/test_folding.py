@@ -1,7 +1,6 @@
 """Folding: the same relation in fewer unknowns, at an instant and over a step, whatever is folded first."""
 
 from dataclasses import replace
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -26,8 +25,8 @@ from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms
 from tests.mechanics.kernels import Draw, agreeing
 from tests.numerics import largest
+from tests.scenes import SCENES, shipped
 
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 seeds = st.integers(0, 2**20)
 MOMENTUM = PortType(quantity.body_momentum, True)
 
@@ -318,12 +317,12 @@ def test_folded_steps_are_the_same_steps(file, method):
 @pytest.mark.parametrize("stem", ["mbs", "chain"])
 def test_coarse_steps_are_the_same_too(stem, method):
     """There the corrections are large: measured in the frames of the bodies they would be others."""
-    agree(ephs.load(SCENES[0].parent / f"{stem}.toml"), method, 0.1 if stem == "mbs" else 0.05, 4)
+    agree(shipped(stem), method, 0.1 if stem == "mbs" else 0.05, 4)
 
 
 @pytest.mark.parametrize("stem", ["four-bar", "universal"])
 def test_everything_that_is_read_from_a_motion_is_there(stem):
-    scene = ephs.load(SCENES[0].parent / f"{stem}.toml")
+    scene = shipped(stem)
     paper, folded = agree(scene, "natural", 2e-3, 2)
     for name, _ in scene.all_joints():
         one, other = paper.joint(name), folded.joint(name)
@@ -345,7 +344,7 @@ def test_and_in_generated_mechanisms(method, scene):
 
 def test_chosen_steps_inputs_and_events_are_served():
     """What reads states reads the same states; the energies of dense output are the same too."""
-    scene = ephs.load(SCENES[0].parent / "four-bar.toml")
+    scene = shipped("four-bar")
     found = [
         ephs.simulate(
             scene,
@@ -369,14 +368,14 @@ def test_chosen_steps_inputs_and_events_are_served():
 
 
 def test_a_failed_run_keeps_the_papers_solution():
-    scene = ephs.load(SCENES[0].parent / "heavy-top.toml")
+    scene = shipped("heavy-top")
     with pytest.raises(ephs.SimulationError) as failed:
         ephs.simulate(scene, 1.0, step=0.1, method="natural", form="folded")
     assert failed.value.partial["bodies.top.pe.q"].shape[1] == 7
 
 
 def test_methods_in_joint_coordinates_have_no_folded_form():
-    scene = ephs.load(SCENES[0].parent / "mbs.toml")
+    scene = shipped("mbs")
     with pytest.raises(ephs.OptionError, match="form is 'folded', expected reduced"):
         ephs.simulate(scene, 1.0, method="rk87", form="folded")
     assert ephs.simulate(scene, 0.01, form="folded").stats["method"] == "natural4"

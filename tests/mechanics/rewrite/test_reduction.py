@@ -1,7 +1,5 @@
 """What `reduce` says: groups, loops, redundancy and cyclic coordinates against independent computations of each."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -19,20 +17,17 @@ from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
-from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
 from tests.numerics import largest
+from tests.scenes import SCENES, model_of, shipped
 from tests.written import scene_of_text
 
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 BY_NAME = {case.name: case for case in CASES}
 
 
 def reduced_of(scene):
     problem = problem_of_scene(scene)
-    return reduce_system(
-        problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
-    )
+    return reduce_system(problem, model_of(problem))
 
 
 def scene_of(text):
@@ -54,7 +49,7 @@ def named(reduction, name):
     ],
 )
 def test_the_group_of_a_motion_is_named(stem, words):
-    step = named(ephs.reduce(ephs.load(SCENES[0].parent / f"{stem}.toml")), "the group of the motion")
+    step = named(ephs.reduce(shipped(stem)), "the group of the motion")
     assert words in step.reason
     assert step.strength == Strength.TRAJECTORIES
 
@@ -142,7 +137,7 @@ def test_the_squeezer_closes_three_loops_with_two_equations_each():
 
 def test_what_no_group_explains_is_found_by_rank():
     """Both ends of the shafts of a universal joint are held: turning about them closes only where they meet."""
-    scene = ephs.load(SCENES[0].parent / "universal.toml")
+    scene = shipped("universal")
     reduced = reduced_of(scene)
     step = named(ephs.reduce(scene), "redundant constraints")
     (loop,) = coordinates.loops(reduced)
@@ -227,7 +222,7 @@ def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is():
     joint = PIVOT.format(kind="spherical", axis=UP, more="")
     spring = "[springs.s]\nbodies = ['ground', 'top']\nat1 = [1.0, 0.0, 0.0]\nat2 = [0.0, 0.2, 0.0]\nstiffness = 1.0\n"
     assert count(scene_of(TOP.format(gravity="[0.0, 0.0, -9.81]", joint=joint + spring))) == 0
-    assert count(ephs.load(SCENES[0].parent / "four-bar.toml")) == 0
+    assert count(shipped("four-bar")) == 0
 
 
 @settings(max_examples=20)

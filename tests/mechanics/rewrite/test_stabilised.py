@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -20,8 +19,7 @@ from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.posing.errors import OptionError
 from tests.numerics import EPS, largest
-
-SCENES = File(__file__).parents[3] / "scenes"
+from tests.scenes import shipped
 
 UNTIL = 0.2
 LENGTHS = (0.01, 5e-3, 2.5e-3)
@@ -32,7 +30,7 @@ ROUNDING = 10.0 * 1e2 * EPS
 
 
 def prepared(name, make):
-    problem = problem_of_scene(ephs.load(SCENES / f"{name}.toml"))
+    problem = problem_of_scene(shipped(name))
     system = make(problem.system)
     inputs = problem.inputs(0.0, problem.initial)
     return system, problem.initial, inputs
@@ -70,7 +68,7 @@ def stepped(name, make, h):
 
 def largest_gap(name, states):
     """Largest entry of log of where two bodies put a joint's frame, from the scene's own offsets."""
-    scene = ephs.load(SCENES / f"{name}.toml")
+    scene = shipped(name)
     worst = 0.0
     for joint in scene.joints.values():
         ends = []

@@ -11,6 +11,7 @@ from ephs.mechanics.tree.engine.tangents import StepTangent
 from ephs.solve.posing.errors import OptionError
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
 from tests.numerics import largest
+from tests.scenes import shipped
 from tests.solve.test_own_methods import Kutta
 from tests.written import scene_of_text
 
@@ -65,7 +66,7 @@ shape = { plane = {} }
 
 
 def backwards(method, paths=PATHS):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     return ephs.gradient(scene, paths, TIMES, WEIGHTS, method=method, step=STEPS[method])
 
 
@@ -86,7 +87,7 @@ def forwards(scene, paths, times, weights, method, step):
 
 @pytest.mark.parametrize("method", STEPS, ids=str)
 def test_steps_with_loops_friction_and_the_balance_kept_as_tangents_say(method, monkeypatch):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     found, expected = backwards(method), forwards(scene, PATHS, TIMES, WEIGHTS, method, STEPS[method])
     scale = largest(expected)
     assert largest(np.array([found.derivatives[path] for path in PATHS]) - expected) <= NEAR * scale
@@ -140,7 +141,7 @@ def test_through_a_contact_that_slips_as_tangents_say():
     ],
 )
 def test_gradients_refuse(change, says):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     given = {"model": scene, "parameters": PATHS[:1], "times": TIMES, "weights": WEIGHTS} | change
     with pytest.raises(OptionError) as raised:
         ephs.gradient(**given)

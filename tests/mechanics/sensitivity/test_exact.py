@@ -7,16 +7,15 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sensitivity import explicit
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import ParameterFamily, relation_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from tests.mechanics.tree.engine.test_engine import moved
 from tests.numerics import largest
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
 EXACT = 1e-12
@@ -85,7 +84,7 @@ def test_a_pendulum_as_a_complex_step_says(method, monkeypatch):
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "heavy-top"])
 def test_rates_along_directions_as_the_dense_equations_say(name):
     """Derivatives of the accelerations by elements and rates: through sweeps, and through the mass matrix."""
-    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     state = moved(eq)
     linear = Linearised(eq)
     linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
@@ -107,7 +106,7 @@ def test_rates_along_directions_as_the_dense_equations_say(name):
 
 def test_all_directions_are_the_same_whatever_their_place():
     """More parameters than directions of one call: each derivative is what it is alone."""
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     paths = [
         "bodies.coupler.mass",
         "joints.main.friction",
@@ -124,7 +123,7 @@ def test_all_directions_are_the_same_whatever_their_place():
 
 def test_inputs_of_time_are_taken_stage_by_stage():
     """A constant given as a function of time changes nothing; one that reads the state is refused."""
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     family = [
         ParameterFamily(scene, ["bodies.coupler.mass"], None, {"joints.main": u}, None, joints=True)
         for u in (2.0, lambda t, s: [2.0])

@@ -9,6 +9,7 @@ import ephs
 from ephs.mechanics.scene.parameters import read, varied
 from tests.numerics import largest
 from tests.oscillator import damped_oscillator
+from tests.scenes import shipped
 
 FOUR_BAR = ("joints.pivot.friction", "bodies.rocker.inertia[2]", "joints.main.friction")
 DOUBLE = ("joints.j0.friction", "joints.j1.friction", "bodies.rod1.inertia[1]", "bodies.rod1.mass")
@@ -17,7 +18,7 @@ STEPS = {"method": "rk87", "step": 0.025}
 
 def double_pendulum():
     """Two links of the chain, damped."""
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     bodies = {name: body for name, body in scene.bodies.items() if name in ("rod0", "rod1")}
     joints = {name: joint for name, joint in scene.joints.items() if name in ("j0", "j1")}
     short = replace(scene, name="double-pendulum", bodies=bodies, joints=joints)
@@ -33,7 +34,7 @@ def record(scene, joints, until, count):
 
 CASES = {
     "double pendulum": (double_pendulum, DOUBLE, ("j0", "j1"), 0.6),
-    "four-bar": (lambda: ephs.load("scenes/four-bar.toml"), FOUR_BAR, ("main", "pivot"), 0.5),
+    "four-bar": (lambda: shipped("four-bar"), FOUR_BAR, ("main", "pivot"), 0.5),
 }
 
 

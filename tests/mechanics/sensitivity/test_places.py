@@ -9,6 +9,7 @@ from ephs.mechanics.scene.parameters import names
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent, _whole
 from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, ParameterFamily
 from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
 HUNG = """
 format = 1
@@ -43,7 +44,7 @@ def placed(scene):
 @pytest.mark.parametrize("name", ["chain", "heavy-top", "hot-brake"])
 def test_two_neighbours_tell_what_six_do(name, monkeypatch):
     """Of initial states and of the links' numbers, to rounding."""
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     paths = placed(scene)[:6]
     stepper, other = tangent(scene, paths), tangent(scene, paths)
     assert any(stepper._stencil(j) is OUTER for j in range(len(paths)))

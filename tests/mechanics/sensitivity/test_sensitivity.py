@@ -8,6 +8,7 @@ from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
 from tests.numerics import largest
 from tests.oscillator import damped_oscillator
+from tests.scenes import shipped
 from tests.written import scene_of_text
 
 GOOD = 1e-8
@@ -52,7 +53,7 @@ def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options)
 
 @pytest.mark.parametrize("method", ["rk54", "rk87"])
 def test_constant_steps_of_explicit_methods_with_a_closed_loop(method):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     paths = ["bodies.coupler.mass", "bodies.rocker.inertia[2]", "joints.main.friction", "joints.main.drive",
              "joints.knee.frame1.position[0]", "joints.main.coordinate", "world.gravity[1]"]  # fmt: skip
     names = ["joints.main.coordinate", "joints.knee.rate", "bodies.coupler.position", "heat", "work", "kinetic"]
@@ -62,7 +63,7 @@ def test_constant_steps_of_explicit_methods_with_a_closed_loop(method):
 
 def test_chosen_steps_are_held():
     """The derivative of a run whose steps were chosen is that of the motion itself, to the tolerances."""
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     paths = ["bodies.rod1.mass", "joints.j0.coordinate", "joints.j2.frame2.position[1]", "joints.j1.rate"]
     names = ["joints.j3.coordinate", "joints.j0.rate", "bodies.rod3.velocity", "energy"]
     exact = {"rtol": 1e-12, "atol": 1e-13}
@@ -72,7 +73,7 @@ def test_chosen_steps_are_held():
 
 def test_bodies_that_turn_freely():
     """Of a body on a group: initial velocities, inertia, all left-trivialised."""
-    scene = ephs.load("scenes/heavy-top.toml")
+    scene = shipped("heavy-top")
     paths = ["bodies.top.inertia[0]", "bodies.top.mass", "joints.tip.rate[1]"]
     names = ["bodies.top.quaternion", "bodies.top.angular_velocity", "joints.tip.coordinate"]
     agrees(scene, paths, 0.02, names, 1e-7, method="rk87", step=2e-3, compared={"method": "rk87", "step": 2e-3})
@@ -93,7 +94,7 @@ def test_natural_steps_of_scenes(scene):
     names = [f"joints.{joint}.coordinate", f"joints.{joint}.rate", "heat", "work", "potential"]
     names += ["thermal.housing.temperature"] if scene == "slider-crank" else []
     options = {"method": "natural", "step": 0.01}
-    agrees(ephs.load(f"scenes/{scene}.toml"), paths, 0.05, names, 1e-7, options, **options)
+    agrees(shipped(scene), paths, 0.05, names, 1e-7, options, **options)
 
 
 def test_systems_by_components_and_initial_values():
@@ -127,7 +128,7 @@ def test_anything_read_from_a_solution_has_a_derivative():
 
 
 def test_a_friction_of_zero_has_a_derivative_from_above():
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     found = ephs.sensitivity(scene, ["joints.j0.friction"], 0.2, method="rk87", step=0.05)
     values = [
         ephs.simulate(varied(scene, {"joints.j0.friction": mu}), 0.2, method="rk87", step=0.05).joint("j0").rate[-1, 0]
@@ -139,7 +140,7 @@ def test_a_friction_of_zero_has_a_derivative_from_above():
 
 def test_a_rest_of_zero_has_a_derivative():
     """Springs whose force is 0 at the coordinate 0 are other relations."""
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     agrees(
         varied(scene, {"joints.j0.stiffness": 5.0}),
         ["joints.j0.rest"],
@@ -204,7 +205,7 @@ def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method, text,
 def test_what_cannot_be_is_named(keys, what):
     given = {"parameters": ["bodies.crank.mass"], "until": 0.1} | keys
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.sensitivity(ephs.load("scenes/four-bar.toml"), **given)
+        ephs.sensitivity(shipped("four-bar"), **given)
 
 
 def test_unknown_readings_name_the_nearest():
@@ -212,4 +213,4 @@ def test_unknown_readings_name_the_nearest():
     with pytest.raises(ephs.OptionError, match="did you mean"):
         found["osc.pe.x"]
     with pytest.raises(ephs.SceneError, match="did you mean"):
-        ephs.sensitivity(ephs.load("scenes/four-bar.toml"), ["bodies.crnk.mass"], 0.1)
+        ephs.sensitivity(shipped("four-bar"), ["bodies.crnk.mass"], 0.1)

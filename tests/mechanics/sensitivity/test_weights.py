@@ -8,6 +8,7 @@ from ephs.mechanics.scene.parameters import names, read
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import ParameterFamily
 from tests.numerics import largest
+from tests.scenes import shipped
 
 TREES = ("chain", "heavy-top", "hot-brake", "body")
 FUSED = """
@@ -67,6 +68,6 @@ def test_they_are_exact_and_all_that_matters(name, tmp_path, monkeypatch):
 
 
 def test_what_changes_more_is_left_to_neighbours():
-    chain, closed = ephs.load("scenes/chain.toml"), ephs.load("scenes/four-bar.toml")
+    chain, closed = shipped("chain"), shipped("four-bar")
     assert tangent(chain, ["bodies.rod1.position[0]"])._weighed(0) is None
     assert tangent(closed, ["bodies.coupler.mass"])._weighed(0) is None

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 from concurrent.futures import CancelledError, Future
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +20,9 @@ from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.testing import mechanisms
 from tests.numerics import largest
+from tests.scenes import ROOT
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[3]
 SCENES = ROOT / "scenes"
 CHAIN = ROOT / "benchmarks" / "scenes" / "revolute-chain-4.toml"
 OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(

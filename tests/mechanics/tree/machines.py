@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -12,8 +11,8 @@ from ephs import Pattern, junction
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.scene.build import initial_state, scene_system
+from tests.scenes import shipped
 
-SCENES = Path(__file__).parents[3] / "scenes"
 THETA = 293.15
 
 # ---- a motor on the four-bar linkage -----------------------------------------------------------------------------
@@ -25,7 +24,7 @@ A, B, C, D = 0.3, 0.9, 0.7, 1.0
 
 def four_bar():
     """The linkage of the scene, its crank's momentum an outer port."""
-    scene = ephs.load(SCENES / "four-bar.toml")
+    scene = shipped("four-bar")
     joints = {name: replace(j, drive=None) if name == "main" else j for name, j in scene.joints.items()}
     scene = replace(scene, joints=joints)
     return scene_system(scene, driven=["main"]), {f"linkage.{path}": x for path, x in initial_state(scene).items()}
@@ -130,7 +129,7 @@ SHAFT = 0.06
 
 def slider_crank():
     """The mechanism of the scene without friction, the momentum of its cylinder joint an outer port."""
-    scene = ephs.load(SCENES / "slider-crank.toml")
+    scene = shipped("slider-crank")
     joints = {name: replace(j, friction=0.0 * j.friction, heat="environment") for name, j in scene.joints.items()}
     scene = replace(scene, joints=joints, thermal={}, conduction={})
     return scene_system(scene, driven=["cylinder"]), {f"engine.{path}": x for path, x in initial_state(scene).items()}

@@ -7,15 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.road.cuts import Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.records import LinkPlace, LinkState
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
 from tests.numerics import largest, seeds
+from tests.scenes import equations_of, shipped
 
 Z = np.eye(6)[:, 2:3]
 JOINTS = {
@@ -222,7 +220,7 @@ def test_the_memory_of_a_link_begins_with_its_place():
 @pytest.mark.parametrize("name", ["slider-crank", "universal"])
 def test_loops_that_are_a_little_open_are_closed_by_their_own_rows(name):
     """With joints of several freedoms in the tree; what does not converge so is closed with more care."""
-    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     state, moved = eq.start(0.0), np.zeros(eq.nv)
     moved[: eq.n] = 1e-3 * np.random.default_rng(1).standard_normal(eq.n)
     apart = replace(state, q=eq.advance(state.q, moved))

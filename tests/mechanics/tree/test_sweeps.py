@@ -9,15 +9,14 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks import families
 from ephs.mechanics.road.programs import sweeps
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
 from tests.numerics import EPS, largest, seeds
+from tests.scenes import equations_of
 
 slow = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 
@@ -26,7 +25,7 @@ class Tree:
     """A scene's tree: its equations, its records and a state aside of the initial one."""
 
     def __init__(self, scene, seed=0):
-        self.equations = eq = ReducedEquations(problem_of_scene(scene), 0.0)
+        self.equations = eq = equations_of(scene)
         self.packed = links_of(eq.reduced).packed(eq.gravity)
         self.sweeps = sweeps(self.packed.kind)
         rng = np.random.default_rng(seed)

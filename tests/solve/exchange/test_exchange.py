@@ -1,22 +1,20 @@
 """Units by themselves: exported mechanisms that are read back move as they do here, and signals go where wires say."""
 
-from pathlib import Path
-
 import fmpy
 import numpy as np
 import pytest
 
 import ephs
 from tests.numerics import largest
+from tests.scenes import shipped
 
-ROOT = Path(__file__).resolve().parents[3]
 SHARP = {"method": "rk87", "rtol": 1e-11, "atol": 1e-13}
 """Two runs at this tolerance over less than a second, whose steps end at different times, differ by less than 1e-9."""
 
 
 @pytest.mark.parametrize(("name", "joint", "size"), [("slider-crank", "bearing", 0.2), ("motor-four-bar", "main", 0.5)])
 def test_exported_and_read_back_it_moves_as_here(tmp_path, name, joint, size):
-    scene, period, until = ephs.load(ROOT / f"scenes/{name}.toml"), 0.02, 0.4
+    scene, period, until = shipped(name), 0.02, 0.4
     file = tmp_path / "unit.fmu"
     made = ephs.export_fmu(scene, file, inputs=[f"joints.{joint}"], **SHARP, platforms=[fmpy.platform_tuple])
     unit = ephs.library.fmu(file)

@@ -14,7 +14,6 @@ from ephs.mechanics.methods import jacobian, radau
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.sparse import PIVOTS, SparseSystems
 from ephs.mechanics.motion.reduced import ReducedMotion
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.tree.engine import apart
 from ephs.mechanics.tree.equations.equations import ReducedEquations
@@ -25,6 +24,7 @@ from ephs.solve.methods.solvers import Solvers
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
 from tests.numerics import EPS, largest, seeds
+from tests.scenes import equations_of
 
 
 def patch(elements=(3, 2), damping=1e-3, gravity=(0.0, 0.0, -9.81), **options):
@@ -154,7 +154,7 @@ def test_a_pattern_without_the_elements_is_another_matrix(monkeypatch):
 @settings(max_examples=15, deadline=None)
 @given(mechanisms(loops=False))
 def test_sparse_matrices_of_mechanisms_are_dense_ones(scene):
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     assume(equations.n)
     state = equations.start(0.0)
     sparse = matrix_of(equations, state, sparse=True)

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods import jacobian
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.apart import directions
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from tests.numerics import largest
+from tests.scenes import equations_of
 
 BODY = """
 [bodies.{name}]
@@ -66,7 +65,7 @@ def test_directions_are_shared_without_another_bit(kind, most, tmp_path, monkeyp
     """A stack needs three bodies' columns at once, bodies that do not meet one's; what warms one store is apart."""
     file = tmp_path / "scene.toml"
     file.write_text(scene(kind), encoding="utf-8")
-    equations = ReducedEquations(problem_of_scene(ephs.load(file)), 0.0)
+    equations = equations_of(ephs.load(file))
     state = equations.start(0.0)
     found = []
 

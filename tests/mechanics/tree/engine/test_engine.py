@@ -1,7 +1,6 @@
 """The compiled engine against the sweeps over dense matrices, and in growth."""
 
 from dataclasses import replace
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -10,21 +9,19 @@ from hypothesis import given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.road.elimination import closing
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.posing.errors import SolveError
 from ephs.testing import mechanisms
 from tests.numerics import largest
+from tests.scenes import ROOT, equations_of
 
-ROOT = File(__file__).parents[4]
 SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} | {
     case.name: ROOT / "benchmarks" / "scenes" / f"{case.name}.toml" for case in CASES
 }
 
 
 def equations(scene):
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    return equations_of(scene)
 
 
 def moved(eq, seed=0, far=0.3):
