@@ -5,13 +5,16 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-__all__ = ["EPS", "largest", "seeds"]
+__all__ = ["EPS", "generators", "largest", "seeds"]
 
 EPS = float(np.finfo(float).eps)
 """Distance of 1 from the next number."""
 
 seeds = st.integers(0, 2**32 - 1)
 """For generators of random numbers."""
+
+generators = seeds.map(np.random.default_rng)
+"""Such generators."""
 
 
 def largest(values: Any, **options: float) -> Any:

@@ -15,7 +15,7 @@ from ephs.mechanics.sensitivity.family import relation_of
 from ephs.mechanics.tree.engine.residuals import ACTIVE, point_program
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
-from tests.numerics import seeds
+from tests.numerics import generators, seeds
 from tests.scenes import equations_of, shipped
 
 pytestmark = pytest.mark.optimised
@@ -149,11 +149,10 @@ def test_rates_and_their_derivatives(name, seed):
 
 @pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=2)
-@given(seed=seeds)
-def test_components(name, seed):
+@given(rng=generators)
+def test_components(name, rng):
     """Each relation at drawn numbers about those that it has, and over dual numbers."""
     eq = equations(name)[0]
-    rng = np.random.default_rng(seed)
     t = eq.model.tables
     for i in evaluated(eq.engine.tables):
         slot = eq.problem.descriptor.components[i]

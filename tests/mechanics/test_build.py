@@ -23,7 +23,7 @@ from tests.scenes import shipped
 from tests.written import scene_of_text
 
 # Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
-calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+calm = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 LEG = """format = 1
 [bodies.shank]

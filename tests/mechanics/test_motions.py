@@ -25,7 +25,7 @@ from tests.written import scene_of_text
 
 # what is slow is compiled once: the first example
 # Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
-calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+calm = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 
 @pytest.mark.parametrize(("method", "step"), [("natural", 0.005), ("natural4", 0.02)])

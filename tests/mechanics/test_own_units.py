@@ -44,7 +44,7 @@ def test_a_run_knows_no_unit(name):
     there = moved(ran(name))
     near = SOLVED if METHODS[name].fixed else 1e-6
 
-    @settings(max_examples=2, deadline=None)
+    @settings(max_examples=2)
     @example(exponents=(-28, 0, 0))
     @example(exponents=(30, -30, 30))
     @given(exponents=EXPONENTS)
@@ -61,7 +61,7 @@ def test_a_whole_unit_further_every_bit_is_the_same(name):
         np.testing.assert_array_equal(moved(ran(name, exponents), exponents), there)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @example(exponents=(-28, 0, 0))
 @given(exponents=EXPONENTS)
 def test_mobility_knows_no_unit(exponents):

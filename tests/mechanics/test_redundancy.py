@@ -24,7 +24,7 @@ from tests.written import scene_of_text
 
 SHIPPED = sorted([*(ROOT / "scenes").glob("*.toml"), *(ROOT / "benchmarks" / "scenes").glob("*.toml")])
 # Redundancy is searched in whole mechanisms, by singular values: what Hypothesis deems slow is meant here.
-calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+calm = settings(suppress_health_check=[HealthCheck.too_slow])
 Z = (0.0, 0.0, 1.0)
 HEAD = 'format = 1\nname = "test"\n[world]\ngravity = [0.0, 0.0, -9.81]\n'
 

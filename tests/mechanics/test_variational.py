@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import rotation_log
 from ephs.solve.equations.instant import instant
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
-from tests.numerics import largest
+from tests.numerics import largest, seeds
 
-seeds = st.integers(0, 2**20)
 few = settings(max_examples=10)
 
 

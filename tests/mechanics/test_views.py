@@ -94,7 +94,7 @@ def test_names_read_what_the_dynamics_say(path):
     assert not agrees(model, model.state0, of=model.step(model.state0, 0.01))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(moving())
 def test_names_read_what_the_dynamics_say_in_any_motion(found):
     _, model, state, _ = found

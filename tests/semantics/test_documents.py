@@ -111,7 +111,7 @@ def assert_same(one, two, tolerance=AGREEMENT):
             assert np.allclose(a, b, rtol=tolerance, atol=tolerance * largest(a, initial=0.0)), path
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(written())
 def test_what_is_written_is_read_back(system):
     text = system.to_json()
@@ -121,7 +121,7 @@ def test_what_is_written_is_read_back(system):
     VALID.validate(system.to_dict())
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(systems(max_depth=2))
 def test_a_drawn_system_is_written_or_refused_by_path(system):
     try:
@@ -132,7 +132,7 @@ def test_a_drawn_system_is_written_or_refused_by_path(system):
     assert_same(system, System.from_json(text))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(written(), st.data())
 def test_another_number_is_another_system(system, data):
     """The control: a comparison that saw no numbers would pass here, too."""

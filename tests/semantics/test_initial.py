@@ -42,7 +42,7 @@ def assert_starts(system, values):
         assert np.array_equal(state[path], system.initial[path])
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(systems(max_depth=3), st.integers(0, 99))
 def test_systems_collect_what_their_storages_carry(system, seed):
     values, made = started(system, seed)

@@ -27,7 +27,7 @@ from tests.numerics import largest
 
 # A system holds many draws; what is slow is the plain solver, which is the point.
 # Relations of whole hierarchies are composed and compared: what Hypothesis deems slow and large is meant here.
-patient = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
+patient = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 few = settings(patient, max_examples=10)
 seeds = st.integers(0, 2**16)
 

@@ -14,7 +14,7 @@ from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
-from tests.numerics import largest
+from tests.numerics import largest, seeds
 from tests.semantics.subspace import dirac
 
 GASES = (
@@ -33,7 +33,6 @@ ARGUMENTS = {
     "rotational_friction": {"d": 0.3}, "rotor": {"j": 0.1}, "series_springs": {}, "spring": {"k": 1.5},
     "thermal_capacity": {"c1": 3e4, "c2": 100.0},
 }  # fmt: skip
-seeds = st.integers(0, 2**20)
 
 
 @cache

@@ -36,7 +36,7 @@ def reaction(nu, species):
     )
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.lists(st.tuples(WHOLE, WHOLE), min_size=2, max_size=3), st.data())
 def test_a_reaction_is_taken_where_it_keeps_the_elements_and_nowhere_else(atoms, data):
     nu = data.draw(st.tuples(*[WHOLE] * len(atoms)).filter(any))

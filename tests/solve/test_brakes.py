@@ -38,7 +38,7 @@ def brake(friction, capacity=None):
     )
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     method=st.sampled_from(["natural", "natural4"]),
     friction=st.sampled_from([20.0, 1e3, 1e6]),

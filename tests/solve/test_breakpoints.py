@@ -84,7 +84,7 @@ def test_a_steep_ramp_is_found_by_both_its_ends():
     assert len(sol.stats["jumps"]["found"]) >= 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.1, 300.0), st.floats(0.0, 6.3), st.floats(-5.0, 5.0), st.sampled_from([-1.0, 1.0]))
 def test_nothing_is_found_in_smooth_functions(rate, phase, mean, sign):
     asked = ProbedInput("wave", lambda t, _state: mean + np.sin(rate * t + phase), stateful=False)
@@ -96,7 +96,7 @@ def test_nothing_is_found_in_smooth_functions(rate, phase, mean, sign):
     assert not found.stats()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.01, 0.99), st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 1e-3), st.sampled_from([-1.0, 1.0]))
 def test_any_jump_is_found_to_rounding(at, size, sign):
     asked = ProbedInput("edge", lambda t, _state: np.cos(t) + (size if abs(t) >= at else 0.0), stateful=False)

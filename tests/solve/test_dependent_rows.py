@@ -13,7 +13,7 @@ import ephs
 from ephs import library
 from ephs import quantity as Q
 from ephs.solve.methods.analysis import dependent_rows, entangled, entries_at, exchanged
-from tests.numerics import EPS, largest, seeds
+from tests.numerics import EPS, generators, largest
 from tests.scenes import ROOT, model_of, shipped
 
 BRICARD = ROOT / "scenes/bricard.toml"
@@ -102,11 +102,10 @@ def test_rank_depends_on_no_step(name, tmp_path):
     assert found == {sol.stats["dependent_equations"]}
 
 
-@settings(max_examples=50, deadline=None)
-@given(seed=seeds, count=st.integers(2, 9), short=st.integers(1, 3))
-def test_what_is_left_out_depends_on_the_rest_and_is_of_the_preferred(seed, count, short):
+@settings(max_examples=50)
+@given(rng=generators, count=st.integers(2, 9), short=st.integers(1, 3))
+def test_what_is_left_out_depends_on_the_rest_and_is_of_the_preferred(rng, count, short):
     """Random rows of rank ``count − short``; the control takes the pivots' own choice, which asks no preference."""
-    rng = np.random.default_rng(seed)
     rank = max(1, count - short)
     rows = rng.standard_normal((count, rank)) @ rng.standard_normal((rank, count + 2))
     rows /= np.linalg.norm(rows, axis=1)[:, None]
@@ -131,11 +130,10 @@ def test_the_control_leaves_out_whatever_the_pivots_say():
     assert list(exchanged(triangle, pivots, 2, np.array([1.0, 1e-3, 1e-3]))) == [0]
 
 
-@settings(max_examples=50, deadline=None)
-@given(seed=seeds, loops=st.integers(0, 3))
-def test_rows_with_an_effort_of_their_own_take_part_in_no_dependence(seed, loops):
+@settings(max_examples=50)
+@given(rng=generators, loops=st.integers(0, 3))
+def test_rows_with_an_effort_of_their_own_take_part_in_no_dependence(rng, loops):
     """A chain whose rows have two neighbours' efforts and one of their own, in any order, beside dependent rows."""
-    rng = np.random.default_rng(seed)
     count = 12
     chain = np.zeros((count, 2 * count + 1 + 3))
     for i in range(count):
@@ -170,7 +168,7 @@ def oscillator(row=None):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(entries=st.lists(st.floats(0.1, 1.0), min_size=1, max_size=3), data=st.data())
 def test_a_constraint_that_cancels_on_a_junction_but_for_rounding_holds_nothing(method, entries, data):
     """0 = Σ aᵢ e − (Σ aᵢ) e, rounded otherwise; the relation has no equation there either."""

@@ -26,7 +26,7 @@ def test_counts_of_shipped_scenes_are_those_of_the_dense_matrix(file):
     assert found == expected
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(mechanisms())
 def test_counts_of_drawn_mechanisms_are_those_of_the_dense_matrix(scene):
     found, expected = both(scene)

@@ -9,7 +9,7 @@ from scipy.sparse import csc_array
 from ephs.solve.methods import solvers
 from ephs.solve.methods.solvers import DENSE, NARROW, Solvers
 from ephs.solve.posing.errors import SolveError
-from tests.numerics import EPS, seeds
+from tests.numerics import EPS, generators, seeds
 
 
 def made():
@@ -31,10 +31,9 @@ def matrices(draw):
     return dense[hidden][:, hidden]
 
 
-@given(matrices(), seeds)
+@given(matrices(), generators)
 @settings(max_examples=50)
-def test_all_shapes_solve_as_a_dense_solver(dense, seed):
-    rng = np.random.default_rng(seed)
+def test_all_shapes_solve_as_a_dense_solver(dense, rng):
     family = made()
     for part in (dense, 2.0 * dense):  # the second one meets the order that the first one made
         right = rng.standard_normal(len(dense)).astype(dense.dtype)
@@ -43,11 +42,11 @@ def test_all_shapes_solve_as_a_dense_solver(dense, seed):
         assert np.all(np.abs(part @ x - right) <= 8 * (2 * NARROW + 1) * EPS * scale.max())
 
 
-@given(matrices(), matrices(), st.booleans(), seeds)
+@given(matrices(), matrices(), st.booleans(), generators)
 @settings(max_examples=50)
-def test_sums_are_solved_as_the_sum(one, other, turning, seed):
+def test_sums_are_solved_as_the_sum(one, other, turning, rng):
     """Also one after the other of two patterns, with zeros that the sum leaves."""
-    n, rng, family = min(len(one), len(other)), np.random.default_rng(seed), made()
+    n, family = min(len(one), len(other)), made()
     a, b = np.real(one)[:n, :n] + 9.0 * np.eye(n), np.where(rng.random((n, n)) < 0.1, np.real(other)[:n, :n], 0.0)
     weight = 0.01 + 0.02j if turning else 0.01
     for left, right in (

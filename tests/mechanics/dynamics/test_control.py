@@ -20,7 +20,7 @@ def near(found, expected, model, state, forces):
     return largest(found - expected) <= (10.0 * np.linalg.cond(mass) + 48.0 * len(model.joints)) * EPS * size
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(moving(loops=False))
 def test_states_by_joint_are_those_of_the_scene(found):
     """Without a scene made anew the same places and speeds, by name or as arrays; differences lead there."""
@@ -39,7 +39,7 @@ def test_states_by_joint_are_those_of_the_scene(found):
     assert largest(model.difference(state, state)) <= 8.0 * EPS
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(moving())
 def test_forces_make_the_accelerations_that_they_are_for(found):
     """By arrays and by joint; gravity is what holds at rest; computed torques are those of the oscillator."""
@@ -67,7 +67,7 @@ def test_forces_make_the_accelerations_that_they_are_for(found):
         assert near(model.acceleration(state, forces), asked, model, state, forces)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(moving(loops=False), st.booleans())
 def test_a_task_has_the_acceleration_that_its_forces_are_for(found, turning):
     """And its drift is how its velocity changes where rates stay: by differences along the motion."""

@@ -193,7 +193,7 @@ def test_a_rod_tells_its_strain_and_what_holds_its_pieces():
     assert not found.strain[..., 3:].any() and found.energy[-1].sum() > 0.1
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(seeds)
 def test_scenes_with_rods_come_back_from_text(seed):
     rng = np.random.default_rng(seed)

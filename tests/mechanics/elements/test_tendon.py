@@ -18,7 +18,7 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
-from tests.numerics import EPS, seeds
+from tests.numerics import EPS, generators
 from tests.scenes import equations_of
 from tests.written import scene_of_text
 
@@ -89,10 +89,9 @@ def tied(scene, rng):
     return replace(scene, tendons={"rope": made.called("rope")})
 
 
-@settings(max_examples=8, deadline=None)
-@given(mechanisms(max_bodies=4), seeds)
-def test_through_drawn_mechanisms_both_forms_have_its_forces(scene, seed):
-    rng = np.random.default_rng(seed)
+@settings(max_examples=8)
+@given(mechanisms(max_bodies=4), generators)
+def test_through_drawn_mechanisms_both_forms_have_its_forces(scene, rng):
     problem = problem_of_scene(tied(scene, rng))
     port = Path.of("tensions.rope")
     problem = replace(problem, signals={**problem.signals, port: Signal(rng.normal(size=1))})

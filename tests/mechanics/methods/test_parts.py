@@ -23,7 +23,7 @@ from ephs.semantics.primitives.primitives import power_ports
 from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import problem_of, renamed
-from tests.numerics import largest, seeds
+from tests.numerics import generators, largest, seeds
 
 REDUCED = File(ephs.__file__).parent / "mechanics" / "reduced"
 FROM_MODEL = ("address", "dims", "parameters", "parameter_at")
@@ -110,9 +110,8 @@ def test_what_has_no_place_is_refused_by_path(name, filling, ports, words):
     assert str(refused.value.path).startswith(name)
 
 
-@given(seeds)
-def test_an_inertia_is_read_from_the_energy_itself(seed):
-    rng = np.random.default_rng(seed)
+@given(generators)
+def test_an_inertia_is_read_from_the_energy_itself(rng):
     root, mass = rng.standard_normal((3, 3)), rng.uniform(0.1, 9.0)
     inertia = root @ root.T + 0.1 * np.eye(3)
     inverse = np.linalg.inv(np.block([[inertia, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3)]]))

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
@@ -17,7 +16,7 @@ from ephs.semantics.stage import Program, Real, Vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
-from tests.numerics import largest
+from tests.numerics import largest, seeds
 from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
@@ -175,7 +174,7 @@ def check(stage, seed):
     assert np.all(made >= 0.0)
 
 
-@given(scene=mechanisms(), seed=st.integers(0, 2**20))
+@given(scene=mechanisms(), seed=seeds)
 @settings(max_examples=25)
 def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
     stage = Stage(scene, seed)
@@ -191,7 +190,7 @@ def closed(request):
     return scene_of_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text)
 
 
-@given(seed=st.integers(0, 2**20))
+@given(seed=seeds)
 @settings(max_examples=5)
 def test_so_they_do_within_loops_and_beside_prescribed_motions(closed, seed):
     stage = Stage(closed, seed)
@@ -199,7 +198,7 @@ def test_so_they_do_within_loops_and_beside_prescribed_motions(closed, seed):
     assert stage.memory["counts"][0] > 0
 
 
-@given(seed=st.integers(0, 2**20))
+@given(seed=seeds)
 @settings(max_examples=10)
 def test_so_do_those_of_contacts_within_a_mechanism(hug, seed):
     stage = Stage(hug, seed)

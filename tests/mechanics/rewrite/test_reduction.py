@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 
 import ephs
 from benchmarks.cases import CASES
@@ -18,7 +17,7 @@ from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
-from tests.numerics import largest
+from tests.numerics import generators, largest, seeds
 from tests.scenes import SCENES, model_of, shipped
 from tests.written import scene_of_text
 
@@ -84,7 +83,7 @@ def test_slides_and_pins_make_the_groups_that_they_generate(kind, name):
 
 
 @settings(max_examples=15)
-@given(scene=mechanisms(max_bodies=3), seed=st.integers(0, 2**20))
+@given(scene=mechanisms(max_bodies=3), seed=seeds)
 def test_bodies_never_leave_the_group_of_their_mechanism(scene, seed):
     """Displacements from the start are in it: the logarithm of q q⁰⁻¹, where it is short, lies in the algebra."""
     found = coordinates.mechanisms(reduced_of(scene))
@@ -226,11 +225,10 @@ def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is():
 
 
 @settings(max_examples=20)
-@given(scene=mechanisms(max_bodies=3, loops=False, springs=False, heat=False), seed=st.integers(0, 2**20))
-def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, seed):
+@given(scene=mechanisms(max_bodies=3, loops=False, springs=False, heat=False), rng=generators)
+def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, rng):
     """Started elsewhere along them, momenta and all other coordinates go as before."""
     reduced = reduced_of(scene)
-    rng = np.random.default_rng(seed)
     changed = {str(path): value for path, value in initial_state(scene).items()}
     shifted = set()
     for part in coordinates.mechanisms(reduced):

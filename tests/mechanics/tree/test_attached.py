@@ -215,7 +215,7 @@ def _rope():
 # ---- efforts that only balances determine ---------------------------------------------------------------------------
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.floats(0.1, 10.0), min_size=2, max_size=5), st.floats(0.2, 3.0))
 def test_efforts_without_a_storage_follow_from_balances(resistances, ratio):
     """Pairs of brakes in series, side by side on the shaft of a gear: balances divide its rate between each two."""

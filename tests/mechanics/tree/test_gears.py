@@ -109,7 +109,7 @@ def trains(draw):
     return bodies, gears
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(trains(), st.integers(0, 10**6))
 def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     system, start = train(*made)

@@ -50,7 +50,7 @@ def test_a_pendulum_falls_as_in_books(tmp_path):
     assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(mechanisms(max_bodies=3))
 def test_two_evaluations_of_the_relations_agree(scene):
     problem = problem_of_scene(scene)

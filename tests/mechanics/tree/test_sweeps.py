@@ -18,7 +18,7 @@ from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
 from tests.numerics import EPS, largest, seeds
 from tests.scenes import equations_of
 
-slow = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+slow = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow])
 
 
 class Tree:

@@ -21,9 +21,7 @@ from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.stage import PLAIN
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
-from tests.numerics import EPS, largest
-
-seeds = st.integers(0, 2**20)
+from tests.numerics import EPS, generators, largest, seeds
 
 
 def _rising(x, a, b):
@@ -103,10 +101,10 @@ def moved(storage, point, v):
 
 
 @pytest.mark.parametrize("name", ENERGIES)
-@given(seed=seeds, length=st.sampled_from([1.0, 1e-3, 1e-7, 1e-12]))
-def test_the_effort_along_the_step_is_the_difference_of_energies(name, seed, length):
+@given(rng=generators, length=st.sampled_from([1.0, 1e-3, 1e-7, 1e-12]))
+def test_the_effort_along_the_step_is_the_difference_of_energies(name, rng, length):
     storage, _ = made(name)
-    a, point = arguments(storage.kernel.relation, storage, np.random.default_rng(seed), 0.15 * length)
+    a, point = arguments(storage.kernel.relation, storage, rng, 0.15 * length)
     status, out = run(compiled(storage.kernel.relation), storage.kernel.relation, a)
     before, (_, after) = storage.energy(point), moved(storage, point, a["v"])
     effort = out["e"] + storage.bundle.intensive(ephs.Reference(300.0, 1e-3))
@@ -197,11 +195,11 @@ ALL = {name: made(name)[0] for name in ENERGIES} | RELATIONS
 
 
 @pytest.mark.parametrize("name", ALL)
-@given(seed=seeds)
-def test_floats_and_machine_code_give_the_same_bits(name, seed):
+@given(rng=generators)
+def test_floats_and_machine_code_give_the_same_bits(name, rng):
     primitive = ALL[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    a, _ = arguments(relation, primitive, rng, 0.3)
     one = run(compiled(relation), relation, a)
     two = run(program(relation).plain()["value"], relation, a)
     assert one[0] == two[0]  # a volume may become negative in such a step
@@ -210,11 +208,11 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
 
 
 @pytest.mark.parametrize("name", ALL)
-@given(seed=seeds)
-def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, seed):
+@given(rng=generators)
+def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, rng):
     primitive = ALL[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.0)
+    a, _ = arguments(relation, primitive, rng, 0.0)
     status, over = run(compiled(relation), relation, a)
     stepped = a | {"v": a["v"] + 0.3}  # increments are not read
     found, rest = run(compiled(relation, rest=True), relation, stepped)
@@ -226,11 +224,11 @@ def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, seed):
 
 
 @pytest.mark.parametrize("name", ALL)
-@given(seed=seeds)
-def test_jacobians_are_derivatives(name, seed):
+@given(rng=generators)
+def test_jacobians_are_derivatives(name, rng):
     primitive = ALL[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.1)
+    a, _ = arguments(relation, primitive, rng, 0.1)
     call = compiled(relation)
     n, k, m, _ = relation.dimensions
     stores = primitive.kind == "storage"
@@ -253,11 +251,11 @@ def test_jacobians_are_derivatives(name, seed):
 
 
 @pytest.mark.parametrize("name", ["drag", "conduction"])
-@given(seed=seeds)
-def test_processes_keep_energy_and_make_entropy(name, seed):
+@given(rng=generators)
+def test_processes_keep_energy_and_make_entropy(name, rng):
     primitive = RELATIONS[name]
     relation = primitive.kernel.relation
-    a, point = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    a, point = arguments(relation, primitive, rng, 0.3)
     _, out = run(compiled(relation), relation, a)
     reference = ephs.Reference(300.0, 1e-3)
     energy = a["e"] + primitive.bundle.intensive(reference)
@@ -268,19 +266,19 @@ def test_processes_keep_energy_and_make_entropy(name, seed):
 
 
 @pytest.mark.parametrize("name", ["turning", "rod"])
-@given(seed=seeds)
-def test_reversible_relations_exchange_power_and_lose_none(name, seed):
+@given(rng=generators)
+def test_reversible_relations_exchange_power_and_lose_none(name, rng):
     primitive = RELATIONS[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    a, _ = arguments(relation, primitive, rng, 0.3)
     _, out = run(compiled(relation), relation, a)
     power, terms = a["e"] @ out["f"] - a["lam"] @ out["c"], np.abs(a["e"]) @ np.abs(out["f"])
     assert abs(power) <= 16 * EPS * (terms + np.abs(a["lam"]) @ np.abs(out["c"]))
 
 
 @pytest.mark.parametrize("code", [codes.SO3, codes.SE3, codes.SE2, codes.SO3xR3])
-@given(seed=seeds, length=st.sampled_from([1e-9, 1e-4, 0.1, 1.0]))
-def test_points_over_a_step_are_those_of_the_groups(code, seed, length):
+@given(rng=generators, length=st.sampled_from([1e-9, 1e-4, 0.1, 1.0]))
+def test_points_over_a_step_are_those_of_the_groups(code, rng, length):
     """The ends by other code; their difference by the slopes."""
     from ephs.semantics.derive.charts import moved as retracted
     from ephs.semantics.derive.charts import over
@@ -289,7 +287,6 @@ def test_points_over_a_step_are_those_of_the_groups(code, seed, length):
         manifold(q.space) for q in (Q.pose, Q.direct_pose, Q.relative_pose("planar"), Q.relative_pose("spherical"))
         if manifold(q.space).code == code
     )  # fmt: skip
-    rng = np.random.default_rng(seed)
     x, v = space.random(rng), length * rng.standard_normal(space.dim)
     numbers = over(PLAIN, code, list(x), list(v), 0)
     size = 1.0 + largest(x)

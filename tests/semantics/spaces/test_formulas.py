@@ -10,7 +10,7 @@ from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.spaces.staged_groups import STAGED, included
 from ephs.semantics.spaces.vectors import symmetric_inverse, upper
 from ephs.semantics.stage import PLAIN, Entry, Program, vector
-from tests.numerics import EPS, largest, seeds
+from tests.numerics import EPS, generators, largest
 
 GROUPS = {codes.VECTOR: vector_space("real", 3), codes.SO3: SO3, codes.SE2: SE2, codes.SE3: SE3, codes.SO3xR3: SO3xR3}
 
@@ -92,10 +92,9 @@ PROGRAM = Program("formulas", **{name: entry(function, letters) for name, (funct
 
 @pytest.mark.parametrize("name", FORMULAS)
 @settings(max_examples=20)
-@given(seed=seeds, size=st.sampled_from([0.0, 1e-9, 1e-4, 0.1, 0.5, 1.0]))
-def test_a_formula_is_what_the_group_says(name, seed, size):
+@given(rng=generators, size=st.sampled_from([0.0, 1e-9, 1e-4, 0.1, 0.5, 1.0]))
+def test_a_formula_is_what_the_group_says(name, rng, size):
     _, letters, reference = FORMULAS[name]
-    rng = np.random.default_rng(seed)
     inputs = [draw(letter, rng, size) for letter in letters]
     expected = np.ravel(reference(*inputs))
     found, machine = np.zeros(expected.size), np.zeros(expected.size)
@@ -110,9 +109,9 @@ def test_a_formula_is_what_the_group_says(name, seed, size):
 
 
 @pytest.mark.parametrize("code", STAGED)
-@given(seed=seeds)
-def test_increments_and_differentials_undo_each_other(code, seed):
-    group, formulas, rng = GROUPS[code], STAGED[code], np.random.default_rng(seed)
+@given(rng=generators)
+def test_increments_and_differentials_undo_each_other(code, rng):
+    group, formulas = GROUPS[code], STAGED[code]
     a, v = group.random(rng), 0.5 * rng.standard_normal(group.dim)
     b = formulas.retract(PLAIN, list(a), list(v))
     assert np.allclose(formulas.increment(PLAIN, list(a), b), v, atol=1e-13)
@@ -123,9 +122,8 @@ def test_increments_and_differentials_undo_each_other(code, seed):
 
 
 @pytest.mark.parametrize("name", [*PAIRS])
-@given(seed=seeds)
-def test_the_frame_of_a_joint_is_its_pose(name, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_the_frame_of_a_joint_is_its_pose(name, rng):
     joint = pair(name, **{parameter: 0.3 for parameter in PAIRS[name].parameters})
     x = joint.manifold.random(rng)
     rotation, place = included(PLAIN, joint.code, joint.basis.T.tolist(), list(x))
@@ -135,9 +133,8 @@ def test_the_frame_of_a_joint_is_its_pose(name, seed):
 
 
 @pytest.mark.parametrize("size", range(1, 7))
-@given(seed=seeds)
-def test_a_symmetric_matrix_is_inverted_where_it_is_positive(size, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_a_symmetric_matrix_is_inverted_where_it_is_positive(size, rng):
     values = np.exp(rng.uniform(-3.0, 3.0, size))
     turn = np.linalg.qr(rng.standard_normal((size, size)))[0]
     inverse, sound = symmetric_inverse(PLAIN, (turn * values @ turn.T).tolist())

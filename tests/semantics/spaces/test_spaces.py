@@ -24,7 +24,7 @@ from ephs.semantics.spaces import (
     twist_of_velocity,
     vector_space,
 )
-from tests.numerics import EPS, largest, seeds
+from tests.numerics import EPS, generators, largest
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,8 @@ def test_a_new_manifold_is_one_entry():
 
 
 @pytest.mark.parametrize("group", [SE3, SO3xR3], ids=lambda g: g.name)
-@given(seed=seeds)
-def test_material_form(group, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_material_form(group, rng):
     pose, u, f, h = group.random(rng), rng.standard_normal(6), rng.standard_normal(6), 1e-5
     gradient = rng.standard_normal((3, 3)), rng.standard_normal(3)
     velocity = material_velocity(group, pose, u)

@@ -20,11 +20,10 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.symbols.tracing import Untraceable, trace
 from ephs.semantics.symbols.voices import formula_text
 from ephs.semantics.verdicts.checks import random_point
-from tests.numerics import largest
+from tests.numerics import generators, largest, seeds
 from tests.semantics.test_primitives import ARGUMENTS, made
 
 UNARY = [np.sin, np.cos, np.tanh, np.arctan, np.exp, np.cosh, np.sinh, np.expm1, abs]
-seeds = st.integers(0, 2**20)
 
 
 def branches():
@@ -120,11 +119,11 @@ SPACES = {
 
 
 @pytest.mark.parametrize("name", SPACES)
-@given(seed=seeds)
-def test_gradients_are_the_left_trivialised_derivatives(name, seed):
+@given(rng=generators)
+def test_gradients_are_the_left_trivialised_derivatives(name, rng):
     quantity, energy = SPACES[name]
     interface = library.power_ports(x=quantity)
-    rng, space, port = np.random.default_rng(seed), manifold(quantity.space), Path.of("x")
+    space, port = manifold(quantity.space), Path.of("x")
     x, v = space.random(rng), rng.standard_normal(space.dim)
 
     def along(t):

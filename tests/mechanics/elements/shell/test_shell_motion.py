@@ -21,7 +21,7 @@ from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive import relations
 from ephs.semantics.spaces import SE3
 from ephs.testing import check_primitive
-from tests.numerics import EPS, largest, seeds
+from tests.numerics import EPS, generators, largest
 
 POINTS = np.array([[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [1.1, 0.9, 0.1], [-0.1, 0.8, 0.0]])
 ELEMENT = Shell.of(POINTS, [[0, 1, 2, 3]], ShellSection.isotropic(0.1, E=1e3, nu=0.3, rho=4.0))
@@ -57,9 +57,8 @@ def test_the_element_is_a_storage():
 
 
 @settings(max_examples=20)
-@given(seeds, st.floats(1e-8, 0.3), st.floats(1e-8, 0.3))
-def test_the_work_of_a_step_is_the_difference_of_energies(seed, size, step):
-    rng = np.random.default_rng(seed)
+@given(generators, st.floats(1e-8, 0.3), st.floats(1e-8, 0.3))
+def test_the_work_of_a_step_is_the_difference_of_energies(rng, size, step):
     x, v = states(rng, size), step * rng.standard_normal(18)
     end = SPRING.retract(x, v)
     effort = SPRING.discrete_effort(x, v, Reference())
@@ -81,9 +80,8 @@ def test_the_effort_in_the_middle_of_a_step_does_other_work():
 
 
 @settings(max_examples=10)
-@given(seeds)
-def test_derivatives_of_efforts_are_their_differences(seed):
-    rng = np.random.default_rng(seed)
+@given(generators)
+def test_derivatives_of_efforts_are_their_differences(rng):
     x, v = states(rng, 0.2), 0.2 * rng.standard_normal(18)
     relation = SPRING.kernel.relation
     given_numbers = {name: np.zeros(size) for name, size in relations.sizes(relation).items()}
@@ -98,10 +96,9 @@ def test_derivatives_of_efforts_are_their_differences(seed):
 
 
 @settings(max_examples=15)
-@given(seeds, st.floats(1e-6, 0.2))
-def test_energy_and_efforts_are_those_of_statics(seed, size):
+@given(generators, st.floats(1e-6, 0.2))
+def test_energy_and_efforts_are_those_of_statics(rng, size):
     """`Shell` has the same energy, by another program; its forces are the efforts, seen from the nodes."""
-    rng = np.random.default_rng(seed)
     poses = disturbed(ELEMENT, rng, size)
     x = relative(ELEMENT, poses)
     energy = ELEMENT.energy(poses)[0]
@@ -115,9 +112,8 @@ def test_energy_and_efforts_are_those_of_statics(seed, size):
     assert abs(power - np.sum(ELEMENT.forces(poses) * change)) <= 1e-8 * scale + floor
 
 
-@given(seeds)
-def test_a_rigid_motion_costs_nothing(seed):
-    rng = np.random.default_rng(seed)
+@given(generators)
+def test_a_rigid_motion_costs_nothing(rng):
     motion = SE3.exp(np.concatenate([rng.uniform(-1.5, 1.5, 3), 10.0 * rng.standard_normal(3)]))
     poses = np.array([SE3.compose(motion, pose) for pose in ELEMENT.poses])
     # rounding of places 10 m away, in logarithms of 1 m
@@ -138,9 +134,8 @@ def test_the_damper_is_a_process():
 
 
 @settings(max_examples=5)
-@given(seeds)
-def test_derivatives_of_a_loss_are_its_differences(seed):
-    rng = np.random.default_rng(seed)
+@given(generators)
+def test_derivatives_of_a_loss_are_its_differences(rng):
     relation = DAMPER.kernel.relation
     n, _, m, _ = dims = np.array(relation.dimensions)
     numbers = {name: np.zeros(size) for name, size in relations.sizes(relation).items()}
@@ -159,10 +154,9 @@ def test_derivatives_of_a_loss_are_its_differences(seed):
 
 
 @settings(max_examples=10)
-@given(seeds)
-def test_the_loss_of_a_rate_is_what_the_stress_of_its_strain_rate_does(seed):
+@given(generators)
+def test_the_loss_of_a_rate_is_what_the_stress_of_its_strain_rate_does(rng):
     """⟨u|μ u⟩ = τ ḋᵀ K ḋ with the rates ḋ of the logarithms, by differences of statics."""
-    rng = np.random.default_rng(seed)
     x, u = states(rng, 0.2), rng.standard_normal(18)
     effort = np.append(u, 0.0)
     lost = effort @ DAMPER.matrix(x, effort, Reference()) @ effort / Reference().temperature
