@@ -1,7 +1,5 @@
 """Mechanisms wired by hand are assembled as scenes are: poses from joints, joints from poses, gaps refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,8 @@ from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
 from tests.numerics import EPS, largest
-from tests.scenes import shipped
+from tests.scenes import SCENES, shipped
+from tests.written import scene_of_text
 
 METHODS = ("natural", "natural4")
 
@@ -56,7 +55,7 @@ def test_a_gap_is_refused_by_joint_and_size(method):
 
 
 def test_what_a_scene_was_made_into_is_left_as_it_is():
-    for file in sorted((Path(__file__).parents[2] / "scenes").glob("*.toml")):
+    for file in SCENES:
         scene = ephs.load(file)
         state = initial_state(scene)
         system = scene.system()
@@ -107,10 +106,10 @@ def test_velocity_residuals_are_measured_as_of_scenes(name, monkeypatch):
     assert sol.problem.linked(sol).velocity_error().max() == pytest.approx(off, rel=1e-9)
 
 
-def rod_on_a_pin(folder, size):
+def rod_on_a_pin(size):
     """A rod of one shape and density, which turns at 2 rad/s."""
     thick = size**5
-    (folder / "rod.toml").write_text(
+    return scene_of_text(
         f"""
         format = 1
         [world]
@@ -127,14 +126,13 @@ def rod_on_a_pin(folder, size):
         rate = 2.0
         """
     )
-    return ephs.load(folder / "rod.toml")
 
 
 @pytest.mark.parametrize(
     ("method", "size"), [*(("rk54", size) for size in (1e-6, 1.0, 1e3)), *(("natural", size) for size in (1e-6, 1.0))]
 )
-def test_momenta_off_the_joints_are_refused_at_any_size(size, method, tmp_path):
-    system = rod_on_a_pin(tmp_path, size).system()
+def test_momenta_off_the_joints_are_refused_at_any_size(size, method):
+    system = rod_on_a_pin(size).system()
     momentum = np.array(system.initial[ephs.Path.of("bodies.rod.ke.p")])
     run = {"method": method, "step": 1e-3, "initial": {"bodies.rod.ke.p": momentum}}
     assert ephs.simulate(system, 0.01, **run).joint("joints.pin").rate[-1, 0] == pytest.approx(2.0, rel=1e-12)
@@ -145,8 +143,8 @@ def test_momenta_off_the_joints_are_refused_at_any_size(size, method, tmp_path):
 
 @pytest.mark.parametrize("method", ["rk54", "natural"])
 @pytest.mark.parametrize("size", [1e-6, 1e-2, 1.0, 1e3])
-def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method, tmp_path):
-    scene = rod_on_a_pin(tmp_path, size)
+def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method):
+    scene = rod_on_a_pin(size)
     states = scene.system().initial
     momentum, pose = (np.array(states[ephs.Path.of(f"bodies.rod.{name}")]) for name in ("ke.p", "pe.q"))
     run = {"method": method, "step": 1e-3}

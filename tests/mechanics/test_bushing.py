@@ -7,6 +7,7 @@ import ephs
 from benchmarks.hard.case import read
 from benchmarks.hard.loops import BLOCK, BUSHING, GRAVITY, STIFFNESS, fall
 from ephs.mechanics.methods.registry import METHODS
+from tests.methods import OF_SCENES
 from tests.numerics import largest
 
 
@@ -14,7 +15,7 @@ def scene_of(length):
     return read(BUSHING.format(length=length))
 
 
-@pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
+@pytest.mark.parametrize("name", OF_SCENES)
 def test_a_block_falls_from_the_point_that_holds_it(name):
     method = METHODS[name]
     steps = {"step": 2.0**-8} if method.fixed else {"rtol": 1e-8, "atol": 1e-10}

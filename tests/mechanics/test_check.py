@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import ephs
 from ephs.mechanics.runs import check
 from ephs.mechanics.runs.check import check_model
 from ephs.mechanics.runs.running import by_constant_steps
@@ -12,6 +11,7 @@ from ephs.mechanics.runs.touching import run_of_touching, stays_open
 from ephs.semantics.systems import report
 from ephs.semantics.systems.laws import SystemLaw, Verdict, system_law
 from tests.numerics import largest
+from tests.written import scene_of_text
 
 SCENE = """
 format = 1
@@ -41,11 +41,9 @@ stiffness = 1e4
 
 
 @pytest.fixture
-def load(tmp_path):
+def load():
     def made(low=0.1, high=1.0, speed=0.0):
-        file = tmp_path / "falling.toml"
-        file.write_text(SCENE.format(low=low, high=high, speed=speed))
-        return ephs.load(file)
+        return scene_of_text(SCENE.format(low=low, high=high, speed=speed))
 
     return made
 

@@ -10,6 +10,7 @@ from benchmarks.hard.dead_centre import RATE, folding, gained
 from ephs import PolynomialMotion
 from tests.numerics import EPS, largest
 from tests.scenes import shipped
+from tests.written import scene_of_text
 
 UNTIL = 4.9
 SHAFT = """
@@ -68,12 +69,10 @@ def test_heat_is_part_of_the_work():
     assert sol.work[-1] == pytest.approx(gained(UNTIL) + heat, rel=1e-4)
 
 
-def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier(tmp_path):
+def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier():
     """A pendulum on a shaft that turns evenly: work is the sum of its power, right to the method's error, which the
     plain defect of the balance shows."""
-    file = tmp_path / "shaft.toml"
-    file.write_text(SHAFT)
-    sol = ephs.simulate(ephs.load(file), 1.0, method="rk54", rtol=1e-4)
+    sol = ephs.simulate(scene_of_text(SHAFT), 1.0, method="rk54", rtol=1e-4)
     assert 1e-12 < sol.stats["plain_defect"]["largest"] / sol.ledgers.scale < 1e-2
     assert sol.energy_error.max() < 1e-12
 

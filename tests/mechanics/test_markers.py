@@ -6,6 +6,7 @@ import pytest
 import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from tests.numerics import largest
+from tests.written import scene_of_text
 
 PENDULUM = """
 format = 1
@@ -28,10 +29,8 @@ at = [1.0, 2.0, 3.0]
 
 
 @pytest.fixture
-def pendulum(tmp_path):
-    file = tmp_path / "pendulum.toml"
-    file.write_text(PENDULUM)
-    return ephs.load(file)
+def pendulum():
+    return scene_of_text(PENDULUM)
 
 
 def test_a_marker_moves_with_its_body(pendulum):
@@ -67,7 +66,8 @@ def test_a_force_at_a_marker_is_the_wrench_that_it_makes(pendulum):
     assert largest(both.joint("pin").coordinate - by_force.joint("pin").coordinate) <= 1e-13
 
 
-def test_markers_of_parts_move_with_their_ground(pendulum, tmp_path):
+def test_markers_of_parts_move_with_their_ground(tmp_path):
+    (tmp_path / "pendulum.toml").write_text(PENDULUM)
     (tmp_path / "hall.toml").write_text(
         "format = 1\n[bodies.ball]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n"
         '[parts.left]\nuse = "pendulum.toml"\nposition = [0.0, 5.0, 0.0]\n'
@@ -89,11 +89,9 @@ def test_markers_of_parts_move_with_their_ground(pendulum, tmp_path):
         ('[markers.m]\nbody = "rod"\nwhere = 3\n', "markers.m.where"),
     ],
 )
-def test_faulty_markers_are_named(text, message, tmp_path):
-    file = tmp_path / "faulty.toml"
-    file.write_text(PENDULUM + text)
+def test_faulty_markers_are_named(text, message):
     with pytest.raises(ephs.SceneError, match=message):
-        ephs.load(file)
+        scene_of_text(PENDULUM + text)
 
 
 def test_unknown_inputs_list_the_markers(pendulum):

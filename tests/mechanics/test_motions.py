@@ -19,6 +19,8 @@ from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
 from ephs.semantics.systems.laws import Probe, system_law
 from ephs.testing import mechanisms
+from tests.mechanics.mechanisms import on_ground
+from tests.methods import FIXED_OF_SCENES
 from tests.numerics import EPS
 from tests.scenes import SCENES
 from tests.written import scene_of_text
@@ -105,7 +107,7 @@ def rubbing(kind):
     return scene, end(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13))
 
 
-@pytest.mark.parametrize("method", [m.name for m in METHODS.values() if m.fixed and m.scenes])
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
 @pytest.mark.parametrize("kind", [*PAIRS, "universal"])
 def test_every_pair_with_every_method(kind, method):
     """Balances, closure, and the method's order."""
@@ -234,10 +236,8 @@ def test_contradictory_motions_are_refused():
 
 def test_functions_of_the_user_move_with_the_same_balances():
     """A pendulum with a Python potential and a friction that grows with speed and falls with temperature."""
-    ground = ephs.Pattern.from_text("p1: body_momentum; p2: body_momentum; ground(p=p1); joint(p1, p2); body(p=p2)")
-    system = ground(
-        ground=components.ground(),
-        joint=joint(
+    system = on_ground(
+        link=joint(
             "revolute",
             frame2={"position": [0.0, 0.5, 0.0]},
             friction=lambda x, u, theta: [[0.1 * (1.0 + u[0] ** 2) * 300.0 / theta]],

@@ -10,11 +10,11 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.own_units import NEAR, SI, OwnUnits, mobility_of
 from ephs.mechanics.scene.rescaled import rescaled
+from tests.methods import OF_SCENES
 from tests.scenes import shipped
 
 FOUR_BAR = shipped("four-bar")
 SPAN, STEP = 0.125, 2.0**-6
-NAMES = [name for name, method in METHODS.items() if method.scenes]
 EXPONENTS = st.tuples(*[st.integers(-30, 30)] * 3)
 SOLVED = 1e-11
 """Relative; Newton's iterations end at 1e-13 of what moves, and radau's at a part of its tolerance."""
@@ -39,7 +39,7 @@ def moved(sol, exponents=(0, 0, 0)):
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", OF_SCENES)
 def test_a_run_knows_no_unit(name):
     there = moved(ran(name))
     near = SOLVED if METHODS[name].fixed else 1e-6

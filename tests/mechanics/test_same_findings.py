@@ -7,6 +7,7 @@ import ephs
 from ephs.mechanics.scene.build import scene_inputs
 from ephs.mechanics.scene.rescaled import rescaled
 from tests.scenes import shipped
+from tests.written import scene_of_text
 
 NAMES = ("biped", "body", "cardan-shaft", "chain", "dzhanibekov", "four-bar", "heavy-top", "hot-brake", "slider-crank")
 SETTINGS = (
@@ -46,14 +47,12 @@ def test_some_of_these_runs_are_found_wrong_and_some_are_not():
 
 
 @pytest.mark.parametrize("size", [2.0**-20, 2.0**10])
-def test_a_system_moves_alike_at_any_size(size, tmp_path):
+def test_a_system_moves_alike_at_any_size(size):
     """By natural, which decides the rank of its constraints by numbers; masses grow as volumes do.
 
     Its error at these steps is 1e-4, and parts of it depend on the unit of length.
     """
-    file = tmp_path / "two-rods.toml"
-    file.write_text(
-        """
+    scene = scene_of_text("""
         format = 1
         [assembly]
         adjust = true
@@ -79,9 +78,7 @@ def test_a_system_moves_alike_at_any_size(size, tmp_path):
         axis = [1.0, 0.0, 0.0]
         rate = 2.0
         stiffness = 0.3
-        """
-    )
-    scene = ephs.load(file)
+        """)
     small = rescaled(scene, size, size**3, 1.0)
     setting = {"method": "natural", "step": 0.01, "audit": "off"}
     one, other = (ephs.simulate(each.system(), 0.2, **setting) for each in (scene, small))

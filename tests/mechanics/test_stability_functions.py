@@ -23,6 +23,7 @@ from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.numerics import largest
 from tests.scenes import model_of
+from tests.written import scene_of_text
 
 J, K, D = 0.5, 3.0, 0.4
 ANGLE, RATE = 0.3, -1.1
@@ -81,10 +82,8 @@ FUNCTIONS = {
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    file = tmp_path_factory.mktemp("torsion") / "torsion.toml"
-    file.write_text(SCENE, encoding="utf-8")
-    return ephs.load(file)
+def scene():
+    return scene_of_text(SCENE)
 
 
 def states(scene, method, h, steps, **more):

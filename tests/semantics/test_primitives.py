@@ -16,6 +16,7 @@ from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
 from tests.numerics import largest, seeds
 from tests.semantics.subspace import dirac
+from tests.semantics.zoo import PS, QP, friction_matrix
 
 GASES = (
     library.chemistry.Species("A", {"X": 1}, energy=1e3, entropy=10.0, capacity=20.0),
@@ -163,17 +164,13 @@ def test_parameters_out_of_range_are_named(name, arguments, key):
         getattr(library, name)(**arguments)
 
 
-QP = {"q": Q.displacement, "p": Q.momentum}
-PS = {"p": Q.momentum, "s": Q.entropy}
-
-
 def test_what_one_makes_oneself_is_what_the_library_makes():
     mine = {
         "spring": ephs.storage({"q": Q.displacement}, lambda q: 0.75 * q * q, lambda q: [1.5 * q]),
         "pkc": ephs.gyrator(QP, [[0.0, -1.0], [1.0, 0.0]]),
         "lever": ephs.transformer({"q1": Q.displacement, "q2": Q.displacement}, [[2.5]]),
         "rigid_link": ephs.constraint({"p": Q.momentum, "p2": Q.momentum}, [[1.0, -1.0]]),
-        "friction": ephs.irreversible(PS, lambda p, s: 0.2 * np.array([[s, -p], [-p, p * p / s]])),
+        "friction": ephs.irreversible(PS, lambda p, s: 0.2 * friction_matrix(p, s)),
     }
     for name, primitive in mine.items():
         state = {str(port): 0.4 for port in primitive.reads}

@@ -16,14 +16,24 @@ AB = {"a": Q.entropy, "b": Q.entropy}
 ONE = power_ports(q=Q.displacement)
 
 
+def friction_matrix(p, s):
+    """M of friction with the coefficient 1."""
+    return np.array([[s, -p], [-p, p * p / s]])
+
+
+def conduction_matrix(a, b):
+    """M of heat conduction with the coefficient 1."""
+    return np.array([[b / a, -1.0], [-1.0, a / b]])
+
+
 def conduct(k):
     """Heat conduction with the coefficient k(a, b) of the two temperatures."""
-    return lambda: ephs.irreversible(AB, lambda a, b: k(a, b) * np.array([[b / a, -1.0], [-1.0, a / b]]))
+    return lambda: ephs.irreversible(AB, lambda a, b: k(a, b) * conduction_matrix(a, b))
 
 
 def drag(d):
     """Friction with the coefficient d(p, s) of velocity and temperature."""
-    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * np.array([[s, -p], [-p, p * p / s]]))
+    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * friction_matrix(p, s))
 
 
 def hidden(function):
@@ -66,12 +76,12 @@ ZOO = {
     "drives above a thousand kelvin": (drag(hidden(lambda p, s: 1.0 if s <= 1000.0 else -1.0)), "definite"),
     "drives in small volumes": (
         lambda: ephs.irreversible(
-            {**PS, "~v": Q.volume}, lambda p, s, v: (v - 0.2) * np.array([[s, -p], [-p, p * p / s]])
+            {**PS, "~v": Q.volume}, lambda p, s, v: (v - 0.2) * friction_matrix(p, s)
         ), "definite",
     ),
     "drives where x is negative": (
         lambda: ephs.irreversible(
-            {**PS, "~x": Q.displacement}, lambda p, s, x: x * np.array([[s, -p], [-p, p * p / s]])
+            {**PS, "~x": Q.displacement}, lambda p, s, x: x * friction_matrix(p, s)
         ), "definite",
     ),
     "three bodies, one pair wrong": (
@@ -105,7 +115,7 @@ ZOO = {
     "friction with a direction": (drag(lambda p, s: 2.0 + np.tanh(p)), "parity"),
     "friction tells quaternions apart": (
         lambda: ephs.irreversible(
-            PS | {"~q": Q.pose}, lambda p, s, q: (2.0 + q[1]) * np.array([[s, -p], [-p, p * p / s]])
+            PS | {"~q": Q.pose}, lambda p, s, q: (2.0 + q[1]) * friction_matrix(p, s)
         ), "rotation-sign",
     ),
     "a class of one's own": (

@@ -13,6 +13,7 @@ from ephs.solve.posing import probe
 from ephs.solve.posing.breakpoints import Breakpoints
 from ephs.solve.posing.probe import WIDTH, ProbedInput
 from tests.mechanics.plain import uncorrected
+from tests.methods import FIXED_OF_SCENES
 from tests.numerics import largest
 
 SCENE = sprung()
@@ -24,7 +25,6 @@ def run(method, until=UNTIL, function=push, **options):
 
 
 ADAPTIVE = ["auto", *(name for name, method in METHODS.items() if method.adaptive and method.scenes)]
-CONSTANT = [name for name, method in METHODS.items() if method.fixed and method.scenes]
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
@@ -35,7 +35,7 @@ def test_chosen_steps_end_on_declared_jumps_and_keep_the_tolerance(method):
     assert sol.stats["jumps"] == {"declared": 4, "found": [], "divided_steps": 0}
 
 
-@pytest.mark.parametrize("method", CONSTANT)
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
 def test_constant_steps_keep_their_order_over_jumps_that_divide_them(method):
     with uncorrected():  # corrections are largest where the mass turns back, which a grid meets by chance
         sols = [run(method, step=1.0 / n, jumps=TIMES, audit="off") for n in (30, 60)]

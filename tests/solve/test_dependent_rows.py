@@ -1,7 +1,5 @@
 """Equations that loops repeat: which of them a step leaves out, and what long steps keep of them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,21 +12,22 @@ from ephs import library
 from ephs import quantity as Q
 from ephs.solve.methods.analysis import dependent_rows, entangled, entries_at, exchanged
 from tests.numerics import EPS, generators, largest
-from tests.scenes import ROOT, model_of, shipped
+from tests.oscillator import free_oscillator
+from tests.scenes import model_of, shipped
+from tests.written import scene_of_text
 
-BRICARD = ROOT / "scenes/bricard.toml"
 NAMES = ("a", "b", "c", "d", "e")
 
 
 @pytest.fixture(scope="module")
 def exact():
     """Positions after 5 s, in joint coordinates with another equation left out at every instant."""
-    sol = ephs.simulate(ephs.load(BRICARD), 5.0, method="rk87", rtol=1e-11, atol=1e-11, save_at=[0.0, 5.0])
+    sol = ephs.simulate(shipped("bricard"), 5.0, method="rk87", rtol=1e-11, atol=1e-11, save_at=[0.0, 5.0])
     return np.concatenate([sol.body(name).position[-1] for name in NAMES])
 
 
 def run(method, **options):
-    sol = ephs.simulate(ephs.load(BRICARD), 5.0, method=method, audit="off", **options)
+    sol = ephs.simulate(shipped("bricard"), 5.0, method=method, audit="off", **options)
     return sol, np.concatenate([sol.body(name).position[-1] for name in NAMES])
 
 
@@ -55,7 +54,7 @@ def test_chosen_steps_carry_it_too(exact):
     assert sol.stats["steps"] <= 100
 
 
-def ring(folder):
+def ring():
     """Six slender bars of 1 kg along edges of a cube of 1 m, each turning on the next about the axis that is left."""
     corners = [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)]
     lines = ["format = 1", "[world]", "gravity = [0.0, -9.81, 0.0]"]
@@ -69,15 +68,13 @@ def ring(folder):
         axis = [float(i == (1, 2, 0)[k % 3]) for i in range(3)]
         lines += [f"[joints.j{k}]", "type = 'revolute'", f"bodies = ['{one}', '{two}']"]
         lines += [f"at = {list(map(float, corner))}", f"axis = {axis}"]
-    file = Path(folder, "ring.toml")
-    file.write_text("\n".join(lines), encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text("\n".join(lines))
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
-def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishes(method, tmp_path):
+def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishes(method):
     """The part of one joint's equation passes zero at 1.247 s; without another choice its gap would grow by 1e-9."""
-    scene = ring(tmp_path)
+    scene = ring()
     for step in (0.01, 0.002):
         sol = ephs.simulate(scene, 1.3, method=method, step=step)
         rounding = np.sqrt(1.3 / step) * EPS
@@ -87,9 +84,9 @@ def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishe
 
 
 @pytest.mark.parametrize("name", ["ring", "bricard", "four-bar", "n-four-bar", "slider-crank"])
-def test_rank_depends_on_no_step(name, tmp_path):
+def test_rank_depends_on_no_step(name):
     """Within a step that is not solved, loops are open by its third power: equations that depend seem not to."""
-    scene = ring(tmp_path) if name == "ring" else shipped(name)
+    scene = ring() if name == "ring" else shipped(name)
     sol = ephs.simulate(scene, 0.5, method="natural4", step=0.01, save_at=np.linspace(0.0, 0.5, 6))
     problem = sol.problem
     model = model_of(problem)
@@ -157,14 +154,11 @@ METHODS = ("natural", "natural4", "rk54", "rk87", "radau", "auto", "variational"
 
 def oscillator(row=None):
     """A spring and a mass, and a constraint whose ports are all on the momentum's junction."""
-    boxes = {"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}}
-    parts = {"pe": library.spring(k=1.5), "ke": library.point_mass(m=1.0), "pkc": library.pkc()}
-    if row is not None:
-        boxes["row"] = {str(port): "p" if each.power else "~q" for port, each in row.interface.items()}
-        parts["row"] = row
-    return ephs.Pattern(junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum)}, boxes=boxes)(
-        **parts
-    )
+    if row is None:
+        return free_oscillator(k=1.5)
+    wires = ", ".join(f"{port}=p" if each.power else f"{port}=~q" for port, each in row.interface.items())
+    pattern = ephs.Pattern.from_text(f"q: displacement; p: momentum; pe(q); ke(p); pkc(q, p); row({wires})")
+    return pattern(pe=library.spring(k=1.5), ke=library.point_mass(m=1.0), pkc=library.pkc(), row=row)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -4,28 +4,19 @@ import numpy as np
 import pytest
 
 from benchmarks.cells import grid, ladder
-from ephs import Reference
-from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.descriptor.numbering import spans
-from ephs.solve.equations.model import compile_model, evaluate_at
+from ephs.solve.equations.model import evaluate_at
 from ephs.solve.march.control import Proportional
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.records import IRREVERSIBLE
 from examples import physics
 from tests.numerics import EPS, largest
+from tests.solve.test_energies import compiled
 
 ROUNDING = EPS
 SYSTEMS = {"ladder": ladder(4), "grid": grid(9), "motor": physics.motor, "cylinder": physics.cylinder}
 OTHERS = {"springs in series": physics.springs, "a rod": physics.masses, "a lever": physics.lever}
-
-
-def compiled(system):
-    """The model, an effort given at its first outer port and flows at the others, and the values there."""
-    ports = [(path, port.quantity.space.dim) for path, port in system.interface.items() if port.power]
-    given = {path: Input(np.full(dim, 0.3), i == 0) for i, (path, dim) in enumerate(ports)}
-    model = compile_model(descriptor_of(system.flatten()), Reference(), given)
-    return model, model.input_values()
 
 
 def state(model, seed):

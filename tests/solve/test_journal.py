@@ -22,6 +22,7 @@ from ephs.solve.running.journal import read_journal
 from examples.failures import runs
 from tests.mechanics.ball import BALL
 from tests.scenes import ROOT, shipped
+from tests.written import scene_of_text
 
 SCENE = shipped("slider-crank")
 TIMES = np.linspace(0.0, 0.2, 23)
@@ -111,9 +112,7 @@ def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp
 
 
 def test_a_run_that_goes_from_method_to_method_goes_on_too(copies, tmp_path):
-    file = tmp_path / "ball.toml"
-    file.write_text(BALL.format(slip=1e-4), encoding="utf-8")
-    model, options = ephs.load(file), {"until": 0.8, "rtol": 1e-4}
+    model, options = scene_of_text(BALL.format(slip=1e-4)), {"until": 0.8, "rtol": 1e-4}
     whole = simulate(model, options)
     assert {"semi", "radau"} <= {switch["to"] for switch in whole.stats["switches"]}
     assert same(simulate(model, options, journal=tmp_path / "run.journal"), whole)

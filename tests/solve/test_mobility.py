@@ -10,6 +10,7 @@ from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
 from tests.scenes import ROOT, shipped
 from tests.solve.dense import dense_mobility
+from tests.written import scene_of_text
 
 FILES = sorted([*ROOT.glob("scenes/*.toml"), *ROOT.glob("benchmarks/scenes/*.toml")])
 
@@ -33,7 +34,7 @@ def test_counts_of_drawn_mechanisms_are_those_of_the_dense_matrix(scene):
     assert found == expected
 
 
-def test_surfaces_that_may_touch_restrict_no_motion(tmp_path):
+def test_surfaces_that_may_touch_restrict_no_motion():
     bodies = "".join(
         f'[bodies.{name}]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.{name}]\ntype = "{kind}"\n'
         f'bodies = ["ground", "{name}"]\nframe1 = {{ position = [0.0, 0.0, {height}] }}\nframe2 = {{}}\n'
@@ -44,9 +45,7 @@ def test_surfaces_that_may_touch_restrict_no_motion(tmp_path):
         )
     )
     floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n'
-    file = tmp_path / "boxes.toml"
-    file.write_text(f'format = 1\nname = "boxes"\n{bodies}{floor}', encoding="utf-8")
-    found, expected = both(ephs.load(file))
+    found, expected = both(scene_of_text(f'format = 1\nname = "boxes"\n{bodies}{floor}'))
     assert found == expected and (found.mobility, found.redundant) == (7, 0)
 
 

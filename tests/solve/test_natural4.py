@@ -11,6 +11,7 @@ from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
 from tests.numerics import EPS, largest
 from tests.scenes import ROOT, model_of
+from tests.written import scene_of_text
 
 TOP = """format = 1
 name = "top"
@@ -33,10 +34,8 @@ adjust = true
 
 
 @pytest.fixture(scope="module")
-def top(tmp_path_factory):
-    file = tmp_path_factory.mktemp("top") / "top.toml"
-    file.write_text(TOP, encoding="utf-8")
-    problem = problem_of_scene(ephs.load(file))
+def top():
+    problem = problem_of_scene(scene_of_text(TOP))
     return problem, model_of(problem)
 
 

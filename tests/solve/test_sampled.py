@@ -11,6 +11,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.solve.posing.errors import OptionError
 from ephs.solve.running import journal
 from tests.numerics import EPS, largest
+from tests.written import scene_of_text
 
 MASS, STIFFNESS, START = 2.0, 8.0, 0.3
 
@@ -37,10 +38,8 @@ PLAIN = ("natural", "natural4", "variational")
 
 
 @pytest.fixture
-def cart(tmp_path):
-    file = tmp_path / "cart.toml"
-    file.write_text(CART)
-    return ephs.load(file)
+def cart():
+    return scene_of_text(CART)
 
 
 def control(t, state):

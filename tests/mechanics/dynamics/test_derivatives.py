@@ -1,6 +1,7 @@
 """Derivatives are exact: to what differences are good for, closed forms to rounding, and as one function's inverse."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -12,21 +13,14 @@ from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
-from tests.numerics import EPS, largest
+from tests.numerics import EPS, jacobian, largest
 from tests.scenes import equations_of
 
 GOOD = 1e-8
 """What extrapolated differences are good for, relative to the largest entry."""
 
 
-def difference(function, size, step=1e-3):
-    """(…, size) by central differences, extrapolated twice."""
-    columns = []
-    for unit in np.eye(size):
-        d = [(function(h * unit) - function(-h * unit)) / (2.0 * h) for h in (step, step / 2.0, step / 4.0)]
-        once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
-        columns.append((16.0 * once[1] - once[0]) / 15.0)
-    return np.array(columns).T
+difference = partial(jacobian, h=1e-3, times=2)
 
 
 def close(found, expected, tolerance=GOOD):

@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.methods.registry import METHODS
 from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
-from tests.numerics import EPS, largest
+from tests.methods import FIXED_OF_SCENES
+from tests.numerics import EPS, largest, slope
 from tests.scenes import SCENES, shipped
+from tests.written import scene_of_text
 
 
 def whole(model, by_joint):
@@ -84,9 +85,7 @@ def test_gravity_is_the_slope_of_its_potential(drawn):
         poses = model.bodies(model.moved(state, h * along))
         return -sum(scene.body(name).mass * scene.world.gravity @ b.position for name, b in poses.items())
 
-    h = 1e-3
-    d = [(potential(k) - potential(-k)) / (2.0 * k) for k in (h, 0.5 * h)]
-    assert model.gravity(state) @ along == pytest.approx((4.0 * d[1] - d[0]) / 3.0, rel=1e-8, abs=1e-8)
+    assert model.gravity(state) @ along == pytest.approx(slope(potential, 1e-3, 1), rel=1e-8, abs=1e-8)
     assert np.allclose(model.bias(state) - model.bias(state, gravity=False), model.gravity(state), atol=1e-12, rtol=0)
 
 
@@ -105,7 +104,7 @@ def test_accelerations_are_how_rates_change(drawn):
 
 
 @settings(max_examples=25)
-@given(drawn=moving(), method=st.sampled_from([m.name for m in METHODS.values() if m.fixed and m.scenes]))
+@given(drawn=moving(), method=st.sampled_from(FIXED_OF_SCENES))
 def test_a_step_is_the_first_of_a_simulation_and_changes_no_state(drawn, method):
     scene, model, state, _ = drawn
     before = state.array.copy()
@@ -150,14 +149,12 @@ ROTORS = {
 
 @pytest.mark.parametrize("rotor", ROTORS)
 @pytest.mark.parametrize("way", ["adjusted", "natural", "natural4"])
-def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way, tmp_path):
+def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way):
     """What asks for states and not for rates finds them from momenta: of J + g² J of the rotor, too."""
     text = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n"
     pin = "[joints.pin]\ntype = 'revolute'\nbodies = ['ground', 'arm']\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n"
-    file = tmp_path / "arm.toml"
     lines, seen, resisting = ROTORS[rotor]
-    file.write_text(text + pin + lines)
-    dynamics, rate, step = ephs.dynamics(ephs.load(file)), 2.0, 1e-3
+    dynamics, rate, step = ephs.dynamics(scene_of_text(text + pin + lines)), 2.0, 1e-3
     state = dynamics.state({}, {"pin": rate}, adjust=way == "adjusted")
     lost = 0.0
     if way != "adjusted":
@@ -186,7 +183,7 @@ def test_bad_arguments_are_named(call, message):
         call(model)
 
 
-def test_what_no_mass_determines_is_named(tmp_path):
+def test_what_no_mass_determines_is_named():
     text = """
     format = 1
     [bodies.frame]
@@ -198,8 +195,6 @@ def test_what_no_mass_determines_is_named(tmp_path):
     at = [0.0, 0.0, 0.0]
     axis = [1.0, 0.0, 0.0]
     """
-    file = tmp_path / "light.toml"
-    file.write_text(text)
-    model = ephs.dynamics(ephs.load(file))
+    model = ephs.dynamics(scene_of_text(text))
     with pytest.raises(ephs.SimulationError, match="joint pin, which moves no mass"):
         model.acceleration(model.state0)

@@ -1,23 +1,19 @@
 """Derivatives of accelerations where the equations of a loop repeat each other: exact along what keeps it closed."""
 
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
 
 import ephs
-from tests.numerics import largest
+from tests.numerics import largest, slope
+from tests.scenes import shipped
 
-BRICARD = Path(__file__).parents[3] / "scenes/bricard.toml"
 GOOD = 1e-8
 """What extrapolated differences are good for, relative to the largest entry."""
 
 
-def difference(function, step=1e-2):
-    """The derivative at 0 by central differences, extrapolated twice."""
-    d = [(function(h) - function(-h)) / (2.0 * h) for h in (step, step / 2.0, step / 4.0)]
-    once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
-    return (16.0 * once[1] - once[0]) / 15.0
+difference = partial(slope, h=1e-2, times=2)
 
 
 def closed_direction(model, state):
@@ -37,7 +33,7 @@ def with_rates(model, state, change):
 @pytest.mark.parametrize(("turned", "rate"), [(0.1, 1.5), (-0.7, 1.0)])
 def test_derivatives_along_a_loop_with_a_repeated_equation_are_those_of_differences(turned, rate):
     """Of Bricard's linkage, moved along its loop: rates follow, and without their part derivatives are others."""
-    model = ephs.dynamics(ephs.load(BRICARD))
+    model = ephs.dynamics(shipped("bricard"))
     n = model.layout.n
     state = model.closed(model.state0)
     state = model.closed(model.moved(state, turned * closed_direction(model, state)))

@@ -12,10 +12,8 @@ from ephs.mechanics.scene.build import scene_inputs
 from ephs.semantics.spaces import SE3
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.methods.test_by_hand import four_bar
-from tests.numerics import largest
+from tests.numerics import EPS, largest
 from tests.scenes import shipped
-
-EPS = 2.2e-16
 
 
 def given_at_ports(scene):

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path as File
 
 import mujoco
@@ -22,18 +21,13 @@ from ephs.solve.methods.continuous import Continuous
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
-from tests.numerics import largest
+from tests.numerics import jacobian, largest, slope
 from tests.scenes import shipped
 
 
 def extrapolated(function, h=1e-2):
     """The derivative at 0, by central differences extrapolated three times."""
-    table = [(function(d) - function(-d)) / (2.0 * d) for d in (h, h / 2, h / 4, h / 8)]
-    power = 4.0
-    while len(table) > 1:
-        table = [(power * b - a) / (power - 1.0) for a, b in pairwise(table)]
-        power *= 4.0
-    return table[0]
+    return slope(function, h, 3)
 
 
 @pytest.fixture(autouse=True)
@@ -157,8 +151,7 @@ def test_a_moving_tree_linearises_as_its_flow_does(drawn):
             columns.append((8.0 * (d[1] - d[-1]) - (d[2] - d[-2])) / 12e-3)
         return np.array(columns).T
 
-    rough = [(flow(h) - flow(-h)) / (2.0 * h) for h in (4e-3, 2e-3)]
-    expected = (4.0 * rough[1] - rough[0]) / 3.0
+    expected = slope(flow, 4e-3, 1)
     assert largest(found.A - expected) < 1e-6 * max(1.0, largest(expected))
 
 
@@ -297,9 +290,7 @@ def test_derivatives_by_states_are_those_of_the_equations_where_mechanisms_turn(
     x, inputs = d.pack(problem.initial), equations.model.input_values()
     z = equations.guess(x) + 0.1 * np.random.default_rng(0).standard_normal(equations.unknowns)
     found = equations.matrices(x, z, inputs).states.toarray()[:, : d.rate_size]
-    steps = 1e-6 * np.eye(d.rate_size)
-    ends = [[equations.residual(d.advance(x, by), z, inputs) for by in (step, -step)] for step in steps]
-    near = np.array([(after - before) / 2e-6 for after, before in ends]).T
+    near = jacobian(lambda by: equations.residual(d.advance(x, by), z, inputs), d.rate_size, 1e-6)
     assert largest(found - near) <= 1e-8 * largest(found)
 
 

@@ -15,11 +15,10 @@ from ephs.semantics.primitives.primitives import power_ports
 from ephs.semantics.primitives.structures import constant_structure, quadratic
 from ephs.testing import systems
 from examples import physics
-from tests.numerics import largest
+from tests.numerics import jacobian, largest
+from tests.oscillator import oscillator
 
-MASS = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")(
-    pe=lib.spring(k=1.5), ke=lib.point_mass(m=2.0), pkc=lib.pkc()
-)
+MASS = oscillator(m=2.0)
 SHAKER = Pattern.from_text("q: displacement; p: momentum, exposed; s: entropy; pe(q); pkc(q, p); mf(p, s); env(s)")(
     pe=lib.spring(k=0.7), pkc=lib.pkc(), mf=lib.friction(d=0.3), env=lib.environment()
 )
@@ -82,10 +81,7 @@ def test_rates_differ_as_the_matrix_says_away_from_equilibrium():
     def rates(step):
         return pencil.unknowns(x + step)[: pencil.n_w]
 
-    columns = [
-        (8.0 * (rates(h) - rates(-h)) - (rates(2.0 * h) - rates(-2.0 * h))) / 12e-3 for h in 1e-3 * np.eye(x.size)
-    ]
-    assert largest(found.A - np.array(columns).T) < 1e-10
+    assert largest(found.A - jacobian(rates, x.size, 2e-3, 1)) < 1e-10
     assert found.structure is None and "depends on the state" in found.reason
 
 
@@ -165,9 +161,7 @@ def test_a_spring_settles_under_its_load():
 
 
 def test_what_only_falls_has_no_equilibrium():
-    falling = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")(
-        pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: -9.81 * q), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
-    )
+    falling = oscillator(pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: -9.81 * q))
     with pytest.raises(ephs.SimulationError, match="no state found in which nothing moves"):
         ephs.equilibrium(falling)
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods.registry import METHODS
+from tests.methods import FIXED_OF_SCENES
 from tests.numerics import largest
 from tests.scenes import equations_of
+from tests.written import scene_of_text
 
 BODY = """
 [bodies.{name}]
@@ -33,7 +34,7 @@ BETWEEN = {
 }
 
 
-def five_bar(folder, mass=1.0):
+def five_bar(mass=1.0):
     """Two cranks that are turned, and two rods between them, in a plane."""
     text = 'format = 1\nname = "five-bar"\n[assembly]\nadjust = true\n[world]\ngravity = [0.0, -9.81, 0.0]\n'
     for i, (name, (one, two)) in enumerate(BARS.items(), 1):
@@ -42,18 +43,12 @@ def five_bar(folder, mass=1.0):
     for name, (first, second, more) in BETWEEN.items():
         x, y = POINTS[name]
         text += JOINT.format(name=name, first=first, second=second, x=x, y=y, more=more)
-    file = folder / f"five-bar-{mass}.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file)
-
-
-def equations(scene):
-    return equations_of(scene)
+    return scene_of_text(text)
 
 
 @pytest.fixture(scope="module")
-def closed(tmp_path_factory):
-    eq = equations(five_bar(tmp_path_factory.mktemp("five")))
+def closed():
+    eq = equations_of(five_bar())
     return eq, eq.start(0.0)
 
 
@@ -70,10 +65,10 @@ def test_rows_are_what_gaps_change_by(closed):
         assert np.abs((there - back) / 2e-5 - rows @ unit)[2:].max() <= 1e-9
 
 
-def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
+def test_sizes_of_rows_are_measured_by_inertia(closed):
     """A row is measured in the mass metric: four times the mass, half the size."""
     found = []
-    for eq in (closed[0], equations(five_bar(tmp_path, 4.0))):
+    for eq in (closed[0], equations_of(five_bar(4.0))):
         state = eq.start(0.0)
         eq.gaps(state.q, state.r)
         arrays = eq.dense.residual.arrays
@@ -115,9 +110,9 @@ def test_gaps_are_counted_from_the_last_prescribed_joint_on(closed):
     assert np.array_equal(out, [0.0, 0.0, *own]) and worst == largest(own) > 1e-5
 
 
-@pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.scenes and m.fixed])
-def test_every_method_turns_what_is_prescribed_and_counts_its_work(method, tmp_path):
-    scene, missed = five_bar(tmp_path), []
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
+def test_every_method_turns_what_is_prescribed_and_counts_its_work(method):
+    scene, missed = five_bar(), []
     best = ephs.simulate(scene, 0.2, method="rk87", rtol=1e-11, atol=1e-13, save_at=[0.2])
     size = abs(best.work[-1])
     for h in (0.02, 0.01):

@@ -22,21 +22,12 @@ from ephs.mechanics.scene.model import frozen
 from ephs.semantics import Reference
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
+from tests.mechanics.mechanisms import on_ground
 from tests.numerics import generators, largest
 
 NONE = (0.0, 0.0, 0.0)
 TURNED = SE3.exp(np.array([0.3, 0.4, 0.1, 0.0, 0.0, 0.0]))
 BALL, BRICK, SKEW = [0.4, 0.4, 0.4], [0.3, 0.4, 0.5], [0.3, 0.4, 0.5, 0.0, 0.1, 0.05]
-
-
-def on_ground(body, link):
-    """A body that a joint ties to the ground; the body's is the joint's second frame."""
-    momentum = quantity.body_momentum
-    pattern = Pattern(
-        junctions={"g": junction(momentum), "p": junction(momentum)},
-        boxes={"ground": {"p": "g"}, "body": {"p": "p"}, "joint": {"p1": "g", "p2": "p"}},
-    )
-    return pattern(ground=ground(), body=body, joint=link)
 
 
 def refusals(system, rule):

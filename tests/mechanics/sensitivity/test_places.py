@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-import ephs
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent, _whole
 from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, ParameterFamily
 from tests.numerics import EPS, largest
 from tests.scenes import shipped
+from tests.written import scene_of_text
 
 HUNG = """
 format = 1
@@ -60,11 +60,9 @@ def test_two_neighbours_tell_what_six_do(name, monkeypatch):
             assert largest(near - six) <= rounding
 
 
-def test_what_is_of_no_low_degree_takes_six(tmp_path):
+def test_what_is_of_no_low_degree_takes_six():
     """A spring's length is a root of places; coordinates of loops follow from each other; a ball's are a turn."""
-    file = tmp_path / "hung.toml"
-    file.write_text(HUNG)
-    hung, closed, top = (ephs.load(f) for f in (file, "scenes/four-bar.toml", "scenes/heavy-top.toml"))
+    hung, closed, top = scene_of_text(HUNG), shipped("four-bar"), shipped("heavy-top")
     assert tangent(hung, ["springs.hold.at2[0]"])._stencil(0) is CENTRAL
     assert tangent(closed, ["bodies.coupler.position[0]"])._stencil(0) is CENTRAL
     assert tangent(top, ["joints.tip.coordinate[0]"])._stencil(0) is CENTRAL

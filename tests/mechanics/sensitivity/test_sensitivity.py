@@ -6,20 +6,13 @@ import pytest
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
-from tests.numerics import largest
+from tests.numerics import largest, slope
 from tests.oscillator import damped_oscillator
 from tests.scenes import shipped
 from tests.written import scene_of_text
 
 GOOD = 1e-8
 """What extrapolated differences of runs are good for, relative to the largest; 1e-7 is asked for."""
-
-
-def extrapolated(function, h):
-    """The derivative at 0, by central differences extrapolated twice."""
-    d = [(function(s) - function(-s)) / (2.0 * s) for s in (h, h / 2.0, h / 4.0)]
-    once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
-    return (16.0 * once[1] - once[0]) / 15.0
 
 
 def reading(solution, name):
@@ -38,7 +31,7 @@ def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options)
             motion = ephs.simulate(varied(scene, {path: value + by}, strict=False), until, **run)
             return np.concatenate([reading(motion, name).ravel() for name in names])
 
-        expected = extrapolated(at, 1e-2 * (abs(value) if abs(value) > 1e-9 else 1.0))
+        expected = slope(at, 1e-2 * (abs(value) if abs(value) > 1e-9 else 1.0), 2)
         mine = np.concatenate([got[name][..., number].ravel() for name in names])
         start = 0
         for name in names:

@@ -2,13 +2,12 @@
 
 import pytest
 
-import ephs
-from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names, read
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
-from ephs.mechanics.sensitivity.family import ParameterFamily
+from tests.mechanics.sensitivity.test_places import tangent
 from tests.numerics import largest
 from tests.scenes import shipped
+from tests.written import scene_of_text
 
 TREES = ("chain", "heavy-top", "hot-brake", "body")
 FUSED = """
@@ -36,21 +35,15 @@ at = [0.5, 0.0, 0.0]
 """
 
 
-def tangent(scene, paths):
-    return ExplicitTangent(ParameterFamily(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
-
-
 def weights(scene):
     found = [path for path in names(scene) if path.startswith("bodies.") and ("mass" in path or "inertia" in path)]
     return [path for path in found if read(scene, path) > 0.0 and path[-3:] not in ("[3]", "[4]", "[5]")]
 
 
 @pytest.mark.parametrize("name", [*TREES, "fused"])
-def test_they_are_exact_and_all_that_matters(name, tmp_path, monkeypatch):
+def test_they_are_exact_and_all_that_matters(name, monkeypatch):
     """Tables, and two steps with their derivatives, are those that neighbours of the model give."""
-    file = tmp_path / "fused.toml"
-    file.write_text(FUSED)
-    scene = ephs.load(file if name == "fused" else f"scenes/{name}.toml")
+    scene = scene_of_text(FUSED) if name == "fused" else shipped(name)
     paths = weights(scene)[-5:]
     stepper, other = tangent(scene, paths), tangent(scene, paths)
     assert paths

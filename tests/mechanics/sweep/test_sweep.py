@@ -11,8 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern
-from ephs import library as lib
 from ephs.cli import main
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
@@ -20,14 +18,13 @@ from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.testing import mechanisms
 from tests.numerics import largest
+from tests.oscillator import free_oscillator
 from tests.scenes import ROOT
 from tests.written import scene_of_text
 
 SCENES = ROOT / "scenes"
 CHAIN = ROOT / "benchmarks" / "scenes" / "revolute-chain-4.toml"
-OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(
-    pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
-)
+OSCILLATOR = free_oscillator()
 WELDED = """
 format = 1
 name = "welded"

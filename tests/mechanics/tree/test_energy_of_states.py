@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import initial_state, scene_system
@@ -17,6 +17,7 @@ from examples import physics
 from tests.numerics import EPS, generators, largest
 from tests.semantics.test_chemistry import R, Species, vessel
 from tests.semantics.test_chemistry import start as filled
+from tests.written import scene_of_text
 
 KEEP = {"variational": {"keep": "energy"}}
 EVERY = ["auto", *(name for name, method in METHODS.items() if method.scenes and not method.posed)]
@@ -115,15 +116,10 @@ axis = [0.0, 1.0, 0.0]
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau"])
-def test_a_circuit_beside_a_mechanism_at_rest_keeps_its_energy(method, tmp_path):
+def test_a_circuit_beside_a_mechanism_at_rest_keeps_its_energy(method):
     """Nothing of the body moves that could take what the circuit's steps miss."""
-    file = tmp_path / "hanging.toml"
-    file.write_text(HANGING, encoding="utf-8")
-    scene = ephs.load(file)
-    pattern = Pattern(
-        {"q": junction(quantity.charge), "b": junction(quantity.flux_linkage)},
-        {"cap": {"q": "q"}, "coil": {"b": "b"}, "emc": {"q": "q", "b": "b"}, "linkage": {}},
-    )
+    scene = scene_of_text(HANGING)
+    pattern = Pattern.from_text("q: charge; b: flux_linkage; cap(q); coil(b); emc(q, b); linkage()")
     boxes = {"cap": lib.capacitor(c=0.5), "coil": lib.inductor(l=2.0), "emc": lib.emc()}
     start = {f"linkage.{path}": x for path, x in initial_state(scene).items()} | {"cap.q": 1.0}
     system = pattern(**boxes, linkage=scene_system(scene))

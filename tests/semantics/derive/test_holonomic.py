@@ -15,6 +15,7 @@ from ephs.semantics.primitives.pullback import Map, pull_back, pulled_ports
 from ephs.semantics.spaces import PAIRS, SE3, pair
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from tests.numerics import EPS, generators, seeds
+from tests.semantics.zoo import PS, friction_matrix
 
 MOMENTUM = PortType(Q.body_momentum, True)
 
@@ -34,9 +35,7 @@ def joint(kind, ends=(), seed=0):
 
 def drag(_seed):
     """Friction that is seen through a map of two velocities to one."""
-    made = ephs.irreversible(
-        {"p": Q.momentum, "s": Q.entropy}, lambda p, s: abs(p) * np.array([[s, -p], [-p, p * p / s]])
-    )
+    made = ephs.irreversible(PS, lambda p, s: abs(p) * friction_matrix(p, s))
     return pull_back(made, {Path.of("p"): Map(np.array([[0.7]]), PortType(Q.momentum, True))})
 
 

@@ -22,6 +22,7 @@ from ephs.semantics.stage import PLAIN
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from tests.numerics import EPS, generators, largest, seeds
+from tests.semantics.zoo import PS, conduction_matrix, friction_matrix
 
 
 def _rising(x, a, b):
@@ -49,12 +50,10 @@ ENERGIES = {
     "direct": ({"q": Q.direct_pose}, lambda q: q[4] ** 2 * q[0] ** 2 + np.arctan2(q[6], 9.0 + q[5])),
 }
 RELATIONS = {
-    "drag": ephs.irreversible(
-        {"p": Q.momentum, "s": Q.entropy}, lambda p, s: abs(p) * np.array([[s, -p], [-p, p * p / s]])
-    ),
+    "drag": ephs.irreversible(PS, lambda p, s: abs(p) * friction_matrix(p, s)),
     "conduction": ephs.irreversible(
         {"a": Q.entropy, "b": Q.entropy, "~q": Q.displacement},
-        lambda a, b, q: 2.0 * (1.0 + np.tanh(q) ** 2) * np.array([[b / a, -1.0], [-1.0, a / b]]),
+        lambda a, b, q: 2.0 * (1.0 + np.tanh(q) ** 2) * conduction_matrix(a, b),
     ),
     "turning": ephs.gyrator(
         {"x": Q.displacement, "p": Q.momentum, "~q": Q.pose},

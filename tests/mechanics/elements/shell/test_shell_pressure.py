@@ -10,6 +10,7 @@ from ephs.mechanics.methods import jacobian
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
+from tests import numerics
 from tests.numerics import EPS, largest, seeds
 from tests.written import scene_of_text
 
@@ -149,8 +150,7 @@ def test_derivatives_are_exact_off_the_balance_and_a_potential_has_symmetric_one
     forces, accelerations = model.derivatives(at, accelerations={}).force_q, model.derivatives(at).acceleration_q
     exact = (forces, model.inverse_dynamics), (accelerations, model.acceleration)
     for found, function in (*exact, (model.stiffness(at), model.inverse_dynamics)):
-        ends = [[function(model.moved(at, sign * h * unit), zero) for sign in (1.0, -1.0)] for unit in np.eye(n)]
-        differenced = np.array([(one - two) / (2.0 * h) for one, two in ends]).T
+        differenced = numerics.jacobian(lambda v, function=function: function(model.moved(at, v), zero), n, h)
         assert largest(found - differenced) <= 1e-8 * largest(found)
     bare = ephs.dynamics(varied(scene, {f"shells.{next(iter(scene.shells))}.pressure": 0.0}))
     added = (ephs.dynamics(scene).stiffness(model.state0) - bare.stiffness(model.state0))[np.ix_(*2 * [moved(model)])]

@@ -34,9 +34,12 @@ axis = [0.0, 1.0, 0.0]
 """
 
 
+def lines_of(keys):
+    return "".join(f"{key} = {value}\n" for key, value in keys.items())
+
+
 def sheet(more="", **keys):
-    table = "".join(f"{key} = {value}\n" for key, value in {**SHEET, **keys}.items())
-    return scene_of_text(f"{WORLD}{more}[shells.skin]\n{table}")
+    return scene_of_text(f"{WORLD}{more}[shells.skin]\n{lines_of(SHEET | keys)}")
 
 
 def hub(kind="revolute", **keys):
@@ -90,8 +93,7 @@ def test_other_units_are_the_same_motion():
 
 
 def test_a_part_that_is_moved_has_its_sheet_moved(tmp_path):
-    table = "".join(f"{key} = {value}\n" for key, value in SHEET.items())
-    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{table}")
+    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{lines_of(SHEET)}")
     turn = [0.8, 0.0, 0.0, 0.6]
     (tmp_path / "whole.toml").write_text(
         f'{WORLD}[parts.left]\nuse = "wing.toml"\nposition = [1.0, 2.0, 0.5]\nrotation = {turn}\n'

@@ -14,14 +14,11 @@ from ephs.solve.posing.errors import SolveError
 from ephs.testing import mechanisms
 from tests.numerics import largest
 from tests.scenes import ROOT, equations_of
+from tests.written import scene_of_text
 
 SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} | {
     case.name: ROOT / "benchmarks" / "scenes" / f"{case.name}.toml" for case in CASES
 }
-
-
-def equations(scene):
-    return equations_of(scene)
 
 
 def moved(eq, seed=0, far=0.3):
@@ -61,7 +58,7 @@ def agree(eq, state):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_accelerate_as_the_dense_sweeps_say(name):
-    eq = equations(ephs.load(SCENES[name]))
+    eq = equations_of(ephs.load(SCENES[name]))
     for seed in range(3):
         agree(eq, moved(eq, seed))
 
@@ -69,7 +66,7 @@ def test_scenes_accelerate_as_the_dense_sweeps_say(name):
 @settings(max_examples=40)
 @given(scene=mechanisms(max_bodies=4))
 def test_so_do_generated_mechanisms(scene):
-    eq = equations(scene)
+    eq = equations_of(scene)
     agree(eq, moved(eq))
 
 
@@ -77,7 +74,7 @@ def test_so_do_generated_mechanisms(scene):
 @given(scene=mechanisms(max_bodies=3))
 def test_least_corrections_take_rates_onto_the_constraints(scene):
     """J (x + change) = 0 on all rows, and the change is M⁻¹Jᵀμ: the least in the mass metric."""
-    eq = equations(scene)
+    eq = equations_of(scene)
     state = moved(eq)
     if not eq.engine.closing.row.size:
         return
@@ -161,22 +158,20 @@ stiffness = {stiffness}
 """
 
 
-def sprung(tmp_path, second="revolute", stiffness="5.0"):
-    file = tmp_path / "sprung.toml"
-    file.write_text(TWO_SPRINGS.format(second=second, stiffness=stiffness))
-    return ephs.load(file)
+def sprung(second="revolute", stiffness="5.0"):
+    return scene_of_text(TWO_SPRINGS.format(second=second, stiffness=stiffness))
 
 
-def test_each_spring_has_the_energy_of_its_own_joint(tmp_path):
-    eq = equations(sprung(tmp_path))
+def test_each_spring_has_the_energy_of_its_own_joint():
+    eq = equations_of(sprung())
     start = eq.start(0.0)
     for q in np.random.default_rng(0).standard_normal((4, 2)):
         found = eq.engine.energy(q, 0.0 * start.r, start.heats)[1]
         assert found == pytest.approx(0.5 * (3.0 * q[0] ** 2 + 5.0 * q[1] ** 2), rel=1e-14)
 
 
-def test_only_pins_and_slides_are_taken_for_planar(tmp_path):
+def test_only_pins_and_slides_are_taken_for_planar():
     """A planar pair moves in the plane as well, by elements that the planar sweeps do not have."""
-    plain = links_of(equations(sprung(tmp_path)).reduced)
-    wider = links_of(equations(sprung(tmp_path, "planar", "[5.0, 1.0, 2.0]")).reduced)
+    plain = links_of(equations_of(sprung()).reduced)
+    wider = links_of(equations_of(sprung("planar", "[5.0, 1.0, 2.0]")).reduced)
     assert plain.planar and not wider.planar
