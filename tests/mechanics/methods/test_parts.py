@@ -25,7 +25,7 @@ from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import problem_of, renamed
 from tests.numerics import generators, largest, seeds
 
-REDUCED = File(ephs.__file__).parent / "mechanics" / "reduced"
+TREE = File(ephs.__file__).parent / "mechanics" / "tree"
 FROM_MODEL = ("address", "dims", "parameters", "parameter_at")
 
 
@@ -49,9 +49,11 @@ def test_names_and_nesting_do_not_matter(scene, word, seed):
 
 
 def test_no_module_of_joint_coordinates_knows_scenes():
+    files = sorted(TREE.rglob("*.py"))
+    assert len(files) > 10
     found = {
         (file.name, name)
-        for file in REDUCED.glob("*.py")
+        for file in files
         for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.ImportFrom | ast.Import)
         for name in [getattr(node, "module", None) or "", *(alias.name for alias in node.names)]
