@@ -7,22 +7,19 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks.cases import CASES
-from ephs import Pattern
-from ephs import library as lib
 from ephs.mechanics.methods import registry
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.solve.running.stepping import Attempt
+from tests.methods import OF_SCENES
 from tests.numerics import largest
+from tests.oscillator import free_oscillator, oscillator
 from tests.scenes import shipped
 from tests.written import scene_of_text
 
 BY_NAME = {case.name: case for case in CASES}
-OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(
-    pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
-)
+OSCILLATOR = free_oscillator()
 OF_SYSTEMS = [m.name for m in METHODS.values() if m.systems]
-OF_SCENES = [m.name for m in METHODS.values() if m.scenes]
 ADAPTIVE = [m.name for m in METHODS.values() if m.adaptive and m.scenes]
 BALANCED = ("natural", "natural4")
 
@@ -152,6 +149,7 @@ def test_a_tolerance_for_one_joint_steers_by_it():
     assert tight.stats["steps"] > 2 * loose.stats["steps"]
 
 
+@pytest.mark.parametrize("model", [BY_NAME["heavy-top"].scene(), OSCILLATOR], ids=["scene", "system"])
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -162,6 +160,9 @@ def test_a_tolerance_for_one_joint_steers_by_it():
         ({"method": "euler"}, "one of auto, natural"),
         ({"step": float("nan")}, "step is nan"),
         ({"step": -0.1}, "step is -0.1"),
+        ({"step": 0.0}, "step is 0.0"),
+        ({"atol": float("nan")}, "atol is nan"),
+        ({"max_step": -1.0}, "max_step is -1.0"),
         ({"min_step": -1.0}, "min_step"),
         ({"min_step": 1.0, "max_step": 0.1}, "min_step is 1.0"),
         ({"events": [3]}, "events is 3"),
@@ -169,12 +170,12 @@ def test_a_tolerance_for_one_joint_steers_by_it():
         ({"options": {"rho": 0.5}, "method": "rk54"}, "options of rk54: keep"),
         ({"method": "variational"}, "takes constant steps"),
         ({"until": float("inf")}, "until is inf"),
+        ({"until": 0.0}, "until is 0.0"),
     ],
 )
-def test_bad_options_are_refused_by_name(options, words):
-    scene = BY_NAME["heavy-top"].scene()
+def test_bad_options_are_refused_by_name(options, words, model):
     with pytest.raises(ephs.OptionError, match=words):
-        ephs.simulate(scene, **{"until": 1.0, **options})
+        ephs.simulate(model, **{"until": 1.0, **options})
 
 
 @pytest.mark.parametrize("former", registry.REPLACED)
@@ -259,8 +260,7 @@ def test_natural4_is_of_order_four_with_friction_heat_and_loops():
 
 def test_feedback_keeps_the_order_of_natural4():
     """A force that reads the state is taken at the stages themselves."""
-    pattern = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
-    system = pattern(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+    system = oscillator(k=1.0)
     inputs = {"p": {"flow": lambda t, state: -0.5 * state["pe.q"]}}
     exact = np.cos(2.0 * 1.5**0.5)
     errors = [

@@ -17,6 +17,7 @@ from ephs.solve.result.labels import freedoms, labels_of
 from ephs.testing import mechanisms, systems
 from tests.numerics import largest
 from tests.scenes import shipped
+from tests.written import scene_of_text
 
 TOTALS = {"kinetic", "potential", "thermal", "environment", "exergy", "entropy", "heat", "work", "supplied", "made"}
 TOTALS |= {"least", "storages", "makers", "entropies", "volumes", "momenta", "exergies"}
@@ -35,6 +36,7 @@ def same(found: ephs.Solution, expected: ephs.Solution) -> None:
     for a, b in zip(found.events, expected.events, strict=True):
         assert all(np.array_equal(a.state[path], b.state[path]) for path in b.state)
     assert found.summary() == expected.summary()
+    json.dumps(found.summary(), allow_nan=False)
 
 
 def through_a_file(sol: ephs.Solution, folder, **options) -> ephs.Solution:
@@ -56,9 +58,10 @@ def test_mechanisms_come_back_bit_by_bit(tmp_path_factory, scene, pushed, wrench
 def test_circuits_come_back_bit_by_bit(tmp_path, damped):
     falls = ephs.Event(lambda t, state: float(state["osc.pe.q"][0]), "through zero", -1)
     sol = ephs.simulate(damped, 9.0, initial={"osc.pe.q": 1.0}, rtol=1e-4, events=[falls])
-    again = through_a_file(sol, tmp_path)
+    again = through_a_file(sol, tmp_path / "deep")
     same(again, sol)
     assert len(again.events) == 2
+    assert [file.name for file in (tmp_path / "deep").iterdir()] == ["sol.nc"]
     same(through_a_file(again, tmp_path), sol)  # without its system it is saved again as it was
 
 
@@ -191,17 +194,12 @@ stiffness = 1e4
 """
 
 
-def falling(folder, text=FALLING):
-    (folder / "falling.toml").write_text(text)
-    return ephs.load(folder / "falling.toml")
-
-
 @pytest.mark.parametrize(
     "options", [{"step": 1e-3}, {"method": "rk54"}, {"method": "semi", "rtol": 1e-3}, {"method": "radau"}]
 )
 def test_contacts_come_back_bit_by_bit_though_a_file_lacks_what_follows(tmp_path, options):
     """Poses of points follow from those of bodies; ledgers of what is out of reach are zero."""
-    sol = ephs.simulate(falling(tmp_path), 0.2, audit="off", **options)
+    sol = ephs.simulate(scene_of_text(FALLING), 0.2, audit="off", **options)
     assert sol.contact("floor_box").gap.min() < 0.0 < sol.contact("floor_ball").gap.min()
     same(through_a_file(sol, tmp_path), sol)
     with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
@@ -215,7 +213,7 @@ def test_contacts_come_back_bit_by_bit_though_a_file_lacks_what_follows(tmp_path
 
 def test_a_pose_that_does_not_follow_is_written(tmp_path):
     """It may differ from the bodies' poses by more than a difference can tell, as after a turn."""
-    sol = ephs.simulate(falling(tmp_path), 0.01, step=1e-3)
+    sol = ephs.simulate(scene_of_text(FALLING), 0.01, step=1e-3)
     path = ephs.operad.Path.of("contacts.floor_box.point1.pe.q_r")
     sol.states[path][:] = np.random.default_rng(1).standard_normal(sol[path].shape) * 1e-30
     same(through_a_file(sol, tmp_path), sol)
@@ -225,7 +223,7 @@ def test_a_file_is_never_so_dense_that_readers_refuse_it(tmp_path, monkeypatch):
     """Most of the file is zero: many points of a body at rest."""
     corners = np.random.default_rng(2).standard_normal((60, 3))
     corners /= np.linalg.norm(corners, axis=1)[:, None]
-    sol = ephs.simulate(falling(tmp_path, RESTING.format(corners=corners.tolist())), 0.5, step=1e-3, audit="off")
+    sol = ephs.simulate(scene_of_text(RESTING.format(corners=corners.tolist())), 0.5, step=1e-3, audit="off")
     sizes = []
     for most in (guard.MOST, 2):
         for module in (guard, file):
@@ -237,7 +235,7 @@ def test_a_file_is_never_so_dense_that_readers_refuse_it(tmp_path, monkeypatch):
 
 def test_files_of_format_3_are_read(tmp_path):
     """They had everything."""
-    sol = ephs.simulate(falling(tmp_path), 0.01, step=1e-3)
+    sol = ephs.simulate(scene_of_text(FALLING), 0.01, step=1e-3)
     data = sol.to_xarray()
     data.attrs["ephs_format"] = 3
     data.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
@@ -257,7 +255,7 @@ def test_files_of_format_3_are_read(tmp_path):
     ],
 )
 def test_files_that_lack_what_poses_follow_from_are_refused(tmp_path, change, words):
-    ephs.simulate(falling(tmp_path), 0.01, step=1e-3).save(tmp_path / "sol.nc")
+    ephs.simulate(scene_of_text(FALLING), 0.01, step=1e-3).save(tmp_path / "sol.nc")
     with xr.open_dataset(tmp_path / "sol.nc", engine="h5netcdf") as data:
         change(data.load()).to_netcdf(tmp_path / "less.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match=words):
