@@ -10,8 +10,8 @@ import ephs
 from ephs.cli import main
 from ephs.mechanics.sweep.outputs import known_outputs
 from ephs.show.plots.chosen import plot_signals
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 CRANK = str(ROOT / "scenes/slider-crank.toml")
 
 

@@ -1,14 +1,13 @@
 """`ephs linearize` on real models, from the file to the matrices."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 import ephs
 from ephs.cli import main
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 LOOP = str(ROOT / "scenes/four-bar.toml")
 
 

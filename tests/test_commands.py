@@ -14,8 +14,8 @@ import pytest
 import ephs
 from ephs.cli import main
 from ephs.solve.running.journal import _FRAME, Journal
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 SPINNING = """format = 1
 [bodies.top]
 mass = 1.0

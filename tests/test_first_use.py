@@ -16,8 +16,7 @@ from ephs.cli import commands as cli
 from ephs.cli.new import TEMPLATES
 from ephs.cli.next import EXAMPLES, commands
 from ephs.cli.progress import said_of, seldom
-
-ROOT = Path(__file__).resolve().parents[1]
+from tests.scenes import ROOT, shipped
 
 
 @pytest.fixture
@@ -111,7 +110,7 @@ def test_slips_are_met_with_the_nearest_name(here, capsys, words, expected):
     [({"method": "rk45"}, "'rk54'"), ({"form": "fodled"}, "'folded'"), ({"options": {"kepe": "energy"}}, "'keep'")],
 )
 def test_slips_in_python_are_met_with_the_nearest_name(options, expected):
-    scene = ephs.load(ROOT / "scenes/mbs.toml")
+    scene = shipped("mbs")
     with pytest.raises(ephs.OptionError, match=f"did you mean {expected}"):
         ephs.simulate(scene, 1.0, step=0.1, **{"method": "radau", **options})
 
@@ -155,7 +154,7 @@ def test_a_run_says_what_to_look_at_next(here, capsys):
 
 @pytest.mark.parametrize("step", [None, 1e-3], ids=["chosen steps", "constant steps"])
 def test_progress_tells_steps_and_the_energy_error_so_far(step):
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     seen = []
     options = {"method": "natural", "step": step} if step else {"method": "rk87", "rtol": 1e-8}
     sol = ephs.simulate(scene, 60.0 if step is None else 4.0, progress=lambda *now: seen.append(now), **options)

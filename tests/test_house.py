@@ -2,14 +2,12 @@
 
 import re
 from itertools import pairwise
-from pathlib import Path
 
 import networkx as nx
 import pytest
 
 from tests.rooms import DOORS, PLACE, house
-
-ROOT = Path(__file__).resolve().parents[1]
+from tests.scenes import ROOT
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """What notebooks show of a value by itself."""
 
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import pytest
 
@@ -9,13 +8,12 @@ import ephs
 from ephs.show import draw
 from ephs.show.notebook import MANY
 from ephs.show.shared.palette import RED
-
-ROOT = Path(__file__).resolve().parents[1]
+from tests.scenes import shipped
 
 
 @pytest.fixture(scope="module")
 def scene():
-    return ephs.load(ROOT / "scenes/slider-crank.toml")
+    return shipped("slider-crank")
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +63,7 @@ def test_a_ledger_shows_the_cells_that_it_prints(solution):
 
 
 def test_an_empty_solution_shows_itself_too():
-    scene = ephs.load(ROOT / "scenes/mbs.toml")
+    scene = shipped("mbs")
     empty = ephs.simulate(scene, 0.1, step=0.1, save_at=[])
     assert "empty" in words_of(empty._repr_html_())
 
@@ -74,7 +72,7 @@ def test_solutions_dynamics_and_equilibria_show_their_mechanism(scene, solution)
     values = {
         "Solution of slider-crank": solution,
         "Dynamics of slider-crank": ephs.dynamics(scene),
-        "Equilibrium of four-bar": ephs.equilibrium(ephs.load(ROOT / "scenes/four-bar.toml")),
+        "Equilibrium of four-bar": ephs.equilibrium(shipped("four-bar")),
     }
     for title, value in values.items():
         said = value._repr_html_()
@@ -83,13 +81,13 @@ def test_solutions_dynamics_and_equilibria_show_their_mechanism(scene, solution)
 
 
 def test_a_mechanism_of_many_bodies_shows_no_schematic():
-    said = ephs.dynamics(ephs.load(ROOT / "scenes/chain.toml"))._repr_html_()
-    bodies = len(ephs.load(ROOT / "scenes/chain.toml").bodies)
+    said = ephs.dynamics(shipped("chain"))._repr_html_()
+    bodies = len(shipped("chain").bodies)
     assert ("<svg" in said) == (bodies <= MANY)
 
 
 def test_a_linear_system_shows_each_eigenvalue():
-    linear = ephs.linearize(ephs.load(ROOT / "scenes/four-bar.toml"))
+    linear = ephs.linearize(shipped("four-bar"))
     said = linear._repr_html_()
     assert said.count("<circle") == len(linear.eigenvalues) and said.count(RED) == int(
         (linear.eigenvalues.real > 0).sum()

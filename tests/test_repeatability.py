@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from threading import Event, Thread
 
 import pytest
@@ -16,8 +15,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.solve.running import loop
 from ephs.solve.running.threads import in_one_thread
 from tests.repeat import contents, digest
-
-ROOT = Path(__file__).resolve().parents[1]
+from tests.scenes import ROOT, shipped
 
 
 def digests(threads: str, seed: str) -> subprocess.Popen:
@@ -56,7 +54,7 @@ def test_how_fast_the_machine_is_changes_nothing(method, file, until, step, monk
 
 @pytest.mark.parametrize("method", ["rk54", "rk87"])
 def test_how_many_steps_a_compiled_call_takes_changes_nothing(method, monkeypatch):
-    scene = ephs.load(ROOT / "scenes/four-bar.toml")
+    scene = shipped("four-bar")
     found = set()
     for burst, response in ((1, 0.1), (3, 0.1), (2000, 1e9)):
         monkeypatch.setattr(loop, "BURST", burst)
@@ -131,7 +129,7 @@ def test_any_thread_takes_one_thread_of_linear_algebra_and_restores_it():
 @pytest.mark.parametrize(("method", "until"), [("rk87", 0.5), ("radau", 0.05)])
 def test_runs_in_several_threads_at_once_are_those_of_one(method, until):
     """Engines of one mechanism share tables; memory is each one's own, that of attached circuits, too."""
-    scene = ephs.load(ROOT / "scenes/motor-four-bar.toml")
+    scene = shipped("motor-four-bar")
 
     def run():
         return digest(contents(ephs.simulate(scene, until, method=method, rtol=1e-8)))

@@ -10,12 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ephs
 from benchmarks import families
 from ephs.mechanics.elements.shell.edges import SIZE
 from ephs.mechanics.road.loops import ARGUMENTS as LOOPS
 from ephs.mechanics.road.programs import ARGUMENTS as SWEEPS
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces.differentials import DIMENSIONS
 from ephs.semantics.stage import llvm
@@ -23,6 +21,7 @@ from ephs.semantics.stage.calling import Call
 from ephs.semantics.stage.objects import FITTING, emitted, fitting
 from ephs.semantics.stage.programs import _staged
 from ephs.shipped import programs
+from tests.scenes import equations_of, shipped
 from tests.semantics.linear.test_rows import Solved, problems
 from tests.semantics.stage.arm import Arm
 from tests.semantics.stage.test_elementary import EDGES
@@ -133,8 +132,8 @@ def linear(run: Heard, n: int, k: int, m: int, seed: int) -> None:
 
 @cache
 def mechanism(family: str, size: int) -> ReducedEquations:
-    scene = ephs.load("scenes/slider-crank.toml") if family == "slider-crank" else families.scene(family, size)
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    scene = shipped("slider-crank") if family == "slider-crank" else families.scene(family, size)
+    return equations_of(scene)
 
 
 def drawn(eq: ReducedEquations, seed: int) -> dict[str, Any]:

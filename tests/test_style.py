@@ -2,11 +2,11 @@
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.scenes import ROOT
+
 SOURCES = sorted((ROOT / "ephs").rglob("*.py"))
 TEXTS = sorted(
     file

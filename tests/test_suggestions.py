@@ -13,13 +13,13 @@ from ephs import quantity as Q
 from ephs.cli import main
 from ephs.mechanics import joint, rigid_body
 from ephs.operad.messages import legible
+from tests.scenes import ROOT, shipped
 
-ROOT = Path(__file__).parents[1]
 NONE = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def four_bar():
-    return ephs.load("scenes/four-bar.toml")
+    return shipped("four-bar")
 
 
 SLIPS = {
@@ -39,7 +39,7 @@ SLIPS = {
     "body": (lambda: (model := ephs.dynamics(four_bar())).jacobian(model.state(), "crnk"), "'crank'"),
     "sweep": (lambda: ephs.sweep(four_bar(), {"joints.main.drive": [1.0]}, 0.1, metod="rk54"), "'method'"),
     "port": (lambda: ephs.simulate(four_bar(), 0.01).port("drives.maim"), "'drives.main'"),
-    "scene": (lambda: ephs.load("scenes/slider-crnk.toml"), '"scenes/slider-crank.toml"'),
+    "scene": (lambda: shipped("slider-crnk"), '"scenes/slider-crank.toml"'),
     "folder": (lambda: ephs.load("slider-crank.toml"), '"scenes/slider-crank.toml"'),
     "ending": (lambda: ephs.load("scenes/slider-crank.tml"), '"scenes/slider-crank.toml"'),
     "no ending": (lambda: ephs.load("slider-crank"), '"scenes/slider-crank.toml"'),

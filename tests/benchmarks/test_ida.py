@@ -1,21 +1,18 @@
 """IDA beside the package's own methods: an independent integrator comes to the same motion, and keeps the balance."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import ephs
 from benchmarks.ida import IDA
 from ephs.mechanics.methods.registry import METHODS
-
-SCENES = Path(__file__).parents[2] / "scenes"
+from tests.scenes import shipped
 
 
 @pytest.mark.parametrize("name", ["bricard", "slider-crank", "hot-brake"])
 def test_it_comes_to_the_same_motion_and_keeps_the_balance(name):
     """Its steps are good to a hundredth of the tolerance; errors of a few hundred of them add up."""
-    scene = ephs.load(SCENES / f"{name}.toml")
+    scene = shipped(name)
     sol = ephs.simulate(scene, 0.4, method=IDA, rtol=1e-8, atol=1e-9, audit="off")
     exact = ephs.simulate(scene, 0.4, method="rk87", rtol=1e-12, atol=1e-12, audit="off")
     for body, _ in scene.all_bodies():
@@ -29,4 +26,4 @@ def test_it_comes_to_the_same_motion_and_keeps_the_balance(name):
 def test_it_is_no_method_of_the_package():
     assert IDA.name not in METHODS
     with pytest.warns(FutureWarning, match="'radau' is taken in its place"):
-        ephs.simulate(ephs.load(SCENES / "heavy-top.toml"), 0.1, method="ida")
+        ephs.simulate(shipped("heavy-top"), 0.1, method="ida")

@@ -1,7 +1,5 @@
 """Other programs on the scenes: they compute the same motions, or say what they cannot do."""
 
-from pathlib import Path
-
 import pytest
 
 import ephs
@@ -10,8 +8,7 @@ from benchmarks.peers.programs import PEERS
 from benchmarks.peers.scene import PeerError
 from ephs.show.charts import FAMILIES, tight_reference
 from ephs.show.charts.runs import RunEnding
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.scenes import ROOT, shipped
 
 
 @pytest.mark.parametrize("file", ["scenes/chain.toml", "benchmarks/scenes/spherical-chain-2.toml"])
@@ -55,7 +52,7 @@ def test_peers_carry_free_and_fixed_bodies():
 @pytest.mark.parametrize("peer", PEERS)
 @pytest.mark.parametrize("file", ["four-bar", "slider-crank", "mbs", "universal"])
 def test_peers_refuse_what_they_cannot_do(file, peer):
-    scene = ephs.load(ROOT / f"scenes/{file}.toml")
+    scene = shipped(file)
     with pytest.raises(PeerError, match="expected"):
         PEERS[peer].prepare(scene, 1.0)
     assert work_precision(scene, 1.0, [peer], reference=tight_reference(scene, 0.01))[0].outcome is RunEnding.REFUSED

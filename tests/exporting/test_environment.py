@@ -1,7 +1,5 @@
 """Environments: gymnasium's own checks, the motion of the package, many on threads like one alone."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
@@ -9,15 +7,14 @@ from gymnasium.utils.env_checker import check_env
 
 import ephs
 from ephs.exporting.environment import Environment, Environments, EnvironmentTask
+from tests.scenes import shipped
 from tests.written import scene_of_text
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
 def task() -> EnvironmentTask:
     return EnvironmentTask(
-        ephs.load(ROOT / "scenes/slider-crank.toml"),
+        shipped("slider-crank"),
         inputs=["joints.bearing"],
         outputs=["joints.bearing", "joints.cylinder"],
         reward=lambda seen, action: -float(action @ action) - (seen[1] - 20.0) ** 2,
@@ -33,7 +30,7 @@ def test_gymnasium_finds_nothing_wrong(task, recwarn):
 
 
 def test_an_episode_is_a_run_of_the_package():
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     made = EnvironmentTask(scene, inputs=["joints.bearing"], reward=lambda *_: 0.0, rtol=1e-9, horizon=10)
     env = Environment(made)
     env.reset(seed=1)
@@ -78,7 +75,7 @@ def test_parameters_are_drawn_anew_for_each_episode(task):
 
 
 def test_what_is_not_there_is_refused_by_name():
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     with pytest.raises(ephs.ExportError, match=r"joints\.no"):
         EnvironmentTask(scene, inputs=["joints.bearing"], outputs=["joints.no"], reward=lambda *_: 0.0)
 

@@ -3,7 +3,6 @@
 import ctypes
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +14,9 @@ from ephs.exporting.module import exported
 from ephs.mechanics.scene.parameters import names, read, varied
 from tests.exporting.runs import Run
 from tests.mechanics.drawn_scenes import drawn, toml
+from tests.scenes import ROOT, shipped
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).resolve().parents[2]
 MAIN = """
 #include <stdio.h>
 #include <stdlib.h>
@@ -118,7 +117,7 @@ def test_drawn_scenes_are_exported(seed):
 
 @pytest.mark.parametrize("scene", ["slider-crank", "heavy-top", "four-bar", "chain", "mbs", "motor-four-bar"])
 def test_the_steps_are_those_of_the_package(scene):
-    model = ephs.load(ROOT / f"scenes/{scene}.toml")
+    model = shipped(scene)
     run = Run(exported(image_of(model, until=0.3), "made"))
     assert run.call("advance", ctypes.c_int64, 0.3) == 0
     assert run.call("time", ctypes.c_double) == 0.3
@@ -131,7 +130,7 @@ def test_the_steps_are_those_of_the_package(scene):
 
 
 def test_the_energy_is_that_of_all_storages_but_the_environment():
-    model = ephs.load(ROOT / "scenes/motor-four-bar.toml")
+    model = shipped("motor-four-bar")
     run = Run(exported(image_of(model, until=0.3), "made"))
     assert run.call("advance", ctypes.c_int64, 0.3) == 0
     solution = ephs.simulate(model, 0.3, method="rk87", save_at=[0.0, 0.3], audit="off")
@@ -144,7 +143,7 @@ def test_the_energy_is_that_of_all_storages_but_the_environment():
 
 
 def test_forces_from_outside_are_inputs():
-    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    model = shipped("slider-crank")
     run = Run(exported(image_of(model, inputs=["joints.bearing"], until=0.2), "made"))
     force = np.array([0.5])
     run.call("inputs", None, force)
@@ -157,7 +156,7 @@ def test_forces_from_outside_are_inputs():
 
 
 def test_many_short_advances_stay_within_the_tolerance():
-    model = ephs.load(ROOT / "scenes/chain.toml")
+    model = shipped("chain")
     made = exported(image_of(model, rtol=1e-10, atol=1e-12), "made")
     short, long = Run(made), Run(made)
     for k in range(1, 51):
@@ -175,7 +174,7 @@ MASSES = {"bodies.rod.mass": 0.2, "bodies.slider.mass": 0.2, "joints.bearing.fri
 )
 def test_parameters_make_the_program_of_the_changed_model(values, near, step):
     """Chosen steps differ where numbers do by rounding, or by the gravity that limits them: within the tolerance."""
-    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    model = shipped("slider-crank")
     made = exported(image_of(model, parameters=list(values), until=0.3, step=step), "made")
     run, plain = Run(made), Run(made)
     run.call("parameters", None, np.array(list(values.values())))
@@ -190,7 +189,7 @@ def test_parameters_make_the_program_of_the_changed_model(values, near, step):
 
 
 def test_parameters_that_are_no_polynomial_are_refused():
-    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    model = shipped("slider-crank")
     with pytest.raises(ephs.ExportError, match=r"joints\.wrist\.at"):
         image_of(model, parameters=["bodies.rod.mass", "joints.wrist.at[0]"])
 
@@ -198,7 +197,7 @@ def test_parameters_that_are_no_polynomial_are_refused():
 @pytest.fixture(scope="module")
 def crank(tmp_path_factory):
     folder = tmp_path_factory.mktemp("crank")
-    model = ephs.load(ROOT / "scenes/slider-crank.toml")
+    model = shipped("slider-crank")
     made = ephs.export(model, folder / "crank.c", inputs=["joints.bearing"], until=0.3)
     run = Run(made)
     run.call("inputs", None, np.array([0.25]))

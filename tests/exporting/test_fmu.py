@@ -2,7 +2,6 @@
 
 import ctypes
 import platform
-from pathlib import Path
 from zipfile import ZipFile
 
 import fmpy
@@ -14,8 +13,8 @@ from fmpy.validation import validate_fmu
 import ephs
 from ephs.exporting.fmu import PLATFORMS, export_fmu
 from tests.exporting.runs import Run
+from tests.scenes import shipped
 
-ROOT = Path(__file__).resolve().parents[2]
 HERE = fmpy.platform_tuple
 GIVEN = {"inputs": ["joints.bearing"], "parameters": ["bodies.rod.mass"]}
 
@@ -23,7 +22,7 @@ GIVEN = {"inputs": ["joints.bearing"], "parameters": ["bodies.rod.mass"]}
 @pytest.fixture(scope="module")
 def unit(tmp_path_factory):
     file = tmp_path_factory.mktemp("unit") / "crank.fmu"
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     return file, export_fmu(scene, file, **GIVEN, until=0.5, platforms=[HERE])
 
 
@@ -95,7 +94,7 @@ def test_outputs_cannot_be_set(slave):
 @pytest.mark.parametrize("fault", [{"file": "a.zip"}, {"platforms": ["moon"]}, {"outputs": ["joints.no"]}])
 def test_what_cannot_be_a_unit_is_refused_by_name(tmp_path, fault):
     given = {"file": "a.fmu", **fault}
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     (value,) = fault.values()
     with pytest.raises(ephs.ExportError) as caught:
         export_fmu(scene, tmp_path / given.pop("file"), **given)

@@ -1,15 +1,14 @@
 """Pages that simulate, in a browser: a slider that moves gives the motion of a run here with that number."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 import ephs
 from ephs.mechanics.scene.parameters import varied
+from tests.scenes import ROOT, shipped
 from tests.show.browser import opened
 
-ROOT = Path(__file__).resolve().parents[2]
 SECONDS = 1.0
 READY = "document.body.dataset.ready === 'yes'"
 MOVE = """(() => {
@@ -47,7 +46,7 @@ def test_the_page_of_the_documentation_simulates_the_torque_of_its_slider(tmp_pa
 
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar", "biped"])
 def test_a_slider_gives_the_motion_of_a_run_here(tmp_path, name):
-    scene = ephs.load(ROOT / f"scenes/{name}.toml")
+    scene = shipped(name)
     body = list(dict(scene.all_bodies()))[1]
     path, mass = f"bodies.{body}.mass", 1.7 * dict(scene.all_bodies())[body].mass
     page = ephs.live_page(scene, parameters=[path], until=SECONDS).save(tmp_path / "live.html")
@@ -70,7 +69,7 @@ def test_a_slider_gives_the_motion_of_a_run_here(tmp_path, name):
 
 
 def test_legends_have_the_values_at_the_time_of_the_animation(tmp_path):
-    scene = ephs.load(ROOT / "scenes/four-bar.toml")
+    scene = shipped("four-bar")
     page = ephs.live_page(scene, until=SECONDS).save(tmp_path / "live.html")
     label = "each.querySelector('.u-label').textContent, each.querySelector('.u-value').textContent"
     legend = f"JSON.stringify([...document.querySelectorAll('#live-plots .u-series')].map(each => [{label}]))"

@@ -1,7 +1,6 @@
 """Readings of a motion as a function of a model's numbers: what PyTorch and JAX differentiate through."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +9,8 @@ import ephs
 from ephs.exporting.errors import ExportError
 from ephs.exporting.response import jax_function, response, torch_function
 from ephs.mechanics.scene.parameters import varied
+from tests.scenes import shipped
 
-ROOT = Path(__file__).resolve().parents[2]
 PATHS = ["bodies.coupler.mass", "joints.main.friction"]
 NAMES = ["joints.main.coordinate", "bodies.coupler.position", "heat"]
 TIMES = [0.05, 0.1]
@@ -19,7 +18,7 @@ TIMES = [0.05, 0.1]
 
 @pytest.fixture(scope="module")
 def four_bar():
-    scene = ephs.load(ROOT / "scenes/four-bar.toml")
+    scene = shipped("four-bar")
     return response(scene, PATHS, NAMES, 0.1, method="rk87", step=0.01, save_at=TIMES)
 
 

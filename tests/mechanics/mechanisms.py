@@ -6,12 +6,19 @@ from typing import Any
 import numpy as np
 
 from ephs.mechanics import joint, mbs_pattern, rigid_body
-from ephs.operad import Path
+from ephs.mechanics.elements.components import ground
+from ephs.operad import Path, Pattern
 from ephs.semantics import System
 from ephs.semantics.spaces import PAIRS, SE3, Pair, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix, rotation_log
 
+ON_GROUND = Pattern.from_text("g: body_momentum; p: body_momentum; ground(p=g); body(p); joint(p1=g, p2=p)")
 GRAVITY = np.array([0.3, -0.2, -9.81])
+
+
+def on_ground(body, link):
+    """A body that a joint ties to the ground; the body's is the joint's second frame."""
+    return ON_GROUND(ground=ground(), body=body, joint=link)
 
 
 def kinds():

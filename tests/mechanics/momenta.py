@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from ephs.mechanics.scene.model import Body, World, frozen
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
+from tests.numerics import seeds
 
 __all__ = ["floating", "momenta"]
 
@@ -28,7 +29,7 @@ def momenta(scene, sol):
 def floating(draw, gravity=(0.0, 0.0, 0.0), **options):
     """Scenes of `mechanisms` with a body that moves and turns in place of the ground."""
     scene = draw(mechanisms(**({"max_bodies": 3} | options)))
-    rng = np.random.default_rng(draw(st.integers(0, 2**20)))
+    rng = np.random.default_rng(draw(seeds))
     twist = rng.standard_normal(6)
     base = Body("base", 2.0, frozen(np.diag([0.7, 0.8, 1.1])), frozen(SE3.identity()), frozen(np.zeros(6)))
     bodies = {

@@ -1,7 +1,5 @@
 """Mechanisms wired by hand are assembled as scenes are: poses from joints, joints from poses, gaps refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,6 +12,9 @@ from ephs.mechanics.scene.build import initial_state, scene_inputs
 from ephs.semantics import AssemblyError
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
+from tests.numerics import EPS, largest
+from tests.scenes import SCENES, shipped
+from tests.written import scene_of_text
 
 METHODS = ("natural", "natural4")
 
@@ -32,7 +33,7 @@ def test_relative_poses_follow_from_poses(method):
     assert sol.constraint_error.max() < 1e-13
     found = mobility(sol.problem.descriptor, sol.problem.descriptor.pack(sol.problem.initial))
     assert (found.mobility, found.redundant) == (1, 3)
-    assert np.abs(sol["crank.pe.q"][-1] - POSES["crank"]).max() > 1e-2  # it moves
+    assert largest(sol["crank.pe.q"][-1] - POSES["crank"]) > 1e-2  # it moves
 
 
 def test_poses_follow_from_relative_poses():
@@ -54,7 +55,7 @@ def test_a_gap_is_refused_by_joint_and_size(method):
 
 
 def test_what_a_scene_was_made_into_is_left_as_it_is():
-    for file in sorted((Path(__file__).parents[2] / "scenes").glob("*.toml")):
+    for file in SCENES:
         scene = ephs.load(file)
         state = initial_state(scene)
         system = scene.system()
@@ -70,7 +71,7 @@ def test_checks_say_how_far_joints_are_closed():
 
 
 def test_the_system_of_a_scene_starts_as_the_scene_and_what_is_given_moves_the_rest():
-    scene = ephs.load(Path(__file__).parents[2] / "scenes" / "chain.toml")
+    scene = shipped("chain")
     system = scene.system()
     run = {"until": 0.1, "method": "rk54", "step": 0.01}
     one, two = ephs.simulate(system, **run), ephs.simulate(scene, **run)
@@ -86,29 +87,29 @@ def test_the_system_of_a_scene_starts_as_the_scene_and_what_is_given_moves_the_r
 
 @pytest.mark.parametrize("method", ["auto", "rk87", "natural"])
 def test_an_input_that_is_missing_is_named(method):
-    system = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml").system()
+    system = shipped("four-bar").system()
     with pytest.raises(AssemblyError, match=r"^drives\.main: .* give inputs=\{'drives\.main'"):
         ephs.simulate(system, 0.1, method=method)
 
 
 @pytest.mark.parametrize("name", ["four-bar", "chain", "universal"])
 def test_velocity_residuals_are_measured_as_of_scenes(name, monkeypatch):
-    scene = ephs.load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
+    scene = shipped(name)
     inputs = {str(path): {"flow": one.value} for path, one in scene_inputs(scene).items()}
     run = {"until": 0.02, "method": "rk54", "step": 2e-3, "audit": "off"}
     sol = ephs.simulate(scene.system(), inputs=inputs, **run)
-    fastest = max(np.abs(sol.body(f"bodies.{body}").angular_velocity).max() for body in scene.bodies)
-    assert sol.velocity_error.max() <= 8 * 6 * 10 * np.finfo(float).eps * max(1.0, fastest)
+    fastest = max(largest(sol.body(f"bodies.{body}").angular_velocity) for body in scene.bodies)
+    assert sol.velocity_error.max() <= 8 * 6 * 10 * EPS * max(1.0, fastest)
     rates = LinkMotion.rates
     monkeypatch.setattr(LinkMotion, "rates", property(lambda self: {k: 1.5 * r for k, r in rates.fget(self).items()}))
-    off = max(np.abs(rate / 3.0).max() for rate in sol.problem.linked(sol).rates.values())
+    off = max(largest(rate / 3.0) for rate in sol.problem.linked(sol).rates.values())
     assert sol.problem.linked(sol).velocity_error().max() == pytest.approx(off, rel=1e-9)
 
 
-def rod_on_a_pin(folder, size):
+def rod_on_a_pin(size):
     """A rod of one shape and density, which turns at 2 rad/s."""
     thick = size**5
-    (folder / "rod.toml").write_text(
+    return scene_of_text(
         f"""
         format = 1
         [world]
@@ -125,33 +126,32 @@ def rod_on_a_pin(folder, size):
         rate = 2.0
         """
     )
-    return ephs.load(folder / "rod.toml")
 
 
 @pytest.mark.parametrize(
     ("method", "size"), [*(("rk54", size) for size in (1e-6, 1.0, 1e3)), *(("natural", size) for size in (1e-6, 1.0))]
 )
-def test_momenta_off_the_joints_are_refused_at_any_size(size, method, tmp_path):
-    system = rod_on_a_pin(tmp_path, size).system()
+def test_momenta_off_the_joints_are_refused_at_any_size(size, method):
+    system = rod_on_a_pin(size).system()
     momentum = np.array(system.initial[ephs.Path.of("bodies.rod.ke.p")])
     run = {"method": method, "step": 1e-3, "initial": {"bodies.rod.ke.p": momentum}}
     assert ephs.simulate(system, 0.01, **run).joint("joints.pin").rate[-1, 0] == pytest.approx(2.0, rel=1e-12)
-    momentum[4] += 0.01 * np.abs(momentum[3:]).max()  # along the pin
+    momentum[4] += 0.01 * largest(momentum[3:])  # along the pin
     with pytest.raises(ephs.SimulationError, match=r"bodies\.rod\.ke\.p: an initial state that contradicts"):
         ephs.simulate(system, 0.01, **run)
 
 
 @pytest.mark.parametrize("method", ["rk54", "natural"])
 @pytest.mark.parametrize("size", [1e-6, 1e-2, 1.0, 1e3])
-def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method, tmp_path):
-    scene = rod_on_a_pin(tmp_path, size)
+def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method):
+    scene = rod_on_a_pin(size)
     states = scene.system().initial
     momentum, pose = (np.array(states[ephs.Path.of(f"bodies.rod.{name}")]) for name in ("ke.p", "pe.q"))
     run = {"method": method, "step": 1e-3}
     for given in ({"bodies.rod.ke.p": momentum}, {"bodies.rod.pe.q": pose}):
         rate = ephs.simulate(scene, 0.01, initial=given, **run).joint("pin").rate
         assert rate[-1, 0] == pytest.approx(2.0, rel=1e-9)
-    momentum[4] += 0.01 * np.abs(momentum[3:]).max()
+    momentum[4] += 0.01 * largest(momentum[3:])
     with pytest.raises(AssemblyError, match=r"^bodies\.rod\.ke\.p: the initial value contradicts the joints"):
         ephs.simulate(scene, 0.01, initial={"bodies.rod.ke.p": momentum}, **run)
     pose[5] += 1e-5 * size
@@ -162,10 +162,10 @@ def test_states_off_the_joints_of_a_scene_are_refused_at_any_size(size, method, 
 @pytest.mark.parametrize("method", ["rk54", "natural"])
 def test_ports_of_a_system_are_those_of_its_scene(method):
     """By natural, momenta between steps are off the joints by its error; ports are asked at momenta on them."""
-    scene = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
+    scene = shipped("four-bar")
     run = {"until": 0.1, "method": method, "step": 0.02, "audit": "off"}
     inputs = {str(path): {"flow": one.value} for path, one in scene_inputs(scene).items()}
     one, two = ephs.simulate(scene, **run), ephs.simulate(scene.system(), inputs=inputs, **run)
     for port in inputs:
-        assert np.abs(one.port(port).power).max() > 0.0
+        assert largest(one.port(port).power) > 0.0
         np.testing.assert_allclose(two.port(port).power, one.port(port).power, rtol=1e-12)

@@ -9,16 +9,14 @@ from functools import cache, partial
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.sensitivity.family import relation_of
 from ephs.mechanics.tree.engine.residuals import ACTIVE, point_program
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent, evaluated, step_program, step_tangents
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import PLAIN, Entry, Program, Table, vector
+from tests.numerics import generators, seeds
+from tests.scenes import equations_of, shipped
 
 pytestmark = pytest.mark.optimised
 
@@ -35,7 +33,7 @@ ALIASES = {
 
 @cache
 def equations(name):
-    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     return eq, eq.start(0.0)
 
 
@@ -104,9 +102,6 @@ def drawn(name, seed):
     return eq, q, rng.standard_normal(eq.n), rng
 
 
-seeds = st.integers(0, 2**32 - 1)
-
-
 @pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=2)
 @given(seed=seeds)
@@ -154,11 +149,10 @@ def test_rates_and_their_derivatives(name, seed):
 
 @pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=2)
-@given(seed=seeds)
-def test_components(name, seed):
+@given(rng=generators)
+def test_components(name, rng):
     """Each relation at drawn numbers about those that it has, and over dual numbers."""
     eq = equations(name)[0]
-    rng = np.random.default_rng(seed)
     t = eq.model.tables
     for i in evaluated(eq.engine.tables):
         slot = eq.problem.descriptor.components[i]

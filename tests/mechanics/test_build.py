@@ -1,7 +1,5 @@
 """Scenes as systems: their names, what parts expose, heat, ground, and drives."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -21,11 +19,11 @@ from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.operad import Path
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
+from tests.scenes import shipped
 from tests.written import scene_of_text
 
-ROOT = File(__file__).parents[2]
 # Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
-calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+calm = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 LEG = """format = 1
 [bodies.shank]
@@ -163,7 +161,7 @@ def test_mobility_of_trees_is_the_number_of_freedoms(scene):
 
 def test_heat_goes_where_it_is_sent():
     """Friction heat of the slider-crank is in the housing and, through the fins, in the environment."""
-    sol = ephs.simulate(ephs.load(ROOT / "scenes" / "slider-crank.toml"), 2.0, step=0.002)
+    sol = ephs.simulate(shipped("slider-crank"), 2.0, step=0.002)
     gained = sol.ledgers.thermal - sol.ledgers.thermal[0] + sol.ledgers.environment - sol.ledgers.environment[0]
     assert np.allclose(gained, sol.heat, rtol=0.0, atol=1e-12)
     assert np.all(np.diff(sol.thermal("housing").temperature) > 0.0)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import ephs
 from ephs.mechanics.runs import check
 from ephs.mechanics.runs.check import check_model
 from ephs.mechanics.runs.running import by_constant_steps
@@ -11,6 +10,8 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.touching import run_of_touching, stays_open
 from ephs.semantics.systems import report
 from ephs.semantics.systems.laws import SystemLaw, Verdict, system_law
+from tests.numerics import largest
+from tests.written import scene_of_text
 
 SCENE = """
 format = 1
@@ -40,11 +41,9 @@ stiffness = 1e4
 
 
 @pytest.fixture
-def load(tmp_path):
+def load():
     def made(low=0.1, high=1.0, speed=0.0):
-        file = tmp_path / "falling.toml"
-        file.write_text(SCENE.format(low=low, high=high, speed=speed))
-        return ephs.load(file)
+        return scene_of_text(SCENE.format(low=low, high=high, speed=speed))
 
     return made
 
@@ -66,7 +65,7 @@ def test_what_stays_open_changes_no_motion(load, seed):
     whole = steps(problem)
     found, left = run_of_touching(problem, [name for name, _ in scene.all_contacts()], steps)
     for path, values in found.states.items():
-        assert np.abs(values - whole[path]).max() <= 1e-9, path
+        assert largest(values - whole[path]) <= 1e-9, path
     gaps = least_gaps(scene, whole)
     assert left <= sum(gap > 0.0 for gap in gaps.values())
     assert left >= sum(gap > 0.05 for gap in gaps.values())  # more than the way of one step

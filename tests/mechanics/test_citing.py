@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,8 +9,8 @@ import pytest
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.citing import ALWAYS, FORM_SOURCES, METHOD_SOURCES, bibliography
+from tests.scenes import ROOT, shipped
 
-ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = tuple(METHODS)  # before any test registers its own
 FILE = ROOT / "ephs" / "mechanics" / "references.bib"
 
@@ -50,7 +49,7 @@ def test_a_run_that_changed_its_method_cites_both():
 
 
 def test_the_reduced_form_is_cited_where_it_was_solved(tmp_path):
-    scene = ephs.load(ROOT / "scenes" / "mbs.toml")
+    scene = shipped("mbs")
     for method, reduced in (("rk54", True), ("natural", False)):
         solution = ephs.simulate(scene, 0.01, method=method, step=1e-3)
         solution.save(tmp_path / "run.nc")

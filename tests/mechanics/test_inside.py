@@ -1,7 +1,5 @@
 """A mechanism in a larger system reads like the mechanism alone."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,14 +8,13 @@ from ephs import Pattern
 from ephs.mechanics.motion.inside import Inside
 from ephs.mechanics.scene.build import initial_state
 from ephs.show import animate
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.scenes import shipped
 
 
 @pytest.fixture(scope="module", params=["mbs", "hot-brake", "biped"])
 def both(request):
     """The motion of a scene, and of it as the only box of a pattern."""
-    scene = ephs.load(ROOT / "scenes" / f"{request.param}.toml")
+    scene = shipped(f"{request.param}")
     steps = {"method": "natural", "form": "paper", "step": 0.002}
     alone = ephs.simulate(scene, 0.02, **steps)
     start = {f"left.engine.{path}": value for path, value in initial_state(scene).items()}

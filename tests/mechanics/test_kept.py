@@ -3,7 +3,6 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -11,21 +10,18 @@ import pytest
 import ephs
 from ephs.mechanics.elements.joints import spring_damper
 from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.scene.build import initial_state, scene_system
 from ephs.mechanics.scene.springs import Spring
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.mechanism import reduce_system
-from ephs.operad import Path, Pattern, junction
+from ephs.operad import Path, Pattern
 from ephs.operad import quantity as Q
 from ephs.solve.equations.model import compile_model
 from tests.mechanics.ball import BALL
 from tests.mechanics.drawn_scenes import drawn, toml
 from tests.mechanics.tree import machines
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
-
-FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 
 
 def ran(scene, method, **more):
@@ -48,30 +44,30 @@ def digest(equations):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_next_run_has_the_digits_of_the_first(method):
-    scene = ephs.load(FOUR_BAR)
-    first, kept = ran(scene, method), ReducedEquations(problem_of_scene(scene), 0.0)
+    scene = shipped("four-bar")
+    first, kept = ran(scene, method), equations_of(scene)
     before = digest(kept)
     assert same(ran(scene, method), first)
-    assert same(ran(ephs.load(FOUR_BAR), method), first)
-    assert digest(ReducedEquations(problem_of_scene(scene), 0.0)) == before
+    assert same(ran(shipped("four-bar"), method), first)
+    assert digest(equations_of(scene)) == before
     kept.reduced.tables.inertia[0] *= 1.5  # written where all read: seen in the digest and in the next run
-    assert digest(ReducedEquations(problem_of_scene(scene), 0.0)) != before
+    assert digest(equations_of(scene)) != before
 
 
 def test_what_is_found_is_found_once():
-    scene = ephs.load(FOUR_BAR)
-    one, other = (ReducedEquations(problem_of_scene(scene), 0.0) for _ in range(2))
+    scene = shipped("four-bar")
+    one, other = (equations_of(scene) for _ in range(2))
     assert one.reduced is other.reduced
     assert one.model.tables is other.model.tables
     assert one.problem.system is other.problem.system
     assert one.engine.work["force"] is not other.engine.work["force"]
-    assert ReducedEquations(problem_of_scene(ephs.load(FOUR_BAR)), 0.0).reduced is not one.reduced
+    assert equations_of(shipped("four-bar")).reduced is not one.reduced
 
 
 @pytest.mark.parametrize("method", ["rk87", "natural"])
 def test_a_changed_scene_is_another_one(method):
     """Bodies, states, motions and inputs that differ from those of a run before it are those of the next run."""
-    scene = ephs.load(FOUR_BAR)
+    scene = shipped("four-bar")
     first = ran(scene, method)
 
     def heavier(of):
@@ -85,11 +81,11 @@ def test_a_changed_scene_is_another_one(method):
     }
     for change in changes.values():
         found = ran(change(scene), method)
-        assert same(found, ran(change(ephs.load(FOUR_BAR)), method))
+        assert same(found, ran(change(shipped("four-bar")), method))
         assert not same(found, first)
     for inputs in ({"joints.main": 3.0}, {"joints.main": 5.0}, {"bodies.coupler": np.arange(6.0)}):
         found = ran(scene, method, inputs=inputs)
-        assert same(found, ran(ephs.load(FOUR_BAR), method, inputs=inputs))
+        assert same(found, ran(shipped("four-bar"), method, inputs=inputs))
         assert not same(found, first)
     assert same(ran(scene, method), first)
 
@@ -105,9 +101,7 @@ def later(scene):
 
 def parts_of(scene):
     """Digits of all that a run begins with: states by path, and tables."""
-    return {str(k): v.tobytes() for k, v in initial_state(scene).items()}, digest(
-        ReducedEquations(problem_of_scene(scene), 0.0)
-    )
+    return {str(k): v.tobytes() for k, v in initial_state(scene).items()}, digest(equations_of(scene))
 
 
 BOUNCING = BALL.format(slip=0.01)
@@ -118,10 +112,8 @@ def test_a_scene_in_another_state_has_the_digits_of_one_made_anew(seed):
     """Systems are shared by scenes that differ in how bodies and joints move alone; states are not."""
     scene = scene_of_text(BOUNCING if seed is None else toml(drawn(seed)))
     moved = later(scene)
-    known = (
-        seed is not None and {"thermal", "shells", "motors", "gears"} & drawn(seed).keys()
-    )  # with states of their own
-    assert known or scene_system(moved) is scene_system(scene)
+    own = seed is not None and {"thermal", "shells", "motors", "gears"} & drawn(seed).keys()
+    assert own or scene_system(moved) is scene_system(scene)
     assert parts_of(moved) == parts_of(made_anew(moved))
     assert parts_of(moved) != parts_of(scene)
     assert scene_system(made_anew(moved)) is not scene_system(scene)
@@ -174,27 +166,25 @@ def same_start(one, other):
 
 
 def test_runs_side_by_side_share_what_is_kept():
-    scene, alone = ephs.load(FOUR_BAR), ran(ephs.load(FOUR_BAR), "rk87")
+    scene, alone = shipped("four-bar"), ran(shipped("four-bar"), "rk87")
     with ThreadPoolExecutor(4) as pool:
         assert all(same(found, alone) for found in pool.map(lambda _: ran(scene, "rk87"), range(8)))
 
 
 def test_a_sweep_leaves_the_scene_as_it_is():
-    scene = ephs.load(FOUR_BAR)
-    before = ran(scene, "rk87"), digest(ReducedEquations(problem_of_scene(scene), 0.0))
+    scene = shipped("four-bar")
+    before = ran(scene, "rk87"), digest(equations_of(scene))
     ephs.sweep(scene, {"bodies.crank.mass": [1.0, 2.0, 5.0]}, 0.01, method="rk87")
     assert same(ran(scene, "rk87"), before[0])
-    assert digest(ReducedEquations(problem_of_scene(scene), 0.0)) == before[1]
+    assert digest(equations_of(scene)) == before[1]
 
 
 def test_tables_call_the_functions_of_their_own_run():
     """An energy that cannot be recorded is called at an address, which goes with the model of its run."""
     linkage, _ = machines.four_bar()
     turning = linkage.interface[Path.of("drives.main")].quantity
-    sprung = Pattern(
-        junctions={"p": junction(turning), "q": junction(Q.angle)},
-        boxes={"linkage": {"drives.main": "p"}, "pkc": {"q": "q", "p": "p"}, "spring": {"q": "q"}},
-    )(
+    text = "p: joint_momentum(revolute); q: angle; linkage(drives.main=p); pkc(q, p); spring(q)"
+    sprung = Pattern.from_text(text)(
         linkage=linkage,
         pkc=ephs.gyrator({"q": Q.angle, "p": turning}, [[0.0, -1.0], [1.0, 0.0]]),
         spring=ephs.storage({"q": Q.angle}, lambda q: 2.0 * float(q) ** 2),

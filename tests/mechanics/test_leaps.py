@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from ephs.solve.auditing.audit import LEAP
+from tests.written import scene_of_text
 
 THICK, RADIUS, SPEED, START = 0.02, 0.01, 10.0, 0.26
 SCENE = f"""
@@ -29,11 +30,9 @@ WAY = THICK + 2.0 * RADIUS
 
 
 @pytest.fixture
-def ball(tmp_path):
+def ball():
     def scene(side=0.0):
-        file = tmp_path / "ball.toml"
-        file.write_text(SCENE.replace("SIDE", repr(side)).replace("START", repr(START)))
-        return ephs.load(file)
+        return scene_of_text(SCENE.replace("SIDE", repr(side)).replace("START", repr(START)))
 
     return scene
 
@@ -60,15 +59,13 @@ def test_a_ball_that_passes_a_plate_in_a_step_is_found(kept, by_hand, ball):
     assert START - SPEED * finding.at < 0.0, "the instant after it"
 
 
-def test_a_ball_at_the_end_of_an_arm_that_turns_is_found(tmp_path):
+def test_a_ball_at_the_end_of_an_arm_that_turns_is_found():
     """Its body only turns, about a centre 1 m aside."""
     text = SCENE.replace("SIDE", "-1.0").replace("START", repr(START)).replace(f"-{SPEED}]", "0.0]")
     text = text.replace(
         "[surfaces.ball]", f"angular_velocity = [0.0, {SPEED}, 0.0]\n[surfaces.ball]\nposition = [1.0, 0.0, 0.0]"
     )
-    file = tmp_path / "arm.toml"
-    file.write_text(text)
-    run = ephs.simulate(ephs.load(file), 0.06, method="natural", step=0.0097, audit="off")
+    run = ephs.simulate(scene_of_text(text), 0.06, method="natural", step=0.0097, audit="off")
     assert run.body("ball").position[-1] == pytest.approx([-1.0, 0.0, START]), "the control: it met nothing"
     (leap,) = run.motion.leaps(0.0097)
     assert leap[2] == pytest.approx(SPEED * 0.0097 / WAY, rel=1e-2)
@@ -85,12 +82,12 @@ def test_the_step_that_is_advised_meets_the_plate(ball):
 @pytest.mark.parametrize("method", ["natural", "variational", "rk54"])
 @pytest.mark.parametrize("part", [0.03, 0.15, 0.3, 0.45])
 @pytest.mark.parametrize("offset", [0.0, 0.4])
-def test_no_soft_contact_lets_a_ball_through_in_silence(offset, part, method, tmp_path):
+def test_no_soft_contact_lets_a_ball_through_in_silence(offset, part, method):
     """Steps of a part of the plate's way: runs end where the contact has no direction, or are found to pass it."""
-    file, start = tmp_path / "soft.toml", START + offset * part * WAY
-    file.write_text(SCENE.replace("SIDE", "0.0").replace("START", repr(start)).replace("1e7", "100.0"))
+    start = START + offset * part * WAY
+    scene = scene_of_text(SCENE.replace("SIDE", "0.0").replace("START", repr(start)).replace("1e7", "100.0"))
     try:
-        run = ephs.simulate(ephs.load(file), 0.06, method=method, step=part * WAY / SPEED, audit="off")
+        run = ephs.simulate(scene, 0.06, method=method, step=part * WAY / SPEED, audit="off")
     except ephs.SimulationError as error:
         assert error.outcome is ephs.Outcome.DEPTH and error.path == "contacts.ball_plate.point0.pe"
         return
@@ -100,13 +97,12 @@ def test_no_soft_contact_lets_a_ball_through_in_silence(offset, part, method, tm
     assert finding.path == "contacts.ball_plate" and "passed" in finding.advice
 
 
-def test_an_overlap_that_turns_back_is_not(tmp_path):
+def test_an_overlap_that_turns_back_is_not():
     """A swing to 0.8 of the way to the middle, by steps that are longer than the layer in which runs end."""
     deep = 0.8 * 0.5 * WAY
-    file = tmp_path / "swing.toml"
     stiffness = 2.0 * (SPEED / deep) ** 2  # two surfaces in series have half of it
-    file.write_text(SCENE.replace("SIDE", "0.0").replace("START", repr(START)).replace("1e7", repr(stiffness)))
-    run = ephs.simulate(ephs.load(file), 0.06, method="rk87", step=0.2 * WAY / SPEED, audit="off")
+    scene = scene_of_text(SCENE.replace("SIDE", "0.0").replace("START", repr(START)).replace("1e7", repr(stiffness)))
+    run = ephs.simulate(scene, 0.06, method="rk87", step=0.2 * WAY / SPEED, audit="off")
     assert run.contact("ball_plate").gap.min() < -0.9 * deep
     assert not any("passed" in finding.advice for finding in run.audit.findings)
 
@@ -134,9 +130,8 @@ def test_chosen_steps_of_a_system_meet_a_plate_as_those_of_its_scene(method, bal
     assert ends[1] == pytest.approx(ends[0], abs=1e-3)
 
 
-def test_hard_surfaces_are_passed_neither(ball, tmp_path):
+def test_hard_surfaces_are_passed_neither(ball):
     """By a system made by hand, at a speed at which one step would lead through."""
     text = SCENE.replace("SIDE", "0.0").replace("START", repr(START)).replace("stiffness = 1e7", "restitution = 0.5")
-    (tmp_path / "hard.toml").write_text(text)
-    run = ephs.simulate(ephs.load(tmp_path / "hard.toml").system(), 0.06)
+    run = ephs.simulate(scene_of_text(text).system(), 0.06)
     assert run.body("bodies.ball").velocity[-1, 2] == pytest.approx(0.5 * SPEED, rel=1e-6)

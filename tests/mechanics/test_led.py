@@ -8,6 +8,9 @@ import pytest
 import ephs
 from benchmarks.hard.dead_centre import RATE, folding, gained
 from ephs import PolynomialMotion
+from tests.numerics import EPS, largest
+from tests.scenes import shipped
+from tests.written import scene_of_text
 
 UNTIL = 4.9
 SHAFT = """
@@ -66,12 +69,10 @@ def test_heat_is_part_of_the_work():
     assert sol.work[-1] == pytest.approx(gained(UNTIL) + heat, rel=1e-4)
 
 
-def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier(tmp_path):
+def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier():
     """A pendulum on a shaft that turns evenly: work is the sum of its power, right to the method's error, which the
     plain defect of the balance shows."""
-    file = tmp_path / "shaft.toml"
-    file.write_text(SHAFT)
-    sol = ephs.simulate(ephs.load(file), 1.0, method="rk54", rtol=1e-4)
+    sol = ephs.simulate(scene_of_text(SHAFT), 1.0, method="rk54", rtol=1e-4)
     assert 1e-12 < sol.stats["plain_defect"]["largest"] / sol.ledgers.scale < 1e-2
     assert sol.energy_error.max() < 1e-12
 
@@ -79,7 +80,7 @@ def test_a_motion_that_leaves_freedoms_is_counted_by_its_multiplier(tmp_path):
 @pytest.mark.parametrize("method", ["natural", "natural4"])
 def test_a_loop_that_is_held_at_rest_takes_few_iterations(method):
     """All velocities are rounding: residuals of constraints have no scale of their own, and none is made of it."""
-    scene = ephs.load("scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     scene = replace(
         scene,
         bodies={name: replace(body, twist=np.zeros(6)) for name, body in scene.bodies.items()},
@@ -117,4 +118,4 @@ def test_the_work_of_what_holds_a_joint_is_rounding_and_no_finding(method, tmp_p
         file.write_text(HELD.format(held=held, mass=mass), encoding="utf-8")
         sol = ephs.simulate(ephs.load(file), 0.5, method=method)
         assert sol.audit.passed, sol.audit
-        assert np.abs(sol.work).max() <= 100.0 * np.finfo(float).eps * mass * 9.81
+        assert largest(sol.work) <= 100.0 * EPS * mass * 9.81

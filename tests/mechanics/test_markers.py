@@ -5,6 +5,8 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
+from tests.numerics import largest
+from tests.written import scene_of_text
 
 PENDULUM = """
 format = 1
@@ -27,10 +29,8 @@ at = [1.0, 2.0, 3.0]
 
 
 @pytest.fixture
-def pendulum(tmp_path):
-    file = tmp_path / "pendulum.toml"
-    file.write_text(PENDULUM)
-    return ephs.load(file)
+def pendulum():
+    return scene_of_text(PENDULUM)
 
 
 def test_a_marker_moves_with_its_body(pendulum):
@@ -38,7 +38,7 @@ def test_a_marker_moves_with_its_body(pendulum):
     tip, rod = sol.marker("tip"), sol.body("rod")
     assert np.allclose(tip.position, sol.point("rod", [0.1, 0.0, -0.5]))
     steps = (tip.position[2:] - tip.position[:-2]) / 0.01
-    assert np.abs(steps - tip.velocity[1:-1]).max() <= 2e-3
+    assert largest(steps - tip.velocity[1:-1]) <= 2e-3
     assert np.allclose(np.linalg.norm(tip.position - rod.position, axis=1), np.hypot(0.1, 0.5))
     assert np.array_equal(sol.marker("wall").position, np.tile([1.0, 2.0, 3.0], (len(sol), 1)))
     assert not sol.marker("wall").velocity.any()
@@ -58,15 +58,16 @@ def test_a_force_at_a_marker_is_the_wrench_that_it_makes(pendulum):
 
     by_force = ephs.simulate(bent, 0.3, step=0.003, inputs={"markers.tip": [0.0, 0.0, weight]})
     by_wrench = ephs.simulate(bent, 0.3, step=0.003, inputs={"bodies.rod": wrench})
-    assert np.abs(by_force.joint("pin").coordinate - by_wrench.joint("pin").coordinate).max() <= 1e-12
+    assert largest(by_force.joint("pin").coordinate - by_wrench.joint("pin").coordinate) <= 1e-12
     rise = by_force.marker("tip").position[:, 2] - by_force.marker("tip").position[0, 2]
     # inputs are held at the middle of a step, where the rotation is known to second order
-    assert np.abs(by_force.work - weight * rise).max() <= 1e-4 * weight * np.ptp(rise)
+    assert largest(by_force.work - weight * rise) <= 1e-4 * weight * np.ptp(rise)
     both = ephs.simulate(bent, 0.3, step=0.003, inputs={"markers.tip": [0.0, 0.0, weight], "bodies.rod": np.zeros(6)})
-    assert np.abs(both.joint("pin").coordinate - by_force.joint("pin").coordinate).max() <= 1e-13
+    assert largest(both.joint("pin").coordinate - by_force.joint("pin").coordinate) <= 1e-13
 
 
-def test_markers_of_parts_move_with_their_ground(pendulum, tmp_path):
+def test_markers_of_parts_move_with_their_ground(tmp_path):
+    (tmp_path / "pendulum.toml").write_text(PENDULUM)
     (tmp_path / "hall.toml").write_text(
         "format = 1\n[bodies.ball]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n"
         '[parts.left]\nuse = "pendulum.toml"\nposition = [0.0, 5.0, 0.0]\n'
@@ -88,11 +89,9 @@ def test_markers_of_parts_move_with_their_ground(pendulum, tmp_path):
         ('[markers.m]\nbody = "rod"\nwhere = 3\n', "markers.m.where"),
     ],
 )
-def test_faulty_markers_are_named(text, message, tmp_path):
-    file = tmp_path / "faulty.toml"
-    file.write_text(PENDULUM + text)
+def test_faulty_markers_are_named(text, message):
     with pytest.raises(ephs.SceneError, match=message):
-        ephs.load(file)
+        scene_of_text(PENDULUM + text)
 
 
 def test_unknown_inputs_list_the_markers(pendulum):

@@ -1,7 +1,5 @@
 """What all methods share: control of the step, events, time backwards, registration; and what each one promises."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,21 +7,19 @@ from hypothesis import strategies as st
 
 import ephs
 from benchmarks.cases import CASES
-from ephs import Pattern
-from ephs import library as lib
 from ephs.mechanics.methods import registry
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, on_joints, register_method
 from ephs.solve.running.stepping import Attempt
+from tests.methods import OF_SCENES
+from tests.numerics import largest
+from tests.oscillator import free_oscillator, oscillator
+from tests.scenes import shipped
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[2]
 BY_NAME = {case.name: case for case in CASES}
-OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(
-    pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
-)
+OSCILLATOR = free_oscillator()
 OF_SYSTEMS = [m.name for m in METHODS.values() if m.systems]
-OF_SCENES = [m.name for m in METHODS.values() if m.scenes]
 ADAPTIVE = [m.name for m in METHODS.values() if m.adaptive and m.scenes]
 BALANCED = ("natural", "natural4")
 
@@ -55,7 +51,7 @@ def test_events_are_located_on_the_oscillator(method):
 
 @pytest.mark.parametrize("method", OF_SCENES)
 def test_an_event_stops_a_scene_where_it_happens(method):
-    scene = ephs.load(ROOT / "scenes/chain.toml")
+    scene = shipped("chain")
     name = next(n for n, _ in scene.all_bodies())
     path = f"bodies.{name}.pe.q"
     full = ephs.simulate(scene, 0.4, **setting(method, 0.01))
@@ -80,7 +76,7 @@ def test_directions_of_events(level, direction):
 
 
 def test_events_survive_a_file(tmp_path):
-    scene = ephs.load(ROOT / "scenes/heavy-top.toml")
+    scene = shipped("heavy-top")
 
     def quarter(t, state):
         return t - 0.25
@@ -112,12 +108,12 @@ def test_there_and_back_again(method):
     back = ephs.simulate(scene, 0.0, t0=0.3, initial=ahead, **setting(method, 0.005, 1e-9))
     assert back.t[0] == 0.3 and back.t[-1] == 0.0 and np.all(np.diff(back.t) < 0.0)
     bound = {"natural": 1e-9, "variational": 1e-9}.get(method, 3e-7)
-    assert np.abs(bodies(back, -1) - bodies(there, 0)).max() <= bound
+    assert largest(bodies(back, -1) - bodies(there, 0)) <= bound
 
 
 def test_friction_does_not_run_backward():
     with pytest.raises(ephs.OptionError, match=r"until is -1.*mf produces entropy"):
-        ephs.simulate(ephs.load(ROOT / "scenes/mbs.toml"), -1.0)
+        ephs.simulate(shipped("mbs"), -1.0)
 
 
 # ---- steps ----------------------------------------------------------------------------------------------------------
@@ -131,7 +127,7 @@ def test_tolerances_are_met_within_ten(name, method):
     exact = bodies(ephs.simulate(case.scene(), until, method="rk87", rtol=1e-13, atol=1e-13, save_at=[until]), -1)
     tolerance = 1e-4 if METHODS[method].order == 2 else 1e-7
     sol = ephs.simulate(case.scene(), until, method=method, rtol=tolerance, atol=tolerance, save_at=[until])
-    assert np.abs(bodies(sol, -1) - exact).max() <= 10.0 * tolerance
+    assert largest(bodies(sol, -1) - exact) <= 10.0 * tolerance
     assert sol.constraint_error.max() <= 1e-10
 
 
@@ -146,13 +142,14 @@ def test_steps_keep_their_limits(method):
 
 
 def test_a_tolerance_for_one_joint_steers_by_it():
-    scene = ephs.load(ROOT / "scenes/chain.toml")
+    scene = shipped("chain")
     joint = next(n for n, _ in scene.all_joints())
     loose = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol=1e-3)
     tight = ephs.simulate(scene, 1.0, method="rk54", rtol=0.0, atol={"*": 1e-3, f"joints.{joint}": 1e-9})
     assert tight.stats["steps"] > 2 * loose.stats["steps"]
 
 
+@pytest.mark.parametrize("model", [BY_NAME["heavy-top"].scene(), OSCILLATOR], ids=["scene", "system"])
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -163,6 +160,9 @@ def test_a_tolerance_for_one_joint_steers_by_it():
         ({"method": "euler"}, "one of auto, natural"),
         ({"step": float("nan")}, "step is nan"),
         ({"step": -0.1}, "step is -0.1"),
+        ({"step": 0.0}, "step is 0.0"),
+        ({"atol": float("nan")}, "atol is nan"),
+        ({"max_step": -1.0}, "max_step is -1.0"),
         ({"min_step": -1.0}, "min_step"),
         ({"min_step": 1.0, "max_step": 0.1}, "min_step is 1.0"),
         ({"events": [3]}, "events is 3"),
@@ -170,12 +170,12 @@ def test_a_tolerance_for_one_joint_steers_by_it():
         ({"options": {"rho": 0.5}, "method": "rk54"}, "options of rk54: keep"),
         ({"method": "variational"}, "takes constant steps"),
         ({"until": float("inf")}, "until is inf"),
+        ({"until": 0.0}, "until is 0.0"),
     ],
 )
-def test_bad_options_are_refused_by_name(options, words):
-    scene = BY_NAME["heavy-top"].scene()
+def test_bad_options_are_refused_by_name(options, words, model):
     with pytest.raises(ephs.OptionError, match=words):
-        ephs.simulate(scene, **{"until": 1.0, **options})
+        ephs.simulate(model, **{"until": 1.0, **options})
 
 
 @pytest.mark.parametrize("former", registry.REPLACED)
@@ -198,7 +198,7 @@ def test_systems_without_bodies_are_left_to_radau():
 
 @pytest.mark.parametrize("method", OF_SCENES)
 def test_initial_states_off_the_joints_are_refused(method):
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     first = ephs.simulate(scene, 1e-3)
     moved = np.array(first["bodies.crank.pe.q"][0])
     moved[4] += 0.01
@@ -246,24 +246,21 @@ def test_a_force_that_is_zero_but_for_rounding_stops_no_step(method):
 @pytest.mark.parametrize("step", [2e-3, 1e-3])
 def test_what_repeats_by_build_stays_left_out(step):
     """Bricard's loop is closed once too often wherever it is; rounding in what is left out must not count as rank."""
-    sol = ephs.simulate(ephs.load(ROOT / "scenes/bricard.toml"), 1.0, method="natural", step=step)
+    sol = ephs.simulate(shipped("bricard"), 1.0, method="natural", step=step)
     assert sol.energy_error.max() <= 1e-12 and sol.constraint_error.max() <= 1e-12
     assert sol.stats["dependent_equations"] == 1
 
 
 def test_natural4_is_of_order_four_with_friction_heat_and_loops():
-    scene = ephs.load(ROOT / "scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     exact = bodies(ephs.simulate(scene, 0.3, method="rk87", rtol=1e-13, atol=1e-13), -1)
-    errors = [
-        np.abs(bodies(ephs.simulate(scene, 0.3, method="natural4", step=h), -1) - exact).max() for h in (0.02, 0.01)
-    ]
+    errors = [largest(bodies(ephs.simulate(scene, 0.3, method="natural4", step=h), -1) - exact) for h in (0.02, 0.01)]
     assert np.log2(errors[0] / errors[1]) >= 3.9
 
 
 def test_feedback_keeps_the_order_of_natural4():
     """A force that reads the state is taken at the stages themselves."""
-    pattern = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
-    system = pattern(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
+    system = oscillator(k=1.0)
     inputs = {"p": {"flow": lambda t, state: -0.5 * state["pe.q"]}}
     exact = np.cos(2.0 * 1.5**0.5)
     errors = [
@@ -312,7 +309,7 @@ def test_auto_changes_to_radau_where_a_scene_is_stiff():
     slow = ephs.simulate(
         scene, 10.0, method="radau", rtol=1e-9, atol=1e-9, audit="off"
     )  # 1.4e-7 of the heat is missing
-    assert np.abs(bodies(sol, -1) - bodies(slow, -1)).max() <= 1e-5
+    assert largest(bodies(sol, -1) - bodies(slow, -1)) <= 1e-5
 
 
 def test_auto_stays_explicit_where_nothing_is_stiff():
@@ -347,7 +344,7 @@ def test_a_method_of_ones_own(monkeypatch):
     scene = BY_NAME["spherical-chain-2"].scene()
     exact = bodies(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13), -1)
     errors = [
-        np.abs(bodies(ephs.simulate(scene, 0.2, method="explicit-midpoint", step=h), -1) - exact).max()
+        largest(bodies(ephs.simulate(scene, 0.2, method="explicit-midpoint", step=h), -1) - exact)
         for h in (0.01, 0.005)
     ]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)

@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from ephs.mechanics import (
     body_pattern,
@@ -21,9 +20,9 @@ from ephs.semantics import Reference, StructureError, System
 from ephs.semantics.spaces import PAIRS, SE3, SO3xR3, pair
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.mechanisms import GRAVITY, TwoBodies, kinds
+from tests.numerics import seeds
 from tests.semantics.subspace import Subspace, subspace_of
 
-seeds = st.integers(0, 2**20)
 few = settings(max_examples=10)
 THETA = Reference().temperature
 

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -20,12 +19,15 @@ from ephs.semantics.meaning.step import step
 from ephs.semantics.spaces import PAIRS
 from ephs.semantics.systems.laws import Probe, system_law
 from ephs.testing import mechanisms
+from tests.mechanics.mechanisms import on_ground
+from tests.methods import FIXED_OF_SCENES
+from tests.numerics import EPS
+from tests.scenes import SCENES
 from tests.written import scene_of_text
 
-SCENES = sorted((File(__file__).parents[2] / "scenes").glob("*.toml"))
 # what is slow is compiled once: the first example
 # Mechanisms are large, and each is solved: what Hypothesis deems slow and large is meant here.
-calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+calm = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 
 @pytest.mark.parametrize(("method", "step"), [("natural", 0.005), ("natural4", 0.02)])
@@ -105,7 +107,7 @@ def rubbing(kind):
     return scene, end(ephs.simulate(scene, 0.2, method="rk87", rtol=1e-13, atol=1e-13))
 
 
-@pytest.mark.parametrize("method", [m.name for m in METHODS.values() if m.fixed and m.scenes])
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
 @pytest.mark.parametrize("kind", [*PAIRS, "universal"])
 def test_every_pair_with_every_method(kind, method):
     """Balances, closure, and the method's order."""
@@ -121,7 +123,7 @@ def test_every_pair_with_every_method(kind, method):
     if kind == "fixed":  # nothing moves
         assert max(errors) <= 1e-15
         return
-    rounding = 8.0 * np.finfo(float).eps * np.abs(exact).max()
+    rounding = 8.0 * EPS * np.abs(exact).max()
     assert errors[1] <= max(errors[0] / 2.0 ** (order - (0.1 if order <= 4 else 0.5)), rounding)
     # no method is better than it says where errors can be seen
     assert errors[1] >= errors[0] / 2.0 ** (order + 0.25) or errors[0] < 1e-6
@@ -234,10 +236,8 @@ def test_contradictory_motions_are_refused():
 
 def test_functions_of_the_user_move_with_the_same_balances():
     """A pendulum with a Python potential and a friction that grows with speed and falls with temperature."""
-    ground = ephs.Pattern.from_text("p1: body_momentum; p2: body_momentum; ground(p=p1); joint(p1, p2); body(p=p2)")
-    system = ground(
-        ground=components.ground(),
-        joint=joint(
+    system = on_ground(
+        link=joint(
             "revolute",
             frame2={"position": [0.0, 0.5, 0.0]},
             friction=lambda x, u, theta: [[0.1 * (1.0 + u[0] ** 2) * 300.0 / theta]],
@@ -301,7 +301,7 @@ conductance = 100.0
 """
 
 
-ROUNDING = 8 * np.finfo(float).eps * 100.0 * 0.01
+ROUNDING = 8 * EPS * 100.0 * 0.01
 """Of the entropy that a conductance of 100 W/K passes on in a step of 0.01 s, in J/K."""
 
 

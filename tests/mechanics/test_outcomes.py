@@ -2,7 +2,6 @@
 
 import re
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,9 +16,9 @@ from ephs.solve.posing.errors import SolveError
 from ephs.solve.running import loop
 from examples.failing import oscillator, pendulum, scene
 from examples.failures import ALL, CASES, ELSEWHERE, Case, pushed, runs
+from tests.numerics import largest
+from tests.scenes import ROOT
 from tests.written import scene_of_text
-
-ROOT = Path(__file__).parents[2]
 
 
 def named(error: ephs.SimulationError) -> bool:
@@ -75,7 +74,7 @@ def assert_prefix(case: Case, method: str, partial: ephs.Solution) -> None:
     whole = case.run(method, float(partial.t[-1]), audit="off")
     assert np.allclose(whole.t, partial.t, rtol=1e-14, atol=0.0)
     for path, values in partial.states.items():
-        size = float(np.abs(values).max(initial=0.0))
+        size = float(largest(values, initial=0.0))
         assert np.allclose(whole[str(path)], values, rtol=0.0, atol=1e-9 * size)
 
 

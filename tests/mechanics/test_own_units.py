@@ -1,7 +1,5 @@
 """A run knows no unit: in other units of length, mass and time the same mechanism moves the same, by every method."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -12,10 +10,11 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.own_units import NEAR, SI, OwnUnits, mobility_of
 from ephs.mechanics.scene.rescaled import rescaled
+from tests.methods import OF_SCENES
+from tests.scenes import shipped
 
-FOUR_BAR = ephs.load(Path(__file__).parents[2] / "scenes" / "four-bar.toml")
+FOUR_BAR = shipped("four-bar")
 SPAN, STEP = 0.125, 2.0**-6
-NAMES = [name for name, method in METHODS.items() if method.scenes]
 EXPONENTS = st.tuples(*[st.integers(-30, 30)] * 3)
 SOLVED = 1e-11
 """Relative; Newton's iterations end at 1e-13 of what moves, and radau's at a part of its tolerance."""
@@ -40,12 +39,12 @@ def moved(sol, exponents=(0, 0, 0)):
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", OF_SCENES)
 def test_a_run_knows_no_unit(name):
     there = moved(ran(name))
     near = SOLVED if METHODS[name].fixed else 1e-6
 
-    @settings(max_examples=2, deadline=None)
+    @settings(max_examples=2)
     @example(exponents=(-28, 0, 0))
     @example(exponents=(30, -30, 30))
     @given(exponents=EXPONENTS)
@@ -62,7 +61,7 @@ def test_a_whole_unit_further_every_bit_is_the_same(name):
         np.testing.assert_array_equal(moved(ran(name, exponents), exponents), there)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @example(exponents=(-28, 0, 0))
 @given(exponents=EXPONENTS)
 def test_mobility_knows_no_unit(exponents):

@@ -2,7 +2,6 @@
 
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +13,9 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
 from examples.failing import four_bar
 from tests.mechanics.methods.test_by_hand import four_bar as four_bar_by_hand
+from tests.scenes import ROOT
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).resolve().parents[2]
 SLIDE = """
 format = 1
 [world]

@@ -1,7 +1,5 @@
 """Likely mistakes are said by name, and sound scenes stay quiet."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,8 @@ from ephs.mechanics.constraints.holding import ConfiguredMechanism
 from ephs.mechanics.constraints.plausible import doubts
 from ephs.mechanics.constraints.redundancy import dependences, explain
 from ephs.mechanics.runs.system_problem import problem_of_system
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = [*sorted(ROOT.glob("scenes/*.toml")), *sorted(ROOT.glob("examples/*.toml"))]
 
 

@@ -37,7 +37,7 @@ def test_sweeps_find_what_the_general_form_finds(family):
     compare(ephs.simulate(families.scene(family, 3), 0.02, method="natural", step=0.01))
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(mechanisms())
 def test_on_drawn_mechanisms_too(scene):
     compare(ephs.simulate(scene, 0.02, method="natural", step=0.01))

@@ -1,7 +1,6 @@
 """Which constraints depend on which: by name in known mechanisms, by count and span in any."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,12 +19,12 @@ from ephs.semantics.spaces import SE3
 from ephs.solve.equations.instant import instant
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
+from tests.scenes import ROOT, shipped
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = sorted([*(ROOT / "scenes").glob("*.toml"), *(ROOT / "benchmarks" / "scenes").glob("*.toml")])
 # Redundancy is searched in whole mechanisms, by singular values: what Hypothesis deems slow is meant here.
-calm = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+calm = settings(suppress_health_check=[HealthCheck.too_slow])
 Z = (0.0, 0.0, 1.0)
 HEAD = 'format = 1\nname = "test"\n[world]\ngravity = [0.0, 0.0, -9.81]\n'
 
@@ -254,7 +253,7 @@ KNOWN = {
 @pytest.mark.parametrize("case", KNOWN)
 def test_known_mechanisms_are_described(case, scene):
     text, expected = KNOWN[case]
-    found = scene(text) if "\n" in text else ephs.load(ROOT / "scenes" / f"{text}.toml")
+    found = scene(text) if "\n" in text else shipped(text)
     assert [str(each) for each in dependences(ConfiguredMechanism.of(found))] == expected
     assert sum(len(each.directions) for each in dependences(ConfiguredMechanism.of(found))) == counted(found)
     if "motion" not in case:
@@ -289,7 +288,7 @@ def test_texts_are_grouped_and_shortened(scene):
         "40 constraint equations depend on others (in world axes): hinge_2, hinge_3, hinge_4, hinge_5, hinge_6 and 3 "
         f"more each repeat hinge_1: {HINGED}"
     )
-    assert explain(ephs.load(ROOT / "scenes" / "chain.toml")) == ""
+    assert explain(shipped("chain")) == ""
     balls = "".join(
         body(f"b{i}", i, 0, 0)
         + joint(f"p{i}", "spherical", "ground", f"b{i}", (i, 0, 0))
@@ -309,13 +308,13 @@ def test_wrenches_are_told_apart(scene):
     sol = ephs.simulate(found, 0.01, step=0.01)
     for name, free in indeterminate(ConfiguredMechanism.of(found)).items():
         assert np.array_equal(np.isnan(sol.joint(name).wrench[0]), free)
-    chain = ephs.load(ROOT / "scenes" / "chain.toml")
+    chain = shipped("chain")
     assert wrenches_in_words(indeterminate(ConfiguredMechanism.of(chain))) == "unique in every joint"
     assert wrenches_in_words(indeterminate(ConfiguredMechanism.of(replace(chain, joints={})))) == "no joints"
 
 
 def test_a_check_says_what_repeats_what(scene):
-    items = {name: detail for name, _, detail in check_model(ephs.load(ROOT / "scenes" / "four-bar.toml")).items}
+    items = {name: detail for name, _, detail in check_model(shipped("four-bar")).items}
     assert items["mobility"] == "1 independent motion in this configuration"
     assert items["redundant constraints"] == (
         f"3 constraint equations depend on others (in world axes): pivot repeats main, pin and knee: {FLAT}; "
@@ -324,7 +323,7 @@ def test_a_check_says_what_repeats_what(scene):
     assert items["joint wrenches"] == (
         "main, pin, knee and pivot: force along z, moment about x and y indeterminate (joint axes)"
     )
-    items = {name: detail for name, _, detail in check_model(ephs.load(ROOT / "scenes" / "chain.toml")).items}
+    items = {name: detail for name, _, detail in check_model(shipped("chain")).items}
     assert (items["redundant constraints"], items["joint wrenches"]) == ("none", "unique in every joint")
 
 
@@ -363,7 +362,7 @@ def test_a_joint_doubled_repeats_itself(scene):
 @pytest.mark.parametrize("name", ["four-bar", "bricard", "cardan-shaft", "n-four-bar"])
 def test_a_system_repeats_what_its_scene_does(name):
     """In the same words, but for the paths of boxes."""
-    scene = ephs.load(ROOT / "scenes" / f"{name}.toml")
+    scene = shipped(name)
     inputs = {
         str(port): {"effort" if signal.effort else "flow": signal.value} for port, signal in scene_inputs(scene).items()
     }

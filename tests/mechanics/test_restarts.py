@@ -1,8 +1,5 @@
 """A run that starts from the end of another one goes on as if that had not stopped."""
 
-from pathlib import Path
-
-import numpy as np
 import pytest
 
 import ephs
@@ -10,12 +7,13 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import scene_inputs
 from ephs.solve.running.control import RTOL
 from tests.mechanics.test_twins import PIN, SCENE, TWINS, load  # noqa: F401 - a fixture
+from tests.numerics import EPS, largest
+from tests.scenes import SCENES
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 STEP, STEPS = 1e-3, 10
 ONWARDS = ("natural",)
 """Its steps depend on more than a scene's state: on momenta that leave the joints by the method's error."""
-ROUNDING = 8 * 7 * STEPS * np.finfo(float).eps
+ROUNDING = 8 * 7 * STEPS * EPS
 """Of eight sums a stage, seven stages a step, relative."""
 CONDITION = 1e3
 """Of what is solved in a step: closed loops, pressures by bulk moduli."""
@@ -32,13 +30,13 @@ def apart(whole, rest):
     """
     found, sizes = 0.0, dict[str, float]()
     for path in whole.states:
-        sizes[path[-1]] = max(sizes.get(path[-1], 0.0), float(np.abs(whole[path]).max(initial=0.0)))
+        sizes[path[-1]] = max(sizes.get(path[-1], 0.0), float(largest(whole[path], initial=0.0)))
     for path in whole.states:
         one, two = whole[path], rest[path]
         if f".{path}".endswith(tuple(f".{name}" for name in COUNTERS)):
             one, two = one - one[STEPS], two - two[0]
         if one.size:
-            found = max(found, float(np.abs(one[-1] - two[-1]).max() / (sizes[path[-1]] or 1.0)))
+            found = max(found, float(largest(one[-1] - two[-1]) / (sizes[path[-1]] or 1.0)))
     return found
 
 

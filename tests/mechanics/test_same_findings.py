@@ -1,15 +1,14 @@
 """A system has the findings of the scene that it is built from: none asks whether there is a scene."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import ephs
 from ephs.mechanics.scene.build import scene_inputs
 from ephs.mechanics.scene.rescaled import rescaled
+from tests.scenes import shipped
+from tests.written import scene_of_text
 
-SCENES = Path(__file__).parents[2] / "scenes"
 NAMES = ("biped", "body", "cardan-shaft", "chain", "dzhanibekov", "four-bar", "heavy-top", "hot-brake", "slider-crank")
 SETTINGS = (
     {"method": "natural", "step": 0.05},
@@ -30,7 +29,7 @@ def findings(model, setting, inputs=None):
 
 def both(name, setting):
     """Findings of a scene and of its system."""
-    scene = ephs.load(SCENES / f"{name}.toml")
+    scene = shipped(name)
     inputs = {str(p): {"effort" if x.effort else "flow": x.value} for p, x in scene_inputs(scene).items()}
     return findings(scene, setting), findings(scene.system(), setting, inputs)
 
@@ -48,14 +47,12 @@ def test_some_of_these_runs_are_found_wrong_and_some_are_not():
 
 
 @pytest.mark.parametrize("size", [2.0**-20, 2.0**10])
-def test_a_system_moves_alike_at_any_size(size, tmp_path):
+def test_a_system_moves_alike_at_any_size(size):
     """By natural, which decides the rank of its constraints by numbers; masses grow as volumes do.
 
     Its error at these steps is 1e-4, and parts of it depend on the unit of length.
     """
-    file = tmp_path / "two-rods.toml"
-    file.write_text(
-        """
+    scene = scene_of_text("""
         format = 1
         [assembly]
         adjust = true
@@ -81,9 +78,7 @@ def test_a_system_moves_alike_at_any_size(size, tmp_path):
         axis = [1.0, 0.0, 0.0]
         rate = 2.0
         stiffness = 0.3
-        """
-    )
-    scene = ephs.load(file)
+        """)
     small = rescaled(scene, size, size**3, 1.0)
     setting = {"method": "natural", "step": 0.01, "audit": "off"}
     one, other = (ephs.simulate(each.system(), 0.2, **setting) for each in (scene, small))

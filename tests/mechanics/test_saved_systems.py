@@ -9,6 +9,7 @@ from ephs import library as lib
 from ephs.show.plots.panels import motion_panels
 from ephs.show.report import write_report
 from tests.mechanics.methods.test_by_hand import four_bar
+from tests.scenes import shipped
 
 WAYS = {
     "a constant": ({"flow": 4.0}, {"method": "natural", "step": 0.01}),
@@ -113,7 +114,7 @@ def test_temperatures_of_systems_relax_as_the_closed_form_says(capacities):
 
 
 def test_temperatures_of_scenes_are_those_of_their_nodes():
-    sol = ephs.simulate(ephs.load("scenes/hot-brake.toml"), 0.5)
+    sol = ephs.simulate(shipped("hot-brake"), 0.5)
     for name, _ in sol.scene.all_thermal():
         np.testing.assert_allclose(sol.temperature(f"thermal.{name}"), sol.thermal(name).temperature, rtol=1e-14)
     assert np.all(sol.temperature("environment") == sol.scene.world.temperature)

@@ -17,11 +17,13 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
-from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.collocation import radau as coefficients
 from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
+from tests.numerics import largest
+from tests.scenes import model_of
+from tests.written import scene_of_text
 
 J, K, D = 0.5, 3.0, 0.4
 ANGLE, RATE = 0.3, -1.1
@@ -80,10 +82,8 @@ FUNCTIONS = {
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    file = tmp_path_factory.mktemp("torsion") / "torsion.toml"
-    file.write_text(SCENE, encoding="utf-8")
-    return ephs.load(file)
+def scene():
+    return scene_of_text(SCENE)
 
 
 def states(scene, method, h, steps, **more):
@@ -99,7 +99,7 @@ def test_a_step_is_the_stability_function(scene, method, h):
     found = states(scene, method, h, 2)
     step = FUNCTIONS[method](h * A)
     for i, expected in enumerate((Y, step @ Y, step @ step @ Y)):
-        assert np.abs(found[i] - expected).max() <= 1e-11
+        assert largest(found[i] - expected) <= 1e-11
 
 
 @pytest.mark.parametrize("compiled", [True, False])
@@ -111,14 +111,14 @@ def test_steps_of_radau_are_the_stability_function_of_their_number_of_stages(sce
         monkeypatch.setattr(implicit.Implicit, "many", lambda *_: None)
     for h in (0.3, 2.0):
         found, step = states(scene, "radau", h, 2), pade(stages - 1, stages)(h * A)
-        assert np.abs(found - [Y, step @ Y, step @ step @ Y]).max() <= 1e-11
-    assert np.abs(found[1] - pade(stages - 2, stages - 1)(h * A) @ Y).max() >= 1e-6  # one stage less shows
+        assert largest(found - [Y, step @ Y, step @ step @ Y]) <= 1e-11
+    assert largest(found[1] - pade(stages - 2, stages - 1)(h * A) @ Y) >= 1e-6  # one stage less shows
     fast = states(scene, "radau", 1e4, 1)[1]
-    assert np.abs(fast + stages * np.linalg.solve(1e4 * A, Y)).max() <= 0.01 * np.abs(fast).max()
+    assert largest(fast + stages * np.linalg.solve(1e4 * A, Y)) <= 0.01 * largest(fast)
 
 
 def test_the_variational_method_is_the_midpoint_rule_with_friction_in_the_middle(scene):
-    assert np.abs(states(scene, "variational", 0.1, 1)[1] - diagonal(1)(0.1 * A) @ Y).max() <= 1e-12
+    assert largest(states(scene, "variational", 0.1, 1)[1] - diagonal(1)(0.1 * A) @ Y) <= 1e-12
 
 
 def test_every_method_of_scenes_with_constant_steps_has_its_test():
@@ -157,24 +157,24 @@ def test_systems_take_the_same_steps(method, system, more, matrix):
     one = FUNCTIONS[method](h * np.array(matrix))
     expected = [np.linalg.matrix_power(one, i) @ list(START.values()) for i in range(steps + 1)]
     found = np.column_stack([np.ravel(sol[path]) for path in START])
-    assert np.abs(found - expected).max() <= (1e-9 if method == "radau" else 1e-12)
+    assert largest(found - expected) <= (1e-9 if method == "radau" else 1e-12)
     for path, value in more.items():
         assert value == START["ke.p"]
-        assert np.abs(np.ravel(sol[path]) - found[:, 1]).max() <= 1e-12
+        assert largest(np.ravel(sol[path]) - found[:, 1]) <= 1e-12
     # Newton's method has the exact matrix of what is linear; the heat is not
     assert sol.stats["iterations"] <= (3 if method == "radau" else 2) * steps + 2
     if method != "radau":  # no step was cut, and the order of elimination was decided at the start
         assert sol.stats["cut_steps"] == 0 and sol.stats["orders"] >= 1
     energy = 0.5 * SPRING * found[:, 0] ** 2 + 0.5 * (1 + len(more)) * found[:, 1] ** 2 / MASS
-    assert np.abs(sol.energy - sol.energy[0]).max() <= (1e-7 if method == "radau" else 1e-11) * energy[0]
+    assert largest(sol.energy - sol.energy[0]) <= (1e-7 if method == "radau" else 1e-11) * energy[0]
     made = (energy[0] - energy) / 293.15 if not more else 0.0 * energy
     tolerance = 1e-12 if method == "natural" else 1e-7
-    assert np.abs(sol.entropy - sol.entropy[0] - made).max() <= tolerance
+    assert largest(sol.entropy - sol.entropy[0] - made) <= tolerance
 
 
 def test_methods_have_the_orders_that_are_said_of_them():
     problem = problem_of_system(SYSTEM, START)
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     for name in ("natural", "natural4"):
         assert METHODS[name].undamped(model).order == METHODS[name].order
 
@@ -188,11 +188,11 @@ def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
         assert round(np.log2(one.error / two.error)) == method.exponent == power
     # dense output is the polynomial through the stages, and the step itself at its ends; no store of heat: y are states
     for attempt in (one, two):
-        assert np.abs(method.inside(attempt, attempt.h).y - attempt.end.y).max() <= 1e-14
-        assert np.abs(method.inside(attempt, 0.0).y - start.y).max() <= 1e-14
+        assert largest(method.inside(attempt, attempt.h).y - attempt.end.y) <= 1e-14
+        assert largest(method.inside(attempt, 0.0).y - start.y) <= 1e-14
     inside = method.inside(one, 0.05)
-    assert inside.t == 0.05 and np.abs(inside.y - two.end.y).max() <= 1e-6
-    assert np.abs(inside.z - two.end.z).max() <= 1e-4
+    assert inside.t == 0.05 and largest(inside.y - two.end.y) <= 1e-6
+    assert largest(inside.z - two.end.z) <= 1e-4
     row = method.row(one.end)  # what is made by friction, and the energies of storages, each at its place
     names = [str(slot.path) for slot in method.model.descriptor.components]
     energies = dict(zip(names, row.energies, strict=True))

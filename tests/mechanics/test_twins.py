@@ -12,6 +12,7 @@ from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.mechanics.elements import components
 from ephs.mechanics.scene.build import component_path
+from tests.numerics import largest
 from tests.written import scene_of_text
 
 NO_COMPONENTS = {"Inside", "body_pattern", "joint_pattern", "mbs_pattern", "stabilised"}
@@ -224,7 +225,7 @@ def test_twins_move_alike(name, load):
     for box, body in twin.compared.items():
         for state in ("ke.p", "pe.q"):
             here, there = one[f"bodies.{box}.{state}"], two[f"{component_path('bodies', body)}.{state}"]
-            assert np.abs(here - there).max() <= twin.condition * ROUNDING * np.abs(there).max()
+            assert largest(here - there) <= twin.condition * ROUNDING * largest(there)
 
 
 @pytest.mark.parametrize("name", TWINS)
@@ -237,6 +238,6 @@ def test_twins_linearise_alike(name, load):
     assert hand.A.shape == scene.A.shape
     one, other = hand.eigenvalues, scene.eigenvalues
     apart = max(np.abs(one - value).min() for value in other)
-    assert apart <= twin.condition * ROUNDING * np.abs(other).max()
+    assert apart <= twin.condition * ROUNDING * largest(other)
     whole = ephs.linearize(system, inputs=twin.inputs, form="paper")
     assert whole.A.shape[0] > scene.A.shape[0]

@@ -1,7 +1,5 @@
 """Functions of inputs and events read states by the names of `Solution`, and read the same numbers."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,9 +8,10 @@ import ephs
 from ephs.mechanics.motion.views import Names
 from ephs.semantics.bundles.errors import AssemblyError
 from tests.mechanics.dynamics.drawn import moving
+from tests.numerics import largest
+from tests.scenes import SCENES
 from tests.written import scene_of_text
 
-SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 ROUNDING = 1e-11
 """10 κ ε: twists are read back from momenta, and rates of cut joints from twists."""
 FOLLOWERS = """
@@ -70,7 +69,7 @@ def followers():
 
 
 def same(found, expected):
-    return np.abs(np.asarray(found) - expected).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(expected).max(initial=0.0))
+    return largest(np.asarray(found) - expected, initial=0.0) <= ROUNDING * (1.0 + largest(expected, initial=0.0))
 
 
 def agrees(model, state, of=None):
@@ -95,7 +94,7 @@ def test_names_read_what_the_dynamics_say(path):
     assert not agrees(model, model.state0, of=model.step(model.state0, 0.01))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(moving())
 def test_names_read_what_the_dynamics_say_in_any_motion(found):
     _, model, state, _ = found

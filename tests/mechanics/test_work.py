@@ -8,8 +8,8 @@ import pytest
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from examples.failing import oscillator
+from tests.scenes import shipped
 
-ROOT = Path(__file__).resolve().parents[2]
 KNOWN = Path(__file__).with_name("work.json")
 SCENES = ("slider-crank", "heavy-top", "hot-brake", "four-bar", "oscillator")
 COUNTED = ("steps", "rejected", "iterations", "evaluations", "jacobians", "factorisations", "orders", "cut_steps")
@@ -39,7 +39,7 @@ def counts(case) -> dict[str, int]:
             oscillator(lambda q: 0.5 * q**2 + q**4), 4.0, initial={"pe.q": 1.0}, method=name, audit="off", **setting
         ).stats
     else:
-        stats = ephs.simulate(ephs.load(ROOT / f"scenes/{scene}.toml"), 0.4, method=name, audit="off", **setting).stats
+        stats = ephs.simulate(shipped(scene), 0.4, method=name, audit="off", **setting).stats
     return {key: stats[key] for key in COUNTED if key in stats}
 
 

@@ -192,17 +192,18 @@ ANYTHING = st.recursive(
 )
 
 
-def _places(value, here=()):
+def places_in(value, here=()):
+    """Keys that lead to each value inside."""
     yield here
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, inner in items:
-        yield from _places(inner, (*here, key))
+        yield from places_in(inner, (*here, key))
 
 
 @given(patterns(), ANYTHING, st.data())
 def test_a_damaged_document_is_read_or_refused(f, junk, data):
     document = json.loads(f.to_json())
-    *way, last = data.draw(st.sampled_from([place for place in _places(document) if place]))
+    *way, last = data.draw(st.sampled_from([place for place in places_in(document) if place]))
     spot = document
     for key in way:
         spot = spot[key]

@@ -13,6 +13,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.meaning import Instant
 from ephs.semantics.spaces.rank import ELIMINATION, TINY, rank_of
+from tests.numerics import largest
 
 
 @final
@@ -72,7 +73,7 @@ class Subspace:
         """Largest entry of the difference of the orthogonal projectors: 0 if equal, of order 1 if not."""
         if self.ambient != other.ambient:
             raise ValueError(f"subspaces of ℝ^{self.ambient} and ℝ^{other.ambient} cannot be compared")
-        return float(np.abs(self.projector - other.projector).max(initial=0.0))
+        return float(largest(self.projector - other.projector, initial=0.0))
 
     def contains(self, vector: Array) -> float:
         """Distance of a vector from the subspace, relative to its length."""

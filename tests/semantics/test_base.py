@@ -14,6 +14,7 @@ from ephs.semantics.meaning.step import solved as solve
 from ephs.semantics.primitives.behaviour import NaturalBehaviour
 from ephs.semantics.spaces import SE3
 from ephs.semantics.systems.laws import random_probe, system_law
+from tests.numerics import EPS
 
 ROTATION = np.array([[0.0, -1.0], [1.0, 0.0]])
 READER = ephs.gyrator(
@@ -109,7 +110,7 @@ def test_two_rotations_are_one_state_up_to_sign_and_rounding():
 def test_values_are_equal_up_to_rounding_of_their_size():
     system = TWICE["on one junction"]
     for value, sign in ((1.0, 1.0), (0.0, 1.0), (1000.0, -1.0)):
-        near, far = (value + sign * k * np.finfo(float).eps * max(1.0, value) for k in (6.0, 12.0))
+        near, far = (value + sign * k * EPS * max(1.0, value) for k in (6.0, 12.0))
         assert not both(system, {"s.q": value, "t.q": near}).contradiction
         assert both(system, {"s.q": value, "t.q": far}).contradiction
 

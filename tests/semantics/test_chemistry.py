@@ -15,9 +15,10 @@ from ephs.operad import quantity as Q
 from ephs.semantics.library import chemistry
 from ephs.semantics.library.chemistry import Species
 from ephs.semantics.systems.report import check_system
+from tests.numerics import EPS, largest
 
 R = 8.31446261815324
-EPS = float(np.finfo(float).eps)
+
 GASES = (
     Species("A", {"X": 1}, energy=1e3, entropy=10.0, capacity=20.0),
     Species("B", {"X": 2}, energy=-2e3, entropy=15.0, capacity=45.0),
@@ -139,11 +140,11 @@ def looked_at(sol, constant_of_temperature, mixture, volume=None):
     """Of a run: atoms, entropy in every step; and at its end the quotient of the reaction over its constant, and θ."""
     a, b = sol["mixture.A"], sol["mixture.B"]
     atoms = a + 2.0 * b
-    assert np.abs(atoms - atoms[0]).max() <= 8 * EPS * len(atoms) * atoms[0]
+    assert largest(atoms - atoms[0]) <= 8 * EPS * len(atoms) * atoms[0]
     made = np.diff(sol["mixture.s"])
     moving = np.abs(np.diff(a)) > 1e-6 * atoms[0]
     assert made[moving].min() > 0.0 and made.min() >= -8 * EPS * abs(sol["mixture.s"][-1])
-    assert np.abs(sol.energy - sol.energy[0]).max() <= 1e-12 * np.abs(sol.energy).max() * len(atoms)
+    assert largest(sol.energy - sol.energy[0]) <= 1e-12 * largest(sol.energy) * len(atoms)
     x = {port: np.array([sol[f"mixture.{port}"][-1]]) for port in mixture.bundle.ports}
     temperature = float(mixture.energy_gradient(x)[mixture.bundle.ports.index(Path.of("s"))])
     size = volume or a[-1] + b[-1]

@@ -11,9 +11,8 @@ from ephs import Pattern, Reference, simulate
 from ephs import library as lib
 from ephs.operad.units import dimension, effort_unit, flow_unit
 from ephs.semantics.library import chemistry
+from tests.numerics import EPS, largest
 from tests.semantics.test_primitives import ARGUMENTS
-
-EPS = float(np.finfo(float).eps)
 
 
 @given(st.floats(-4.0, 4.0))
@@ -66,8 +65,8 @@ def test_a_pipe_swings_between_tanks_and_loses_to_heat():
     expected = 2.0 * level + (3.0 - 2.0 * level) * np.cos(angle * np.arange(len(free)))
     assert np.allclose(free["tank1.v"], expected, rtol=1e-10)
     for sol in (free, slow):
-        assert np.abs(sol["tank1.v"] + sol["tank2.v"] - 3.5).max() <= 1e-12
-        assert np.abs(sol.energy - sol.energy[0]).max() <= 1e-11 * sol.energy[0]
+        assert largest(sol["tank1.v"] + sol["tank2.v"] - 3.5) <= 1e-12
+        assert largest(sol.energy - sol.energy[0]) <= 1e-11 * sol.energy[0]
     assert np.diff(slow["room.s"]).min() > 0.0 and slow.exergy[-1] < slow.exergy[0]
     assert tanks(lib.orifice(c=1e-3, transition=10.0)).check(state={"tank1.v": 3.0, "tank2.v": 0.5}).ok
 
@@ -138,12 +137,10 @@ def defect(name, units, scales, seed):
             found, expected = row_there * efforts, row
             k = int(np.argmax(np.abs(expected)))
             pairs.append((expected * (found[k] / expected[k]), found))
-    size = max([1e-300, *(float(np.abs(a).max(initial=0.0)) for a, _ in pairs)])
+    size = max([1e-300, *(float(largest(a, initial=0.0)) for a, _ in pairs)])
     return (
         max(
-            float(np.abs(a - b).max(initial=0.0)) / max(float(np.abs(a).max(initial=0.0)), 1e-300)
-            for a, b in pairs
-            if a.size
+            float(largest(a - b, initial=0.0)) / max(float(largest(a, initial=0.0)), 1e-300) for a, b in pairs if a.size
         )
         if size > 1e-300
         else 0.0

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs import quantity as Q
 from ephs.semantics import StructureError
+from tests.numerics import generators
 
 PORTS = {"q": Q.displacement, "p": Q.momentum, "c": Q.charge, "b": Q.flux_linkage}
 PARITY = np.array([1.0, -1.0, 1.0, -1.0])
@@ -74,10 +75,9 @@ def test_sums_are_read_in_decimals():
 
 
 @settings(max_examples=100)
-@given(st.integers(0, 2**32 - 1), sizes)
-def test_products_of_matrices_are_never_refuted(seed, size):
+@given(generators, sizes)
+def test_products_of_matrices_are_never_refuted(rng, size):
     """T J Tᵀ is skew but for rounding, among numbers of the same units."""
-    rng = np.random.default_rng(seed)
     ports = {"q": Q.relative_pose("planar"), "p": Q.joint_momentum("planar")}
     turn = np.kron(np.eye(2), rng.standard_normal((3, 3)))
     matrix = size * turn @ np.kron([[0.0, -1.0], [1.0, 0.0]], np.eye(3)) @ turn.T
@@ -85,10 +85,9 @@ def test_products_of_matrices_are_never_refuted(seed, size):
     assert {c.statement for c in found.open} <= {"L + Lᵀ = 0"}
 
 
-@given(st.integers(0, 2**32 - 1))
-def test_constraints_that_mix_parities_are_compared_as_relations(seed):
+@given(generators)
+def test_constraints_that_mix_parities_are_compared_as_relations(rng):
     """Rows (1, 1, 1, 1) and (1, −1, 1, −1) span what is even and what is odd; one of them alone does not."""
-    rng = np.random.default_rng(seed)
     basis = np.array([[1.0, 0.0, rng.integers(1, 9), 0.0], [0.0, rng.integers(1, 9), 0.0, 1.0]])
     rows = np.array([[1.0, 1.0], [1.0, -1.0]]) @ basis
     found = ephs.constraint(PORTS, rows).verdict

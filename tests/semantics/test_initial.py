@@ -14,9 +14,10 @@ from ephs.semantics import Storage
 from ephs.semantics.systems.initial import read_state
 from ephs.semantics.verdicts.checks import random_point
 from ephs.testing import systems
+from tests.numerics import EPS, largest
 from tests.semantics.test_documents import MECHANICS, VALID
 
-ROUNDING = 8 * 7 * np.finfo(float).eps
+ROUNDING = 8 * 7 * EPS
 """Of a quaternion that is normalised, and what goes with it."""
 
 
@@ -37,11 +38,11 @@ def assert_starts(system, values):
     assert system.initial.keys() == values.keys()
     state = system.state()
     for path, value in values.items():
-        assert np.allclose(system.initial[path], value, rtol=0.0, atol=ROUNDING * np.abs(value).max())
+        assert np.allclose(system.initial[path], value, rtol=0.0, atol=ROUNDING * largest(value))
         assert np.array_equal(state[path], system.initial[path])
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(systems(max_depth=3), st.integers(0, 99))
 def test_systems_collect_what_their_storages_carry(system, seed):
     values, made = started(system, seed)
@@ -98,7 +99,7 @@ def test_a_run_goes_on_from_its_end():
     whole = ephs.simulate(system, 1.0, method="rk54", step=0.01)
     half = ephs.simulate(system, 0.5, method="rk54", step=0.01)
     rest = ephs.simulate(system.at(half, 0.5), 1.0, t0=0.5, method="rk54", step=0.01)
-    assert np.allclose(rest["spring.q"], whole["spring.q"][50:], rtol=0.0, atol=8 * 400 * np.finfo(float).eps * 2.0)
+    assert np.allclose(rest["spring.q"], whole["spring.q"][50:], rtol=0.0, atol=8 * 400 * EPS * 2.0)
     with pytest.raises(AssemblyError, match=r"no state at 0\.7 s; it has times from 0\.0 to 0\.5 s"):
         system.at(half, 0.7)
 

@@ -23,10 +23,11 @@ from ephs.testing import (
     patterns,
     systems,
 )
+from tests.numerics import largest
 
 # A system holds many draws; what is slow is the plain solver, which is the point.
 # Relations of whole hierarchies are composed and compared: what Hypothesis deems slow and large is meant here.
-patient = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large], deadline=None)
+patient = settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 few = settings(patient, max_examples=10)
 seeds = st.integers(0, 2**16)
 
@@ -129,7 +130,7 @@ def test_drawn_systems_move_and_dissipate():
         probe = random_probe(system, seed)
         _, solved = step(system, probe.state, probe.h, probe.reference, probe.inputs)
         steps.append(solved.residual < 1e-9)
-        motions.append(sum(np.abs(rate).max() > 1e-9 for rate in solved.rates.values()) >= 3)
+        motions.append(sum(largest(rate) > 1e-9 for rate in solved.rates.values()) >= 3)
         entropies = [path for path, of in system.states.items() if of.kind == "entropy"]
         heats.append(sum(float(solved.rates[path][0]) for path in entropies) > 1e-12)
 

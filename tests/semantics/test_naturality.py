@@ -15,10 +15,11 @@ from ephs.semantics.meaning.step import solved as solve
 from ephs.semantics.primitives.behaviour import GRADIENTS, NaturalBehaviour
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
+from tests.numerics import EPS, largest
 
 REFERENCE = Reference()
 K, CUBIC, M, D = 1.0, 2.0, 1.3, 0.4
-ROUNDING = float(np.finfo(float).eps)
+ROUNDING = EPS
 
 DUFFING = Pattern.from_text("q: displacement; p: momentum; s: entropy; pe(q); ke(p); pkc(q, p); mf(p, s); env(s)")(
     pe=ephs.storage({"q": Q.displacement}, lambda q: 0.5 * K * q**2 + 0.25 * CUBIC * q**4),
@@ -39,11 +40,11 @@ def test_flatten_then_discretise_is_discretise_then_compose(gradient, system, se
     flat, nested = (solve(each, probe.state, behaviour, probe.inputs) for each in (system.flatten(), system))
     if max(flat.residual, nested.residual) > 1e-6:
         return  # a random state may contradict a constraint: then there is no step
-    scale = max([1.0, *(float(np.abs(w).max(initial=0.0)) for w in flat.rates.values())])
+    scale = max([1.0, *(float(largest(w, initial=0.0)) for w in flat.rates.values())])
     for path, rate in flat.rates.items():
         # two Newton iterations in different unknowns: condition 10⁴ times the rounding of an evaluation
         allowed = 1e4 * 8.0 * ROUNDING * scale + flat.rounding + nested.rounding
-        assert np.abs(rate - nested.rates[path]).max(initial=0.0) <= allowed
+        assert largest(rate - nested.rates[path], initial=0.0) <= allowed
 
 
 def duffing(x):
@@ -68,7 +69,7 @@ def composed(h, gradient):
 
 @pytest.mark.parametrize("h", [0.1, 0.05, 0.025])
 def test_the_midpoint_rule_may_be_applied_before_or_after_elimination(h):
-    assert np.abs(composed(h, "midpoint") - midpoint(duffing, START, h)).max() <= 1e-15
+    assert largest(composed(h, "midpoint") - midpoint(duffing, START, h)) <= 1e-15
 
 
 def test_the_average_gradient_of_the_parts_is_that_of_the_whole():
@@ -91,4 +92,4 @@ def test_the_average_gradient_of_the_parts_is_that_of_the_whole():
     average = sum(
         0.5 * w * np.array([K * x[0] + CUBIC * x[0] ** 3, x[1] / M]) for w, x in zip(weights, points, strict=True)
     )
-    assert np.abs(average - of_parts("average")).max() <= 4.0 * ROUNDING * np.abs(average).max()
+    assert largest(average - of_parts("average")) <= 4.0 * ROUNDING * largest(average)

@@ -14,7 +14,9 @@ from ephs.semantics import Reference, StructureError, library
 from ephs.semantics.bundles.bundle import Bundle
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
+from tests.numerics import largest, seeds
 from tests.semantics.subspace import dirac
+from tests.semantics.zoo import PS, QP, friction_matrix
 
 GASES = (
     library.chemistry.Species("A", {"X": 1}, energy=1e3, entropy=10.0, capacity=20.0),
@@ -32,7 +34,6 @@ ARGUMENTS = {
     "rotational_friction": {"d": 0.3}, "rotor": {"j": 0.1}, "series_springs": {}, "spring": {"k": 1.5},
     "thermal_capacity": {"c1": 3e4, "c2": 100.0},
 }  # fmt: skip
-seeds = st.integers(0, 2**20)
 
 
 @cache
@@ -75,7 +76,7 @@ def _conditions(primitive, rng):
         form = np.block([[np.zeros((n, n)), np.eye(n)], [np.eye(n), np.zeros((n, n))]])
         subspace = dirac(skew, constraint)
         assert subspace.dimension == n
-        assert np.abs(subspace.basis.T @ form @ subspace.basis).max(initial=0.0) <= 1e-13
+        assert largest(subspace.basis.T @ form @ subspace.basis, initial=0.0) <= 1e-13
         for kind in bundle.charges:
             terms = np.abs(skew) @ drawn + np.abs(constraint.T) @ np.abs(lam)
             assert abs(bundle.indicator(kind) @ f) <= 1e-13 * max(float(terms.sum()), 1e-300)
@@ -97,7 +98,7 @@ def _conditions(primitive, rng):
         assert abs(rise - gradient @ v) <= 1e-13 * max(scale, 1e-300)
         back = primitive.discrete_effort(primitive.retract(x, v), -v, reference)
         here = primitive.discrete_effort(x, v, reference)
-        assert np.abs(here - back).max() <= 1e-9 * max(1.0, np.abs(here).max())
+        assert largest(here - back) <= 1e-9 * max(1.0, largest(here))
 
 
 @given(
@@ -163,17 +164,13 @@ def test_parameters_out_of_range_are_named(name, arguments, key):
         getattr(library, name)(**arguments)
 
 
-QP = {"q": Q.displacement, "p": Q.momentum}
-PS = {"p": Q.momentum, "s": Q.entropy}
-
-
 def test_what_one_makes_oneself_is_what_the_library_makes():
     mine = {
         "spring": ephs.storage({"q": Q.displacement}, lambda q: 0.75 * q * q, lambda q: [1.5 * q]),
         "pkc": ephs.gyrator(QP, [[0.0, -1.0], [1.0, 0.0]]),
         "lever": ephs.transformer({"q1": Q.displacement, "q2": Q.displacement}, [[2.5]]),
         "rigid_link": ephs.constraint({"p": Q.momentum, "p2": Q.momentum}, [[1.0, -1.0]]),
-        "friction": ephs.irreversible(PS, lambda p, s: 0.2 * np.array([[s, -p], [-p, p * p / s]])),
+        "friction": ephs.irreversible(PS, lambda p, s: 0.2 * friction_matrix(p, s)),
     }
     for name, primitive in mine.items():
         state = {str(port): 0.4 for port in primitive.reads}

@@ -3,7 +3,6 @@
 import math
 
 import mpmath
-import numpy as np
 import pytest
 import sympy as sp
 from hypothesis import given
@@ -12,8 +11,8 @@ from hypothesis import strategies as st
 from ephs.semantics.primitives.special import SHORT, log_mean, sinhc
 from ephs.semantics.symbols.functions import Sinhc, SinhcSlope
 from ephs.semantics.symbols.tracing import trace
+from tests.numerics import EPS
 
-EPS = float(np.finfo(float).eps)
 Z = sp.Symbol("z", real=True)
 SIZES = st.one_of(
     st.floats(-30.0, 30.0), st.floats(-2 * SHORT, 2 * SHORT), st.sampled_from([0.0, 1e-300, SHORT, -SHORT])

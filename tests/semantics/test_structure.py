@@ -24,7 +24,7 @@ from ephs.semantics.verdicts.proving import conditions_of
 from ephs.semantics.verdicts.verdict import Condition, StructureVerdict
 from ephs.testing import check_entropy_production, check_primitive
 from tests.semantics.test_primitives import ARGUMENTS, made
-from tests.semantics.zoo import AB, MALFORMED, QP, ZOO, conduct, drag, hidden, outer
+from tests.semantics.zoo import AB, MALFORMED, QP, ZOO, conduct, conduction_matrix, drag, hidden, outer
 
 FAR = 5e4
 """Beyond it, numbers are not of human size."""
@@ -251,7 +251,7 @@ def forged():
     honest = [True]
 
     def matrix(a, b):
-        return (1.0 if float(a) >= float(b) or honest[0] else -1.0) * np.array([[b / a, -1.0], [-1.0, a / b]])
+        return (1.0 if float(a) >= float(b) or honest[0] else -1.0) * conduction_matrix(a, b)
 
     made = ephs.irreversible(AB, matrix)
     honest[0] = False

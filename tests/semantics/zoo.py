@@ -16,14 +16,24 @@ AB = {"a": Q.entropy, "b": Q.entropy}
 ONE = power_ports(q=Q.displacement)
 
 
+def friction_matrix(p, s):
+    """M of friction with the coefficient 1."""
+    return np.array([[s, -p], [-p, p * p / s]])
+
+
+def conduction_matrix(a, b):
+    """M of heat conduction with the coefficient 1."""
+    return np.array([[b / a, -1.0], [-1.0, a / b]])
+
+
 def conduct(k):
     """Heat conduction with the coefficient k(a, b) of the two temperatures."""
-    return lambda: ephs.irreversible(AB, lambda a, b: k(a, b) * np.array([[b / a, -1.0], [-1.0, a / b]]))
+    return lambda: ephs.irreversible(AB, lambda a, b: k(a, b) * conduction_matrix(a, b))
 
 
 def drag(d):
     """Friction with the coefficient d(p, s) of velocity and temperature."""
-    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * np.array([[s, -p], [-p, p * p / s]]))
+    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * friction_matrix(p, s))
 
 
 def hidden(function):
@@ -49,7 +59,6 @@ ZOO = {
     # ---- the second law ------------------------------------------------------------------------------------------
     "conducts by a − b": (conduct(lambda a, b: a - b), "definite"),
     "conducts by a − b, hidden": (conduct(hidden(lambda a, b: a - b)), "definite"),
-    "conducts by the sign of a − b": (conduct(lambda a, b: np.sign(a - b)), "definite"),
     "conducts by the sign of a − b, hidden": (conduct(hidden(lambda a, b: math.copysign(1.0, a - b))), "definite"),
     "conducts backward when almost equal": (
         conduct(hidden(lambda a, b: -1.0 if 0.0 < abs(a - b) < 1e-4 * a else 1.0)), "definite"
@@ -66,12 +75,12 @@ ZOO = {
     "drives above a thousand kelvin": (drag(hidden(lambda p, s: 1.0 if s <= 1000.0 else -1.0)), "definite"),
     "drives in small volumes": (
         lambda: ephs.irreversible(
-            {**PS, "~v": Q.volume}, lambda p, s, v: (v - 0.2) * np.array([[s, -p], [-p, p * p / s]])
+            {**PS, "~v": Q.volume}, lambda p, s, v: (v - 0.2) * friction_matrix(p, s)
         ), "definite",
     ),
     "drives where x is negative": (
         lambda: ephs.irreversible(
-            {**PS, "~x": Q.displacement}, lambda p, s, x: x * np.array([[s, -p], [-p, p * p / s]])
+            {**PS, "~x": Q.displacement}, lambda p, s, x: x * friction_matrix(p, s)
         ), "definite",
     ),
     "three bodies, one pair wrong": (
@@ -82,30 +91,22 @@ ZOO = {
     ),
     "made friction": (lambda: structures.dissipation("w", power_ports(**PS), np.array([[-1.0]])), "definite"),
     # ---- symmetry and the first law ------------------------------------------------------------------------------
-    "not symmetric": (lambda: ephs.irreversible(PS, lambda p, s: [[s, -p], [0.0, p * p / s]]), "symmetry"),
     "not symmetric when hot": (
         lambda: ephs.irreversible(
             AB, lambda a, b: [[b / a, -1.0], [-1.0 - (1.0 if a > 300.0 else 0.0), a / b]]
         ), "symmetry",
     ),
-    "loses energy": (lambda: ephs.irreversible(PS, lambda p, s: [[s, 0.0], [0.0, 0.0]]), "energy"),
-    "loses a tenth": (lambda: ephs.irreversible(PS, lambda p, s: [[s, -p], [-p, 1.1 * p * p / s]]), "energy"),
     "loses energy at x = 3": (
         lambda: ephs.irreversible(
             {**PS, "~x": Q.displacement}, lambda p, s, x: [[s, -p], [-p, p * p / s + np.exp(-50.0 * (x - 3.0) ** 2)]]
         ), "energy",
     ),
-    "makes volume of heat": (
-        lambda: ephs.irreversible({"v": Q.volume, "s": Q.entropy}, lambda v, s: [[s * s, -s * v], [-s * v, v * v]]),
-        "conservation",
-    ),
     "time's arrow": (
         lambda: ephs.irreversible({**QP, "s": Q.entropy}, lambda p, q, s: outer([s, s, -p - q])), "parity"
     ),
-    "friction with a direction": (drag(lambda p, s: 2.0 + np.tanh(p)), "parity"),
     "friction tells quaternions apart": (
         lambda: ephs.irreversible(
-            PS | {"~q": Q.pose}, lambda p, s, q: (2.0 + q[1]) * np.array([[s, -p], [-p, p * p / s]])
+            PS | {"~q": Q.pose}, lambda p, s, q: (2.0 + q[1]) * friction_matrix(p, s)
         ), "rotation-sign",
     ),
     "a class of one's own": (
@@ -114,20 +115,12 @@ ZOO = {
     # ---- Dirac structures ----------------------------------------------------------------------------------------
     "not skew": (lambda: ephs.gyrator(QP, [[0.0, 1.0], [1.0, 0.0]]), "isotropy"),
     "a bump at x = 3": (twisted(lambda x: np.exp(-100.0 * (x - 3.0) ** 2)), "isotropy"),
-    "a bump at x = 3, hidden": (twisted(hidden(lambda x: 1e-3 if 2.99 < x < 3.01 else 0.0)), "isotropy"),
     "not skew beyond a thousand": (twisted(hidden(lambda x: float(x > 1000.0))), "isotropy"),
     "not skew for small negative x": (twisted(hidden(lambda x: float(-1e-3 < x < 0.0))), "isotropy"),
-    "creates entropy": (lambda: ephs.gyrator(PS, [[0.0, 1.0], [-1.0, 0.0]]), "conservation"),
-    "makes volume": (
-        lambda: ephs.gyrator({"v": Q.volume, "p": Q.momentum}, [[0.0, -1.0], [1.0, 0.0]]), "conservation"
-    ),
     "creates entropy at x = 3": (
         lambda: ephs.gyrator(
             {**PS, "~x": Q.displacement}, lambda x: (x == 3.0) * np.array([[0.0, 1.0], [-1.0, 0.0]])
         ), "conservation",
-    ),
-    "odd gyrator": (
-        lambda: ephs.gyrator({"p": Q.momentum, "b": Q.flux_linkage}, [[0.0, 1.0], [-1.0, 0.0]]), "parity"
     ),
     "gyrator of an even state": (
         lambda: ephs.gyrator(
@@ -136,7 +129,6 @@ ZOO = {
     ),
     "constraint on entropy": (lambda: ephs.constraint(PS, [[0.0, 1.0]]), "conservation"),
     "mixed constraint": (lambda: ephs.constraint(QP, [[1.0, 1.0]]), "parity"),
-    "doubles entropy": (lambda: ephs.transformer({"s": Q.entropy, "s2": Q.entropy}, [[2.0]]), "conservation"),
     "odd transformer": (lambda: ephs.transformer(QP, [[1.0]]), "parity"),
     "constraint tells quaternions apart": (
         lambda: ephs.constraint({"p": Q.momentum, "p2": Q.momentum, "~q": Q.pose}, lambda q: [[1.0, q[1]]]),
@@ -148,8 +140,6 @@ ZOO = {
     # ---- energies ------------------------------------------------------------------------------------------------
     "odd energy": (stored("p", Q.momentum, lambda p: p), "even"),
     "odd beyond a hundred": (stored("p", Q.momentum, lambda p: float(p) ** 2 + (p > 100.0)), "even"),
-    "odd magnetic energy": (stored("b", Q.flux_linkage, lambda b: b**2 + 0.01 * b**3), "even"),
-    "wrong gradient": (stored("q", Q.displacement, lambda q: q**2, lambda q: [q]), "gradient"),
     "gradient wrong for q < 0": (stored("q", Q.displacement, lambda q: q**2, lambda q: [2.0 * abs(q)]), "gradient"),
     "gradient wrong around q = 5": (
         stored("q", Q.displacement, lambda q: q**4, lambda q: [4.0 * q**3 + np.exp(-9.0 * (q - 5.0) ** 2)]), "gradient"
@@ -162,7 +152,6 @@ ZOO = {
     "negative temperature for s < −3, hidden": (
         stored("s", Q.entropy, lambda s: 300.0 * float(s) + 50.0 * float(s) ** 2), "cold"
     ),
-    "negative temperature for s > 1000": (stored("s", Q.entropy, lambda s: s - s**2 / 2000.0), "cold"),
     "temperature of zero": (stored("s", Q.entropy, lambda s: 3.0 + 0.0 * s), "cold"),
     "gas that is cold when thin": (
         lambda: ephs.storage({"s": Q.entropy, "v": Q.volume}, lambda s, v: np.exp(s) * (20.0 - v)), "cold"

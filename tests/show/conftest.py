@@ -6,6 +6,7 @@ import pytest
 
 import ephs
 from tests.oscillator import damped_oscillator
+from tests.scenes import shipped
 
 
 @final
@@ -27,4 +28,4 @@ def circuit() -> ephs.Solution:
 
 @pytest.fixture(scope="session")
 def crank() -> ephs.Solution:
-    return ephs.simulate(ephs.load("scenes/slider-crank.toml"), 0.5, step=5e-3)
+    return ephs.simulate(shipped("slider-crank"), 0.5, step=5e-3)

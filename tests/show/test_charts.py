@@ -3,7 +3,6 @@
 import csv
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,8 +25,8 @@ from ephs.show.charts.outcomes import BOUND, ENERGY, RIGHT, horizon, judge
 from ephs.show.charts.reasons import letter_of, reason_of, reasons, reasons_table
 from ephs.show.charts.reference import PosesInTime
 from ephs.show.charts.runs import RunEnding, RunSetting, attempt
+from tests.scenes import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 TOP = ROOT / "scenes/heavy-top.toml"
 T = np.linspace(0.0, 10.0, 101)
 

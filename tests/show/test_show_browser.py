@@ -8,6 +8,7 @@ import pytest
 
 import ephs
 from ephs.show import animate, write_report
+from tests.scenes import shipped
 from tests.show.browser import Tab, opened
 
 LOCAL = ("file:", "data:", "blob:", "about:")
@@ -15,7 +16,7 @@ LOCAL = ("file:", "data:", "blob:", "about:")
 
 @pytest.fixture(scope="module")
 def crank() -> ephs.Solution:
-    return ephs.simulate(ephs.load("scenes/slider-crank.toml"), 2.0, step=5e-3)
+    return ephs.simulate(shipped("slider-crank"), 2.0, step=5e-3)
 
 
 def drawn(pixels: np.ndarray) -> np.ndarray:

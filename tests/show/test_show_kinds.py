@@ -13,6 +13,7 @@ from ephs.semantics import library as lib
 from ephs.show import ShowError, plot, plot_mechanism, plot_motion, plot_phase, plot_wrenches
 from ephs.show.kinds import KINDS
 from ephs.show.shared.palette import CYCLE, dashes
+from tests.scenes import shipped
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +106,7 @@ def test_wrenches_are_those_of_the_solution(crank):
 
 
 def test_indeterminate_components_are_named():
-    sol = ephs.simulate(ephs.load("scenes/four-bar.toml"), 0.05, step=0.01)
+    sol = ephs.simulate(shipped("four-bar"), 0.05, step=0.01)
     titles = [axes.get_title(loc="right") for axes in plot_wrenches(sol).axes]
     assert titles[:2] == ["z indeterminate", "x, y indeterminate"]
 

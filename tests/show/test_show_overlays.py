@@ -14,6 +14,7 @@ from ephs.show.motions.motion import between_instants, film, nearest
 from ephs.show.motions.overlays import Tones, loads_of, shades_of, tint
 from ephs.show.motions.solids import Solid, box, cylinder, solid_of, sphere
 from ephs.show.motions.stage import stage_of
+from tests.scenes import shipped
 
 BENT = """
 format = 1
@@ -126,7 +127,7 @@ def legend(page):
 
 
 def test_what_is_indeterminate_has_no_arrow():
-    sol = ephs.simulate(ephs.load("scenes/four-bar.toml"), 0.02, step=0.01)
+    sol = ephs.simulate(shipped("four-bar"), 0.02, step=0.01)
     joints = dict(sol.scene.all_joints())
     loads = loads_of(sol, film(sol, list(sol.scene.bodies), 30.0, None), joints)
     assert set(loads.loose) == set(joints)
@@ -210,7 +211,7 @@ def test_the_nearest_instant_is_found_forward_and_backward(times, backward, at):
 
 
 def test_a_run_backward_plays_backward(tmp_path):
-    scene = ephs.load("scenes/heavy-top.toml")
+    scene = shipped("heavy-top")
     sol = ephs.simulate(scene, -0.2, step=None, rtol=1e-8)
     name = next(iter(scene.bodies))
     frames = film(sol, [name], 30.0, None)

@@ -3,7 +3,6 @@
 import base64
 import json
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,9 +23,9 @@ from ephs.show import (
 from ephs.show.plots.panels import Curve, Panel
 from ephs.show.plots.series import ANGLE, motion_lines, thinned, within_a_turn
 from ephs.show.plots.signals import MOST, PanelGroup, packed
+from tests.scenes import shipped
 from tests.show.conftest import Altered
 
-ROOT = Path(__file__).resolve().parents[2]
 PLOTS = (plot_motion, plot_energy, plot_exergy, plot_entropy, plot_constraints)
 
 
@@ -123,7 +122,7 @@ def test_angles_within_a_turn_differ_by_whole_turns_and_lines_end_where_they_jum
 
 @pytest.mark.parametrize(("until", "round"), [(5.0, True), (0.2, False)])
 def test_only_angles_that_go_round_are_drawn_within_a_turn(until, round):
-    sol = ephs.simulate(ephs.load(ROOT / "scenes/slider-crank.toml"), until)
+    sol = ephs.simulate(shipped("slider-crank"), until)
     angles = dict(motion_lines(sol)[ANGLE])
     whole = sol.joint("bearing").coordinate[:, 0]
     assert (np.abs(whole).max() > 2.0 * np.pi) == round

@@ -1,6 +1,5 @@
 """Schematics as SVG: every mark and every name, within the frame."""
 
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,8 +15,7 @@ from ephs.show.motions.sketch import sketch
 from ephs.show.motions.solids import Solid, coarse
 from ephs.show.motions.stage import stage_of
 from ephs.show.motions.still import HIGHEST, WIDTH, still_svg
-
-SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
+from tests.scenes import SCENES
 
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)

@@ -3,7 +3,6 @@
 import json
 from contextlib import contextmanager
 from http.client import HTTPConnection
-from pathlib import Path
 from threading import Thread
 
 import numpy as np
@@ -11,8 +10,8 @@ import pytest
 
 import ephs
 from ephs.show.motions.viewer import Posed, served
+from tests.scenes import shipped
 
-ROOT = Path(__file__).resolve().parents[2]
 URDF = """<robot name="arm"><link name="base"/>
 <link name="rod"><inertial><mass value="1"/><origin xyz="0.5 0 0"/>
 <inertia ixx="0.01" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -23,7 +22,7 @@ URDF = """<robot name="arm"><link name="base"/>
 @contextmanager
 def serving(scene):
     """What is posed, and the port of its server."""
-    posed = Posed(ephs.load(ROOT / "scenes" / f"{scene}.toml"), ephs.load)
+    posed = Posed(shipped(scene), ephs.load)
     server = served(posed)
     Thread(target=server.serve_forever, daemon=True).start()
     try:

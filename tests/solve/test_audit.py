@@ -20,6 +20,9 @@ from ephs.solve.posing.breakpoints import MOST_FOUND
 from ephs.solve.running import ending
 from ephs.solve.running.control import Control, Tolerance
 from examples.failing import oscillator, pendulum
+from tests.methods import FIXED_OF_SCENES
+from tests.numerics import EPS, largest
+from tests.written import scene_of_text
 
 BRAKE = "friction = 20.0"
 TIGHT = Bounds(0.0, 0.005, lawful=True)
@@ -214,10 +217,8 @@ def test_a_solution_without_audit_passes_and_prints():
 def test_heat_that_conducts_is_no_finding():
     """Nothing moves: the scale is that of the energies exchanged."""
     hot = lib.thermal_capacity(c1=293.15, c2=1.0)
-    system = ephs.Pattern(
-        junctions={"a": ephs.junction(ephs.quantity.entropy), "b": ephs.junction(ephs.quantity.entropy)},
-        boxes={"one": {"s": "a"}, "other": {"s": "b"}, "bridge": {"s1": "a", "s2": "b"}},
-    )(one=hot, other=hot, bridge=lib.heat_transfer(h=0.5))
+    pattern = ephs.Pattern.from_text("a: entropy; b: entropy; one(s=a); other(s=b); bridge(s1=a, s2=b)")
+    system = pattern(one=hot, other=hot, bridge=lib.heat_transfer(h=0.5))
     for options in ({"method": "radau"}, {"step": 0.05}):
         sol = ephs.simulate(system, 1.0, initial={"one.s": 0.1}, **options)
         assert sol.audit.passed, sol.audit
@@ -278,7 +279,7 @@ def test_the_estimate_is_that_of_an_oscillation(method, order, step):
     assert sizes[0] < 0.01
 
 
-@pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.fixed and method.scenes])
+@pytest.mark.parametrize("name", FIXED_OF_SCENES)
 def test_the_error_of_constant_steps_is_estimated_for_every_method(name, monkeypatch):
     """Of a spring's oscillation it is C (hω)ᵖ of what a step moves, or less; at hω = 2 to 5 the run does not pass."""
     found, order = [], METHODS[name].order
@@ -310,8 +311,8 @@ def test_members_of_a_sweep_say_what_was_found():
 def test_entropies_of_radau_are_sums_of_what_is_made(rtol):
     sol = ephs.simulate(brake(), 2.0, method="radau", rtol=rtol)
     ledgers = sol.ledgers
-    rounding = 8.0 * len(sol) * np.finfo(float).eps * ledgers.made[-1]
-    assert np.abs(ledgers.entropy - ledgers.entropy[0] - ledgers.made).max() <= rounding
+    rounding = 8.0 * len(sol) * EPS * ledgers.made[-1]
+    assert largest(ledgers.entropy - ledgers.entropy[0] - ledgers.made) <= rounding
     assert np.diff(ledgers.entropy).min() >= -rounding
 
 
@@ -337,10 +338,8 @@ stiffness = 1e6
 
 @pytest.mark.parametrize("options", [{"step": 1e-3}, {}])
 @pytest.mark.parametrize("far", [2.0, 1000.0])
-def test_what_rests_is_not_held_to_the_energy_of_its_rounding(far, options, tmp_path, monkeypatch):
-    file = tmp_path / "resting.toml"
-    file.write_text(RESTING.replace("FAR", repr(far)).replace("ORIGIN", repr(far - 1.0)))
-    scene = ephs.load(file)
+def test_what_rests_is_not_held_to_the_energy_of_its_rounding(far, options, monkeypatch):
+    scene = scene_of_text(RESTING.replace("FAR", repr(far)).replace("ORIGIN", repr(far - 1.0)))
     assert ephs.simulate(scene, 0.1, method="natural4", **options).audit.passed
     for module in (rounding, auditing):
         monkeypatch.setattr(module, "trembling", lambda _: 0.0)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 import ephs
 from ephs.solve.running.control import Symmetric
 from examples.failing import scene
+from tests.numerics import EPS
 
 RATE, ENERGY, WARM = 100.0, 5000.0, 300.0
-EPS = float(np.finfo(float).eps)
 
 
 def brake(friction, capacity=None):
@@ -38,7 +38,7 @@ def brake(friction, capacity=None):
     )
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     method=st.sampled_from(["natural", "natural4"]),
     friction=st.sampled_from([20.0, 1e3, 1e6]),

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods.registry import METHODS
 from ephs.solve.auditing.audit import COARSE, MOTION
 from examples.failing import pendulum, scene, slide
+from tests.methods import FIXED_OF_SCENES, OF_SCENES
 
 RATE, SPEED, STEPS = 20.0, 3.0, 20
 """Of the motions in 1/s; at the start in m/s; in a run."""
-CONSTANT = [name for name, method in METHODS.items() if method.fixed and method.scenes]
 DRIVEN = [(0.7, 11.0), (-2.0, 15.0), (6.0, 6.0)]
 """Rates in rad/s of two axes one on another."""
 
@@ -72,7 +71,7 @@ def models() -> dict[str, ephs.Scene]:
 
 
 @pytest.mark.parametrize("kind", list(models()))
-@pytest.mark.parametrize("method", CONSTANT)
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
 def test_a_finding_says_an_error_and_an_error_is_found(kind, method):
     """Of steps from a hundredth of a time constant to a hundred; of prescribed motions up to half a radian."""
     kinds, rate = kind.split()[0], RATE
@@ -98,7 +97,7 @@ def test_a_finding_says_an_error_and_an_error_is_found(kind, method):
     assert kinds != "spring" or False in judged  # radau stops a block right at any length of steps
 
 
-@pytest.mark.parametrize("method", CONSTANT)
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
 def test_entropy_at_times_inside_steps_is_no_finding(method):
     """Times inside a step are ends of shorter ones from its start, and nothing goes on from there."""
     for friction, step in ((20.0, 0.05), (200.0, 0.02), (2000.0, 0.02)):
@@ -116,7 +115,7 @@ def test_entropy_at_times_inside_steps_is_no_finding(method):
 STOP = "limits = [-1.0, 0.6]\nlimit_restitution = 0.5"
 
 
-@pytest.mark.parametrize("method", [name for name, method in METHODS.items() if method.scenes])
+@pytest.mark.parametrize("method", OF_SCENES)
 @pytest.mark.parametrize("more", ["friction = 20.0", "friction = 2000.0", "stiffness = 400.0", STOP])
 def test_an_advice_names_another_method_that_accepts_the_model(method, more):
     for options in ({"step": 0.05}, {"rtol": 1e-2, "atol": 1e-2}):

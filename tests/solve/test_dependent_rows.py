@@ -1,7 +1,5 @@
 """Equations that loops repeat: which of them a step leaves out, and what long steps keep of them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,23 +10,24 @@ from scipy.sparse import csr_array
 import ephs
 from ephs import library
 from ephs import quantity as Q
-from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.analysis import dependent_rows, entangled, entries_at, exchanged
+from tests.numerics import EPS, generators, largest
+from tests.oscillator import free_oscillator
+from tests.scenes import model_of, shipped
+from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[2]
-BRICARD = ROOT / "scenes/bricard.toml"
 NAMES = ("a", "b", "c", "d", "e")
 
 
 @pytest.fixture(scope="module")
 def exact():
     """Positions after 5 s, in joint coordinates with another equation left out at every instant."""
-    sol = ephs.simulate(ephs.load(BRICARD), 5.0, method="rk87", rtol=1e-11, atol=1e-11, save_at=[0.0, 5.0])
+    sol = ephs.simulate(shipped("bricard"), 5.0, method="rk87", rtol=1e-11, atol=1e-11, save_at=[0.0, 5.0])
     return np.concatenate([sol.body(name).position[-1] for name in NAMES])
 
 
 def run(method, **options):
-    sol = ephs.simulate(ephs.load(BRICARD), 5.0, method=method, audit="off", **options)
+    sol = ephs.simulate(shipped("bricard"), 5.0, method=method, audit="off", **options)
     return sol, np.concatenate([sol.body(name).position[-1] for name in NAMES])
 
 
@@ -41,21 +40,21 @@ def test_long_steps_of_order_4_carry_a_linkage_of_special_geometry(exact):
     for step in (0.1, 0.05, 0.025, 0.0125):
         sol, found = run("natural4", step=step)
         assert sol.stats["cut_steps"] == 0
-        assert sol.energy_error.max() <= 10.0 * np.sqrt(5.0 / step) * 10.0 * np.finfo(float).eps
+        assert sol.energy_error.max() <= 10.0 * np.sqrt(5.0 / step) * 10.0 * EPS
         # ten roundings a step, times the condition of constraints that nearly repeat each other
-        assert sol.constraint_error.max() <= 10.0 * 100.0 * np.sqrt(5.0 / step) * np.finfo(float).eps
-        errors.append(np.abs(found - exact).max())
+        assert sol.constraint_error.max() <= 10.0 * 100.0 * np.sqrt(5.0 / step) * EPS
+        errors.append(largest(found - exact))
     assert errors[0] <= 1e-5
     assert np.all(np.array(errors[:-1]) >= 40.0 * np.array(errors[1:])), errors
 
 
 def test_chosen_steps_carry_it_too(exact):
     sol, found = run("natural4", rtol=1e-7, atol=1e-7)
-    assert np.abs(found - exact).max() <= 1e-6
+    assert largest(found - exact) <= 1e-6
     assert sol.stats["steps"] <= 100
 
 
-def ring(folder):
+def ring():
     """Six slender bars of 1 kg along edges of a cube of 1 m, each turning on the next about the axis that is left."""
     corners = [(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)]
     lines = ["format = 1", "[world]", "gravity = [0.0, -9.81, 0.0]"]
@@ -69,30 +68,28 @@ def ring(folder):
         axis = [float(i == (1, 2, 0)[k % 3]) for i in range(3)]
         lines += [f"[joints.j{k}]", "type = 'revolute'", f"bodies = ['{one}', '{two}']"]
         lines += [f"at = {list(map(float, corner))}", f"axis = {axis}"]
-    file = Path(folder, "ring.toml")
-    file.write_text("\n".join(lines), encoding="utf-8")
-    return ephs.load(file)
+    return scene_of_text("\n".join(lines))
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])
-def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishes(method, tmp_path):
+def test_an_omitted_equation_gives_way_before_its_part_of_the_dependence_vanishes(method):
     """The part of one joint's equation passes zero at 1.247 s; without another choice its gap would grow by 1e-9."""
-    scene = ring(tmp_path)
+    scene = ring()
     for step in (0.01, 0.002):
         sol = ephs.simulate(scene, 1.3, method=method, step=step)
-        rounding = np.sqrt(1.3 / step) * np.finfo(float).eps
+        rounding = np.sqrt(1.3 / step) * EPS
         assert sol.constraint_error.max() <= 10.0 * 100.0 * rounding
         assert sol.energy_error.max() <= 10.0 * 10.0 * rounding
         assert sol.stats["dependent_equations"] == 1
 
 
 @pytest.mark.parametrize("name", ["ring", "bricard", "four-bar", "n-four-bar", "slider-crank"])
-def test_rank_depends_on_no_step(name, tmp_path):
+def test_rank_depends_on_no_step(name):
     """Within a step that is not solved, loops are open by its third power: equations that depend seem not to."""
-    scene = ring(tmp_path) if name == "ring" else ephs.load(ROOT / f"scenes/{name}.toml")
+    scene = ring() if name == "ring" else shipped(name)
     sol = ephs.simulate(scene, 0.5, method="natural4", step=0.01, save_at=np.linspace(0.0, 0.5, 6))
     problem = sol.problem
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     rng, found = np.random.default_rng(7), set()
     for k in range(1, len(sol)):
         x = problem.descriptor.pack(sol.state_at(k))
@@ -102,11 +99,10 @@ def test_rank_depends_on_no_step(name, tmp_path):
     assert found == {sol.stats["dependent_equations"]}
 
 
-@settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 9), short=st.integers(1, 3))
-def test_what_is_left_out_depends_on_the_rest_and_is_of_the_preferred(seed, count, short):
+@settings(max_examples=50)
+@given(rng=generators, count=st.integers(2, 9), short=st.integers(1, 3))
+def test_what_is_left_out_depends_on_the_rest_and_is_of_the_preferred(rng, count, short):
     """Random rows of rank ``count − short``; the control takes the pivots' own choice, which asks no preference."""
-    rng = np.random.default_rng(seed)
     rank = max(1, count - short)
     rows = rng.standard_normal((count, rank)) @ rng.standard_normal((rank, count + 2))
     rows /= np.linalg.norm(rows, axis=1)[:, None]
@@ -131,11 +127,10 @@ def test_the_control_leaves_out_whatever_the_pivots_say():
     assert list(exchanged(triangle, pivots, 2, np.array([1.0, 1e-3, 1e-3]))) == [0]
 
 
-@settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), loops=st.integers(0, 3))
-def test_rows_with_an_effort_of_their_own_take_part_in_no_dependence(seed, loops):
+@settings(max_examples=50)
+@given(rng=generators, loops=st.integers(0, 3))
+def test_rows_with_an_effort_of_their_own_take_part_in_no_dependence(rng, loops):
     """A chain whose rows have two neighbours' efforts and one of their own, in any order, beside dependent rows."""
-    rng = np.random.default_rng(seed)
     count = 12
     chain = np.zeros((count, 2 * count + 1 + 3))
     for i in range(count):
@@ -159,18 +154,15 @@ METHODS = ("natural", "natural4", "rk54", "rk87", "radau", "auto", "variational"
 
 def oscillator(row=None):
     """A spring and a mass, and a constraint whose ports are all on the momentum's junction."""
-    boxes = {"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}}
-    parts = {"pe": library.spring(k=1.5), "ke": library.point_mass(m=1.0), "pkc": library.pkc()}
-    if row is not None:
-        boxes["row"] = {str(port): "p" if each.power else "~q" for port, each in row.interface.items()}
-        parts["row"] = row
-    return ephs.Pattern(junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum)}, boxes=boxes)(
-        **parts
-    )
+    if row is None:
+        return free_oscillator(k=1.5)
+    wires = ", ".join(f"{port}=p" if each.power else f"{port}=~q" for port, each in row.interface.items())
+    pattern = ephs.Pattern.from_text(f"q: displacement; p: momentum; pe(q); ke(p); pkc(q, p); row({wires})")
+    return pattern(pe=library.spring(k=1.5), ke=library.point_mass(m=1.0), pkc=library.pkc(), row=row)
 
 
 @pytest.mark.parametrize("method", METHODS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(entries=st.lists(st.floats(0.1, 1.0), min_size=1, max_size=3), data=st.data())
 def test_a_constraint_that_cancels_on_a_junction_but_for_rounding_holds_nothing(method, entries, data):
     """0 = Σ aᵢ e − (Σ aᵢ) e, rounded otherwise; the relation has no equation there either."""

@@ -1,7 +1,6 @@
 """Forecast of the work of a run: right for a motion that repeats itself, said once, and of long runs only."""
 
 import warnings
-from pathlib import Path
 
 import pytest
 
@@ -9,6 +8,7 @@ import ephs
 from ephs.solve.auditing import forecast
 from ephs.solve.auditing.forecast import Forecast
 from examples.failing import pendulum
+from tests.scenes import shipped
 
 SPRING = pendulum(1.0, "stiffness = 100.0")
 
@@ -26,7 +26,7 @@ def test_a_motion_that_repeats_itself_takes_what_was_forecast(method, rtol, monk
 
 
 def test_long_runs_are_told_after_their_first_steps():
-    scene = ephs.load(Path(__file__).resolve().parents[2] / "scenes/four-bar.toml")
+    scene = shipped("four-bar")
     with pytest.warns(ephs.CostWarning), pytest.raises(ephs.SimulationError, match="33"):
         ephs.simulate(scene, 2.0, method="natural", max_steps=33)
 

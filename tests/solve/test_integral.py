@@ -4,27 +4,19 @@ import numpy as np
 import pytest
 
 from benchmarks.cells import grid, ladder
-from ephs import Reference
-from ephs.semantics.descriptor.descriptor import Input, descriptor_of
 from ephs.semantics.descriptor.numbering import spans
-from ephs.solve.equations.model import compile_model, evaluate_at
+from ephs.solve.equations.model import evaluate_at
 from ephs.solve.march.control import Proportional
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.records import IRREVERSIBLE
 from examples import physics
+from tests.numerics import EPS, largest
+from tests.solve.test_energies import compiled
 
-ROUNDING = float(np.finfo(float).eps)
+ROUNDING = EPS
 SYSTEMS = {"ladder": ladder(4), "grid": grid(9), "motor": physics.motor, "cylinder": physics.cylinder}
 OTHERS = {"springs in series": physics.springs, "a rod": physics.masses, "a lever": physics.lever}
-
-
-def compiled(system):
-    """The model, an effort given at its first outer port and flows at the others, and the values there."""
-    ports = [(path, port.quantity.space.dim) for path, port in system.interface.items() if port.power]
-    given = {path: Input(np.full(dim, 0.3), i == 0) for i, (path, dim) in enumerate(ports)}
-    model = compile_model(descriptor_of(system.flatten()), Reference(), given)
-    return model, model.input_values()
 
 
 def state(model, seed):
@@ -51,7 +43,7 @@ def test_rates_and_all_else_solve_the_general_equations(name, seed):
     ports = spans(t.e_at[makers], t.dims[makers, 0])
     pairs = (found.sums, general.sums), (found.flows[ports], general.flows[ports]), (found.energies, general.energies)
     for one, other in pairs:
-        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13 * np.abs(other).max(initial=0.0))
+        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-13 * largest(other, initial=0.0))
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -64,7 +56,7 @@ def test_derivatives_are_those_of_the_rates(name):
         h = 1e-5 * max(abs(x[j]), 1e-2)
         up, down = (own.residuals((x + s * h * unit)[None], none, inputs[None])[0] for s in (1.0, -1.0))
         column = found.states.toarray()[:, j]
-        assert np.abs((up - down) / (2.0 * h) - column).max() <= 1e-6 * max(np.abs(column).max(), 1.0)
+        assert largest((up - down) / (2.0 * h) - column) <= 1e-6 * max(largest(column), 1.0)
     assert np.array_equal(found.unknowns.toarray(), np.eye(x.size))
 
 

@@ -21,9 +21,10 @@ from ephs.solve.running import journal
 from ephs.solve.running.journal import read_journal
 from examples.failures import runs
 from tests.mechanics.ball import BALL
+from tests.scenes import ROOT, shipped
+from tests.written import scene_of_text
 
-ROOT = Path(__file__).resolve().parents[2]
-SCENE = ephs.load(ROOT / "scenes/slider-crank.toml")
+SCENE = shipped("slider-crank")
 TIMES = np.linspace(0.0, 0.2, 23)
 LOOSE = {"rtol": 1e-4, "atol": 1e-6}
 RUNS = {
@@ -101,7 +102,7 @@ def copies(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp_path):
-    model = ephs.load(ROOT / "scenes/heavy-top.toml") if name == "backward" else SCENE
+    model = shipped("heavy-top") if name == "backward" else SCENE
     whole = simulate(model, RUNS[name])
     assert same(simulate(model, RUNS[name], journal=tmp_path / "run.journal"), whole)
     for copy in [copies[len(copies) // 3], copies[-2], copies[-1]]:
@@ -111,9 +112,7 @@ def test_a_run_goes_on_from_any_entry_to_the_very_same_numbers(name, copies, tmp
 
 
 def test_a_run_that_goes_from_method_to_method_goes_on_too(copies, tmp_path):
-    file = tmp_path / "ball.toml"
-    file.write_text(BALL.format(slip=1e-4), encoding="utf-8")
-    model, options = ephs.load(file), {"until": 0.8, "rtol": 1e-4}
+    model, options = scene_of_text(BALL.format(slip=1e-4)), {"until": 0.8, "rtol": 1e-4}
     whole = simulate(model, options)
     assert {"semi", "radau"} <= {switch["to"] for switch in whole.stats["switches"]}
     assert same(simulate(model, options, journal=tmp_path / "run.journal"), whole)
@@ -242,7 +241,7 @@ def test_another_runs_journal_is_refused_and_left_as_it_is(written):
     file, _ = written
     before = file.read_bytes()
     options = RUNS["natural, constant steps"]
-    heavier = ephs.load(ROOT / "scenes/heavy-top.toml")
+    heavier = shipped("heavy-top")
     for model, more, key in ((SCENE, {"until": 0.3}, "until"), (SCENE, {"step": 0.02}, "step"), (heavier, {}, "model")):
         with pytest.raises(ephs.OptionError, match=f"its {key} is"):
             simulate(model, {**options, **more}, journal=file)

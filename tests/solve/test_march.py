@@ -13,6 +13,7 @@ from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
 from ephs.solve.march import STEPS, Ending, MarchControl, Motion
 from ephs.solve.march.control import DAMPING, HELD, STRICT, UNFELT, Proportional, held_back, length
+from tests.numerics import EPS, largest
 from tests.solve.marching import Field, field, program, start
 
 
@@ -114,7 +115,7 @@ def test_an_orbit_closes(method):
     run = start(KEPLER["compiled"], method, ORBIT, 2.0 * np.pi, rtol=1e-11, atol=1e-11)
     assert run.advance(10_000) is Ending.DONE
     # The share of the tolerance adds up over the run; near the sun errors of place grow along the orbit.
-    assert np.abs(run.arrays["y"] - ORBIT).max() <= 1e3 * 1e-11
+    assert largest(run.arrays["y"] - ORBIT) <= 1e3 * 1e-11
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -131,7 +132,7 @@ def test_another_program_finds_the_same_motion(method, mu):
     )  # fmt: skip
     found, states = run.rows()
     assert np.array_equal(found, instants)
-    assert np.abs(states - other.y.T).max() <= 1e3 * 1e-10
+    assert largest(states - other.y.T) <= 1e3 * 1e-10
 
 
 @pytest.mark.parametrize(("method", "order", "steps"), [("rk54", 5, (40, 80)), ("rk87", 8, (10, 20))])
@@ -143,7 +144,7 @@ def test_orders_are_those_of_the_tableaux(method, order, steps):
         run = start(KEPLER["compiled"], method, ORBIT, 1.0, grid=1.0 / count)
         assert run.advance(1000) is Ending.DONE
         assert run.c.steps == count
-        errors.append(np.abs(run.arrays["y"] - exact.arrays["y"]).max())
+        errors.append(largest(run.arrays["y"] - exact.arrays["y"]))
     assert order - 0.5 <= np.log2(errors[0] / errors[1]) <= order + 1.0
 
 
@@ -213,7 +214,7 @@ def test_a_pendulum_takes_the_steps_of_a_mechanism(method):
         times, _ = run.rows()
         assert times == pytest.approx(sol.t[1:], rel=1e-4)
         moved = run.arrays["rows_q"][: len(times), 0] - 1.0
-        assert np.abs(moved - (angle[1:] - angle[0])).max() <= 1e-4 * 2.0 * np.sqrt(stiffness)
+        assert largest(moved - (angle[1:] - angle[0])) <= 1e-4 * 2.0 * np.sqrt(stiffness)
 
 
 @dataclass(frozen=True)
@@ -260,7 +261,7 @@ def test_backward_in_time_leads_back():
     there.advance(1000)
     back = start(KEPLER["compiled"], "rk87", there.arrays["y"], -3.0, rtol=1e-11, atol=1e-11, origin=3.0)
     assert back.advance(1000) is Ending.DONE
-    assert np.abs(back.arrays["y"] - ORBIT).max() <= 1e3 * 1e-11
+    assert largest(back.arrays["y"] - ORBIT) <= 1e3 * 1e-11
 
 
 @given(
@@ -283,7 +284,7 @@ def test_steps_are_judged_by_proportional_integral_control(h, error, before, fai
     c.before, c.failed, c.most_step = before, int(failed), np.inf
     assert bool(JUDGE(control, h, error)) == accepted
     # Powers by exponential and logarithm: each rounds by its argument, which is at most 40, times ε.
-    assert c.step == pytest.approx(following, rel=100.0 * np.finfo(float).eps)
+    assert c.step == pytest.approx(following, rel=100.0 * EPS)
     assert c.before == pytest.approx(max(shared, 1e-4) if accepted else before)
     assert bool(c.failed) == (not accepted)
     policy = Proportional(lambda: exponent, lambda: share)

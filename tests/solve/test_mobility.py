@@ -1,7 +1,5 @@
 """Counts of motions and redundant constraints: along the constraints as on one dense matrix."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given, settings
 
@@ -10,9 +8,10 @@ from benchmarks import families
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.solve.equations.mobility import mobility
 from ephs.testing import mechanisms
+from tests.scenes import ROOT, shipped
 from tests.solve.dense import dense_mobility
+from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[2]
 FILES = sorted([*ROOT.glob("scenes/*.toml"), *ROOT.glob("benchmarks/scenes/*.toml")])
 
 
@@ -28,14 +27,14 @@ def test_counts_of_shipped_scenes_are_those_of_the_dense_matrix(file):
     assert found == expected
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(mechanisms())
 def test_counts_of_drawn_mechanisms_are_those_of_the_dense_matrix(scene):
     found, expected = both(scene)
     assert found == expected
 
 
-def test_surfaces_that_may_touch_restrict_no_motion(tmp_path):
+def test_surfaces_that_may_touch_restrict_no_motion():
     bodies = "".join(
         f'[bodies.{name}]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n[joints.{name}]\ntype = "{kind}"\n'
         f'bodies = ["ground", "{name}"]\nframe1 = {{ position = [0.0, 0.0, {height}] }}\nframe2 = {{}}\n'
@@ -46,9 +45,7 @@ def test_surfaces_that_may_touch_restrict_no_motion(tmp_path):
         )
     )
     floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n'
-    file = tmp_path / "boxes.toml"
-    file.write_text(f'format = 1\nname = "boxes"\n{bodies}{floor}', encoding="utf-8")
-    found, expected = both(ephs.load(file))
+    found, expected = both(scene_of_text(f'format = 1\nname = "boxes"\n{bodies}{floor}'))
     assert found == expected and (found.mobility, found.redundant) == (7, 0)
 
 
@@ -67,5 +64,5 @@ def test_counts_of_large_mechanisms(family, size, expected):
 
 
 def test_currents_and_rotors_on_gears_are_no_motions():
-    motor, bare = (both(ephs.load(ROOT / "scenes" / f"{name}.toml"))[0] for name in ("motor-four-bar", "four-bar"))
+    motor, bare = (both(shipped(name))[0] for name in ("motor-four-bar", "four-bar"))
     assert motor == bare

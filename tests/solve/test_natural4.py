@@ -1,7 +1,5 @@
 """Natural steps of several stages: energy, closed joints, angular momentum about the vertical, and their order."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,10 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
+from tests.numerics import EPS, largest
+from tests.scenes import ROOT, model_of
+from tests.written import scene_of_text
 
-ROOT = Path(__file__).resolve().parents[2]
 TOP = """format = 1
 name = "top"
 
@@ -34,11 +34,9 @@ adjust = true
 
 
 @pytest.fixture(scope="module")
-def top(tmp_path_factory):
-    file = tmp_path_factory.mktemp("top") / "top.toml"
-    file.write_text(TOP, encoding="utf-8")
-    problem = problem_of_scene(ephs.load(file))
-    return problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+def top():
+    problem = problem_of_scene(scene_of_text(TOP))
+    return problem, model_of(problem)
 
 
 def end(top, h, steps, stages=3):
@@ -60,9 +58,9 @@ def test_a_step_keeps_energy_and_the_tip_where_it_is(top):
     tip = SE3.inverse(first)[4:]  # the origin, as the body sees it
     for h in (0.1, -0.1):
         pose, _, after, iterations = end(top, h, 1)
-        assert np.abs(pose - first).max() > 0.1
+        assert largest(pose - first) > 0.1
         assert after == pytest.approx(energy, abs=1e-12 * max(1.0, abs(energy)))
-        assert np.abs(SE3.inverse(pose)[4:] - tip).max() <= 1e-13
+        assert largest(SE3.inverse(pose)[4:] - tip) <= 1e-13
         assert iterations <= 12
 
 
@@ -89,7 +87,7 @@ def test_momentum_about_the_vertical_is_kept_to_the_order(top):
 @pytest.fixture(scope="module")
 def chain():
     problem = problem_of_scene(ephs.load(ROOT / "benchmarks/scenes/spherical-chain-2.toml"))
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     return problem, model, moved(problem, model, 3, 320)
 
 
@@ -129,5 +127,5 @@ def test_energy_is_kept_and_entropy_made_by_any_number_of_stages(stages):
     for h in (0.1, 1.0):
         state, chunk = method.advance(start, h, 10)
         assert chunk.failure is None
-        assert abs(method.energies(state.x).sum() - energy) <= 10 * 8 * 5 * np.finfo(float).eps * energy
+        assert abs(method.energies(state.x).sum() - energy) <= 10 * 8 * 5 * EPS * energy
         assert chunk.rows.ledgers[:, 4].min() > 0.0

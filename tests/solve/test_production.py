@@ -13,6 +13,7 @@ from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.auditing.production import Production
 from ephs.solve.posing.errors import Outcome, SolveError
 from examples.failing import driving
+from tests.semantics.zoo import AB, PS, conduction_matrix, friction_matrix
 
 SYSTEMS = [method.name for method in METHODS.values() if method.systems]
 
@@ -30,15 +31,15 @@ def walls(*parts):
 
 def hidden(a, b):
     a, b = float(a), float(b)
-    return 2.0 * np.array([[b / a, -1.0], [-1.0, a / b]])
+    return 2.0 * conduction_matrix(a, b)
 
 
 def seen(a, b):
-    return 2.0 * np.array([[b / a, -1.0], [-1.0, a / b]])
+    return 2.0 * conduction_matrix(a, b)
 
 
 def conduction(matrix):
-    return ephs.irreversible({"a": Q.entropy, "b": Q.entropy}, matrix)
+    return ephs.irreversible(AB, matrix)
 
 
 def watch(system, sign=1.0):
@@ -101,8 +102,8 @@ def test_domains_are_bounds_of_ports():
         with pytest.raises(ephs.StructureError, match="parameter domain of"):
             ephs.storage(**energy, domain=wrong)
     slow = ephs.irreversible(
-        {"p": Q.momentum, "s": Q.entropy},
-        lambda p, s: (1.0 - 0.01 * p * p) * np.array([[s, -p], [-p, p * p / s]]),
+        PS,
+        lambda p, s: (1.0 - 0.01 * p * p) * friction_matrix(p, s),
         domain={"p": (-9.0, 9.0)},
     )
     assert slow.verdict == "proved"

@@ -5,13 +5,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ephs
-from ephs import Pattern, junction, library
-from ephs.operad import quantity as Q
+from ephs import Pattern, library
 from ephs.solve.equations.heats import Heats
 from ephs.solve.methods.radau import Radau
 from ephs.solve.posing.errors import Outcome
 from examples import oscillator, physics
 from tests.mechanics.plain import uncorrected
+from tests.numerics import EPS, largest
+from tests.oscillator import free_oscillator
 
 K, M, D, T0 = 1.5, 1.0, 0.1, 293.15
 
@@ -113,7 +114,7 @@ def test_the_published_examples_have_the_motion_of_their_equations(case):
     )
     assert np.array_equal(sol.t, times)
     found = np.column_stack([sol[name] for name in order_of(case)])
-    assert np.abs(found - independent(case, times)).max() <= 1e-9
+    assert largest(found - independent(case, times)) <= 1e-9
     assert sol.energy_error.max() <= 1e-9 and sol.stats["least_production"] >= 0.0
 
 
@@ -124,7 +125,7 @@ def test_the_natural_method_has_the_same_motion_and_exact_balances(case):
     for h in (0.02, 0.01):
         sol = ephs.simulate(system, 2.0, initial=start, inputs=inputs, step=h)
         found = np.array([sol[name][-1] for name in order_of(case)])
-        errors.append(np.abs(found - independent(case, np.array([2.0]))[-1]).max())
+        errors.append(largest(found - independent(case, np.array([2.0]))[-1]))
         assert sol.energy_error.max() <= 1e-11
     assert errors[1] <= 1e-3 and np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
 
@@ -132,9 +133,9 @@ def test_the_natural_method_has_the_same_motion_and_exact_balances(case):
 def test_energy_of_the_cylinder_does_not_drift():
     """EPHS.jl's own test of this run, 200 s at step 0.1, allows 1e-3."""
     sol = ephs.simulate(physics.cylinder, 200.0, initial=physics.CYLINDER_START, step=0.1)
-    assert np.abs(sol.energy / sol.energy[0] - 1.0).max() <= 1e-11
+    assert largest(sol.energy / sol.energy[0] - 1.0) <= 1e-11
     assert np.all(np.diff(sol.entropy) >= 0.0)
-    assert np.abs(sol["gas1.v"] + sol["gas2.v"] - 1.0).max() <= 1e-12
+    assert largest(sol["gas1.v"] + sol["gas2.v"] - 1.0) <= 1e-12
 
 
 @pytest.mark.parametrize("case", ["damped oscillator", "springs in series", "cylinder and piston"])
@@ -147,7 +148,7 @@ def test_constant_steps_have_order_five(case):
         found = []
         for h in (0.2, 0.1, 0.05):
             sol = ephs.simulate(system, 2.0, initial=start, method="radau", step=h, rtol=1e-10, atol=1e-12, audit="off")
-            found.append(np.abs(np.array([sol[name][-1] for name in order_of(case)]) - exact).max())
+            found.append(largest(np.array([sol[name][-1] for name in order_of(case)]) - exact))
             assert len(sol.t) == round(2.0 / h) + 1
         return np.array(found)
 
@@ -159,10 +160,9 @@ def test_constant_steps_have_order_five(case):
     assert np.all(corrected <= 1.5 * plain)
 
 
-SOURCED = Pattern(
-    {"u": junction(Q.charge, exposed=True), "q": junction(Q.charge), "b": junction(Q.flux_linkage)},
-    {"fed": {"q": "u"}, "cap": {"q": "q"}, "coil": {"b": "b"}, "emc": {"q": "q", "b": "b"}},
-)(fed=library.capacitor(c=0.3), cap=library.capacitor(c=0.5), coil=library.inductor(l=2.0), emc=library.emc())
+SOURCED = Pattern.from_text("u: charge, exposed; q: charge; b: flux_linkage; fed(q=u); cap(q); coil(b); emc(q, b)")(
+    fed=library.capacitor(c=0.3), cap=library.capacitor(c=0.5), coil=library.inductor(l=2.0), emc=library.emc()
+)
 """A capacitor at a prescribed voltage beside a circuit without resistance."""
 
 
@@ -175,9 +175,9 @@ def test_what_is_prescribed_is_not_moved_with_the_energy(monkeypatch):
             step=0.5, audit="off",
         )  # fmt: skip
         assert sol.energy_error.max() <= 1e-13 and sol.stats["plain_defect"]["largest"] > 1e-5
-        return np.abs(np.ravel(sol["fed.q"]) - 0.3 * np.cos(sol.t)).max()
+        return largest(np.ravel(sol["fed.q"]) - 0.3 * np.cos(sol.t))
 
-    assert missed() <= 8.0 * np.finfo(float).eps * 0.3
+    assert missed() <= 8.0 * EPS * 0.3
     monkeypatch.setattr(Radau, "_filtered", lambda self, h, changes: changes)
     assert missed() > 1e-7, "the control"
 
@@ -187,7 +187,7 @@ def test_the_error_keeps_to_the_tolerance(tolerance):
     system, _, start, _ = EXAMPLES["cylinder and piston"]
     sol = ephs.simulate(system, 10.0, initial=start, method="radau", rtol=tolerance, atol=tolerance)
     found = np.array([sol[name][-1] for name in order_of("cylinder and piston")])
-    assert np.abs(found - independent("cylinder and piston", np.array([10.0]))[-1]).max() <= 10.0 * tolerance
+    assert largest(found - independent("cylinder and piston", np.array([10.0]))[-1]) <= 10.0 * tolerance
 
 
 def test_stiffness_costs_no_steps():
@@ -217,24 +217,6 @@ def test_initial_values_against_the_constraints_are_refused():
     assert caught.value.outcome == Outcome.INCONSISTENT and caught.value.path in ("ke.p", "other.p")
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"rtol": -1.0}, "rtol is -1.0"),
-        ({"atol": float("nan")}, "atol is nan"),
-        ({"rtol": 0.0, "atol": 0.0}, "rtol or atol > 0"),
-        ({"step": 0.0}, "step is 0.0"),
-        ({"max_step": -1.0}, "max_step is -1.0"),
-        ({"min_step": -1.0}, "min_step is -1.0"),
-        ({"until": 0.0}, "until is 0.0"),
-    ],
-)
-def test_impossible_options_are_refused(options, words):
-    until = options.pop("until", 1.0)
-    with pytest.raises(ephs.OptionError, match=words):
-        ephs.simulate(oscillator.free_oscillator, until, method="radau", **options)
-
-
 def test_what_was_computed_is_kept_when_a_run_ends_early():
     start = {"osc.pe.q": 1.0}
     with pytest.raises(ephs.SimulationError, match="more steps than are allowed") as caught:
@@ -249,9 +231,7 @@ def test_what_was_computed_is_kept_when_a_run_ends_early():
 def test_an_explosion_ends_where_it_happens():
     """An energy −q⁴/4 lets the mass run away in finite time."""
     hill = ephs.storage({"q": ephs.quantity.displacement}, lambda q: -0.25 * q**4, lambda q: [-(q**3)])
-    system = Pattern.from_text("q: displacement; p: momentum; pe(q); pkc(q, p); ke(p)")(
-        pe=hill, pkc=library.pkc(), ke=library.point_mass(m=1.0)
-    )
+    system = free_oscillator(pe=hill)
     with pytest.raises(ephs.SimulationError) as caught:
         ephs.simulate(system, 10.0, initial={"pe.q": 1.0, "ke.p": 1.0}, method="radau", rtol=1e-6, atol=1e-6)
     assert 1.0 < caught.value.time < 2.0 and caught.value.partial["pe.q"][-1] > 100.0
@@ -274,10 +254,10 @@ def test_a_brake_put_together_by_hand_makes_heat_of_all_that_it_takes(friction, 
     times = np.linspace(0.0, 1.0, 8)
     sol = stopped(friction, save_at=times, **({"step": step} if step else {"rtol": 1e-6}))
     lost = 5000.0 - 0.5 * np.ravel(sol["ke.p"]) ** 2
-    allowed = 10.0 * np.sqrt(sol.stats["steps"]) * 10.0 * np.finfo(float).eps * 5000.0
-    assert np.abs(np.ravel(sol["env.s"]) * 293.15 - lost).max() <= allowed
+    allowed = 10.0 * np.sqrt(sol.stats["steps"]) * 10.0 * EPS * 5000.0
+    assert largest(np.ravel(sol["env.s"]) * 293.15 - lost) <= allowed
     assert sol.energy_error.max() * 5000.0 <= allowed and abs(sol.summary()["heat"] - lost[-1]) <= allowed
-    assert np.all(np.diff(np.ravel(sol["env.s"])) >= -8.0 * np.finfo(float).eps * 20.0)
+    assert np.all(np.diff(np.ravel(sol["env.s"])) >= -8.0 * EPS * 20.0)
 
 
 def test_without_the_energy_the_quadrature_misses_it(monkeypatch):

@@ -1,31 +1,26 @@
 """What residuals of the natural method are measured by, against the same over whole matrices."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.stage import Entry, Evaluator, Program, Vector, vector
-from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.moves import tighten
 from ephs.solve.methods.records import parts_of
 from ephs.solve.methods.residuals import evaluation_program
 from ephs.solve.methods.scales import SPREAD, TAKES_PART
+from tests.numerics import generators, seeds
+from tests.scenes import model_of, shipped
 
 CALLS = evaluation_program().compiled()
-ROOT = Path(__file__).resolve().parents[2]
-seeds = st.integers(0, 2**32 - 1)
 
 
 @pytest.fixture(scope="module")
 def model():
     """Joints with friction and with springs, heat, and a motor's torque."""
-    problem = problem_of_scene(ephs.load(ROOT / "scenes/slider-crank.toml"))
-    return compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    problem = problem_of_scene(shipped("slider-crank"))
+    return model_of(problem)
 
 
 def measure(t, z, dropped, memory):
@@ -101,9 +96,9 @@ def test_residuals_are_relative_to_their_blocks(model, seed):
     assert np.isnan(measure(t, z, dropped, memory))
 
 
-@given(seed=seeds)
-def test_quaternions_that_are_off_by_rounding_come_back(seed):
-    q = np.random.default_rng(seed).standard_normal(4)
+@given(rng=generators)
+def test_quaternions_that_are_off_by_rounding_come_back(rng):
+    q = rng.standard_normal(4)
     unit = q / np.linalg.norm(q)
     off = unit * (1.0 + 1e-6)
 

@@ -3,6 +3,7 @@
 import pytest
 
 import ephs
+from tests.written import scene_of_text
 
 SCENE = """
 format = 1
@@ -24,10 +25,8 @@ position = [0.0, 0.0, {floor}]
 
 @pytest.mark.parametrize("height", [0.0, 0.1, 3.0])
 @pytest.mark.parametrize("method", ["rk87", "auto"])
-def test_a_ball_at_rest_passes_the_audit_at_any_height(method, height, tmp_path):
+def test_a_ball_at_rest_passes_the_audit_at_any_height(method, height):
     """At height 0 weight has no energy either."""
-    file = tmp_path / "rest.toml"
-    file.write_text(SCENE.format(height=height, floor=height - 0.1))
-    sol = ephs.simulate(ephs.load(file), 0.5, method=method)
+    sol = ephs.simulate(scene_of_text(SCENE.format(height=height, floor=height - 0.1)), 0.5, method=method)
     assert sol.audit.passed
     assert abs(sol.body("ball").position[-1, 2] - height) < 1e-12

@@ -10,9 +10,11 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.solve.posing.errors import OptionError
 from ephs.solve.running import journal
+from tests.numerics import EPS, largest
+from tests.written import scene_of_text
 
 MASS, STIFFNESS, START = 2.0, 8.0, 0.3
-EPS = float(np.finfo(float).eps)
+
 PERIOD, UNTIL = 0.05, 1.0
 GAINS = 60.0, 14.0
 CART = f"""
@@ -36,10 +38,8 @@ PLAIN = ("natural", "natural4", "variational")
 
 
 @pytest.fixture
-def cart(tmp_path):
-    file = tmp_path / "cart.toml"
-    file.write_text(CART)
-    return ephs.load(file)
+def cart():
+    return scene_of_text(CART)
 
 
 def control(t, state):
@@ -68,13 +68,13 @@ def run(cart, method="rk87", **changes):
 def at_samples(sol):
     """(samples + 1, 2) place and speed."""
     where = [int(np.argmin(np.abs(sol.t - k * PERIOD))) for k in range(round(UNTIL / PERIOD) + 1)]
-    assert np.abs(sol.t[where] - PERIOD * np.arange(len(where))).max() <= 1e-12  # steps end on samples
+    assert largest(sol.t[where] - PERIOD * np.arange(len(where))) <= 1e-12  # steps end on samples
     rail = sol.joint("rail")
     return np.column_stack([rail.coordinate[where, 0], rail.rate[where, 0]])
 
 
 def apart(sol, expected):
-    return float(np.abs(at_samples(sol) - expected).max())
+    return float(largest(at_samples(sol) - expected))
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
@@ -111,7 +111,7 @@ def test_a_sampled_input_is_a_function_of_time_with_declared_jumps(cart, method)
     assert np.array_equal(held.t, free.t)
     for path, values_there in held.states.items():
         # corrections of the energy enlarge rounding where the cart nearly stands
-        assert np.abs(values_there - free.states[path]).max() <= 64.0 * EPS * len(held)
+        assert largest(values_there - free.states[path]) <= 64.0 * EPS * len(held)
     late = ephs.simulate(
         cart, UNTIL, inputs={"joints.rail": lambda t: values[bisect_right(times, t - 0.01) - 1]}, **steps
     )
@@ -134,7 +134,7 @@ def test_steps_end_where_a_delayed_value_takes_effect(cart):
     w = np.sqrt(STIFFNESS / MASS)
     still = 2.5 / STIFFNESS
     under_the_first = still + (START - still) * np.cos(w * sol.t[first])
-    assert np.abs(sol.joint("rail").coordinate[first, 0] - under_the_first).max() <= STEERED
+    assert largest(sol.joint("rail").coordinate[first, 0] - under_the_first) <= STEERED
 
 
 def test_memory_goes_from_sample_to_sample(cart):
@@ -175,7 +175,7 @@ def test_noise_is_what_its_seed_says_and_is_as_large_as_it_is_said_to_be(cart):
     assert np.array_equal(noisy, heard(noise={"joints.rail.coordinate": 0.01}, seed=4))
     assert not np.array_equal(noisy, heard(noise={"joints.rail.coordinate": 0.01}, seed=5))
     other = heard(noise={"joints.rail.coordinate": 0.01}, seed=4, steps={"step": 0.001})
-    assert np.abs(noisy - other).max() <= 1e-7
+    assert largest(noisy - other) <= 1e-7
     off = (noisy - still) / 0.01
     assert abs(off.mean()) <= 5.0 / np.sqrt(off.size)
     assert abs(off.std() - 1.0) <= 5.0 / np.sqrt(2.0 * off.size)

@@ -9,6 +9,7 @@ from scipy.sparse import csc_array
 from ephs.solve.methods import solvers
 from ephs.solve.methods.solvers import DENSE, NARROW, Solvers
 from ephs.solve.posing.errors import SolveError
+from tests.numerics import EPS, generators, seeds
 
 
 def made():
@@ -20,7 +21,7 @@ def matrices(draw):
     """Diagonally dominant matrices of some diagonals in a hidden order, real or complex; and how many there are."""
     n = draw(st.integers(1, 3 * DENSE))
     below, above = (draw(st.integers(0, min(n - 1, NARROW))) for _ in range(2))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     i, j = np.indices((n, n))
     dense = np.where((i - j <= below) & (j - i <= above), rng.uniform(-1.0, 1.0, (n, n)), 0.0)
     dense = dense + np.diag(np.full(n, 2.0 + below + above))
@@ -30,23 +31,22 @@ def matrices(draw):
     return dense[hidden][:, hidden]
 
 
-@given(matrices(), st.integers(0, 2**32 - 1))
+@given(matrices(), generators)
 @settings(max_examples=50)
-def test_all_shapes_solve_as_a_dense_solver(dense, seed):
-    rng = np.random.default_rng(seed)
+def test_all_shapes_solve_as_a_dense_solver(dense, rng):
     family = made()
     for part in (dense, 2.0 * dense):  # the second one meets the order that the first one made
         right = rng.standard_normal(len(dense)).astype(dense.dtype)
         x = family.of(csc_array(part))(right)
         scale = np.abs(part) @ np.abs(x) + np.abs(right)
-        assert np.all(np.abs(part @ x - right) <= 8 * (2 * NARROW + 1) * np.finfo(float).eps * scale.max())
+        assert np.all(np.abs(part @ x - right) <= 8 * (2 * NARROW + 1) * EPS * scale.max())
 
 
-@given(matrices(), matrices(), st.booleans(), st.integers(0, 2**32 - 1))
+@given(matrices(), matrices(), st.booleans(), generators)
 @settings(max_examples=50)
-def test_sums_are_solved_as_the_sum(one, other, turning, seed):
+def test_sums_are_solved_as_the_sum(one, other, turning, rng):
     """Also one after the other of two patterns, with zeros that the sum leaves."""
-    n, rng, family = min(len(one), len(other)), np.random.default_rng(seed), made()
+    n, family = min(len(one), len(other)), made()
     a, b = np.real(one)[:n, :n] + 9.0 * np.eye(n), np.where(rng.random((n, n)) < 0.1, np.real(other)[:n, :n], 0.0)
     weight = 0.01 + 0.02j if turning else 0.01
     for left, right in (
@@ -60,7 +60,7 @@ def test_sums_are_solved_as_the_sum(one, other, turning, seed):
         x = family.of_sum(csc_array(left), weight, csc_array(right))(wanted)
         scale = np.abs(whole) @ np.abs(x) + np.abs(wanted)
         growth = np.abs(np.linalg.inv(whole)).sum(axis=1).max() * np.abs(whole).sum(axis=1).max()
-        assert np.all(np.abs(whole @ x - wanted) <= 8 * n * growth * np.finfo(float).eps * scale.max())
+        assert np.all(np.abs(whole @ x - wanted) <= 8 * n * growth * EPS * scale.max())
 
 
 def chain(n, open_at=None):

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 import ephs
 from ephs.solve.posing.errors import OptionError
 from tests.mechanics.dynamics.drawn import moving
-
-EPS = float(np.finfo(float).eps)
+from tests.numerics import EPS, largest, slope
+from tests.scenes import shipped
 
 
 def near(found, expected, model, state, forces):
@@ -17,10 +17,10 @@ def near(found, expected, model, state, forces):
     mass = model.mass_matrix(state)
     terms = np.abs(forces) + np.abs(model.bias(state)) + np.abs(model.applied(state)) + np.abs(mass) @ np.abs(expected)
     size = float((np.abs(np.linalg.inv(mass)) @ terms).max())
-    return np.abs(found - expected).max() <= (10.0 * np.linalg.cond(mass) + 48.0 * len(model.joints)) * EPS * size
+    return largest(found - expected) <= (10.0 * np.linalg.cond(mass) + 48.0 * len(model.joints)) * EPS * size
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(moving(loops=False))
 def test_states_by_joint_are_those_of_the_scene(found):
     """Without a scene made anew the same places and speeds, by name or as arrays; differences lead there."""
@@ -35,11 +35,11 @@ def test_states_by_joint_are_those_of_the_scene(found):
         arrays[0][where], arrays[1][where] = state.coordinates[name], state.rates[name]
     assert np.array_equal(model.state(*arrays).array, made.array)
     v = 0.5 * rng.standard_normal(model.layout.n)
-    assert np.abs(model.difference(state, model.moved(state, v)) - v).max() <= 1e-12
-    assert np.abs(model.difference(state, state)).max() <= 8.0 * EPS
+    assert largest(model.difference(state, model.moved(state, v)) - v) <= 1e-12
+    assert largest(model.difference(state, state)) <= 8.0 * EPS
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(moving())
 def test_forces_make_the_accelerations_that_they_are_for(found):
     """By arrays and by joint; gravity is what holds at rest; computed torques are those of the oscillator."""
@@ -52,10 +52,10 @@ def test_forces_make_the_accelerations_that_they_are_for(found):
 
     rest = model.unpack(np.concatenate([state.q, np.zeros(n), state.entropies]))
     held = model.inverse_dynamics(rest, np.zeros(n)) + model.applied(rest)
-    size = float(np.abs(model.applied(rest)).max() + np.abs(model.gravity(rest)).max())
-    assert np.abs(held - model.gravity(rest)).max() <= 48.0 * len(model.joints) * EPS * max(size, 1.0)
+    size = float(largest(model.applied(rest)) + largest(model.gravity(rest)))
+    assert largest(held - model.gravity(rest)) <= 48.0 * len(model.joints) * EPS * max(size, 1.0)
     mass = model.mass_matrix(state)
-    assert np.abs(mass - mass.T).max() <= 8 * n * EPS * np.abs(mass).max()
+    assert largest(mass - mass.T) <= 8 * n * EPS * largest(mass)
     assert np.linalg.eigvalsh(mass).min() > 0.0
 
     if model.free:
@@ -67,7 +67,7 @@ def test_forces_make_the_accelerations_that_they_are_for(found):
         assert near(model.acceleration(state, forces), asked, model, state, forces)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(moving(loops=False), st.booleans())
 def test_a_task_has_the_acceleration_that_its_forces_are_for(found, turning):
     """And its drift is how its velocity changes where rates stay: by differences along the motion."""
@@ -84,21 +84,19 @@ def test_a_task_has_the_acceleration_that_its_forces_are_for(found, turning):
     asked = rng.standard_normal(rank)
     still = model.inverse_dynamics(state, np.zeros(model.layout.n))
     a = model.acceleration(state, still + task.forces(asked))
-    assert np.abs(task.jacobian @ a + task.drift - asked).max() <= 1e-8 * (1.0 + np.abs(asked).max())
+    assert largest(task.jacobian @ a + task.drift - asked) <= 1e-8 * (1.0 + largest(asked))
 
     def velocity(t):
         there = model.moved(state, t * state.r)
         there = model.unpack(np.concatenate([there.q, state.r, state.entropies]))
         return pick @ (model.jacobian(there, body, point) @ state.r)
 
-    h = 1e-3
-    d = [(velocity(k) - velocity(-k)) / (2.0 * k) for k in (h, h / 2.0)]
-    assert np.abs((4.0 * d[1] - d[0]) / 3.0 - task.drift).max() <= 1e-8 * (1.0 + np.abs(task.drift).max())
+    assert largest(slope(velocity, 1e-3, 1) - task.drift) <= 1e-8 * (1.0 + largest(task.drift))
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "natural"])
 def test_a_step_under_forces_is_a_run_under_the_same_inputs(method):
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     model = ephs.dynamics(scene)
     push = np.array([0.4, -0.3, 0.2, 0.1])
     inputs = {f"joints.{name}": push[where] for name, where in model.freedoms.items()}
@@ -113,14 +111,14 @@ def test_a_step_under_forces_is_a_run_under_the_same_inputs(method):
 
 
 def test_what_is_no_tree_is_refused_and_so_are_too_many_directions():
-    loop = ephs.dynamics(ephs.load("scenes/four-bar.toml"))
+    loop = ephs.dynamics(shipped("four-bar"))
     for call in (
         lambda: loop.computed_torque(loop.state0, loop.state0, stiffness=1.0, damping=1.0),
         lambda: loop.task(loop.state0, "coupler"),
     ):
         with pytest.raises(OptionError, match="a tree, without loops"):
             call()
-    chain = ephs.dynamics(ephs.load("scenes/chain.toml"))
+    chain = ephs.dynamics(shipped("chain"))
     body = next(iter(chain.scene.bodies))
     with pytest.raises(OptionError, match="at once"):
         chain.task(chain.state0, body)

@@ -1,6 +1,7 @@
 """Derivatives are exact: to what differences are good for, closed forms to rounding, and as one function's inverse."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -12,29 +13,24 @@ from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces import SE3
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
+from tests.numerics import EPS, jacobian, largest
+from tests.scenes import equations_of
 
 GOOD = 1e-8
 """What extrapolated differences are good for, relative to the largest entry."""
 
 
-def difference(function, size, step=1e-3):
-    """(…, size) by central differences, extrapolated twice."""
-    columns = []
-    for unit in np.eye(size):
-        d = [(function(h * unit) - function(-h * unit)) / (2.0 * h) for h in (step, step / 2.0, step / 4.0)]
-        once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
-        columns.append((16.0 * once[1] - once[0]) / 15.0)
-    return np.array(columns).T
+difference = partial(jacobian, h=1e-3, times=2)
 
 
 def close(found, expected, tolerance=GOOD):
     assert found.shape == expected.shape
-    assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max(initial=0.0))
+    assert largest(found - expected, initial=0.0) <= tolerance * max(1.0, largest(expected, initial=0.0))
 
 
 def assert_near(found, expected, rates):
     """Equal to rounding of what is quadratic in rates, of lengths of a few metres."""
-    assert np.abs(found - expected).max(initial=0.0) <= 1e-12 * (1.0 + float(rates @ rates))
+    assert largest(found - expected, initial=0.0) <= 1e-12 * (1.0 + float(rates @ rates))
 
 
 def shifted(model, state, part, by):
@@ -103,7 +99,7 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
         return
     exact = model.derivatives(state)
     mass = model.mass_matrix(state)
-    tolerance = 10.0 * np.finfo(float).eps * np.linalg.cond(mass)
+    tolerance = 10.0 * EPS * np.linalg.cond(mass)
     for forward, inverse in (
         (exact.acceleration_q, exact.force_q),
         (exact.acceleration_r, exact.force_r),
@@ -111,14 +107,14 @@ def test_forward_and_inverse_derivatives_are_those_of_inverse_functions(drawn):
     ):
         expected = -np.linalg.solve(mass, inverse)
         size = np.abs(np.linalg.inv(mass)) @ np.abs(inverse)
-        assert np.abs(forward - expected).max() <= tolerance * max(1.0, size.max())
+        assert largest(forward - expected) <= tolerance * max(1.0, size.max())
 
 
 @settings(max_examples=30)
 @given(drawn=moving())
 def test_the_jacobian_of_a_step_is_that_of_its_right_hand_side(drawn):
     scene, model, state, _ = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     q, r, s = model.layout.split(state.array)
     here = replace(equations.start(0.0), q=q, r=r, heats=equations.heats.energies(s))
     jacobian = Jacobian(equations)
@@ -158,7 +154,7 @@ def test_inputs_that_read_the_state_are_in_the_jacobian(scene):
 @given(drawn=moving())
 def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
     scene, model, state, _ = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     q, r, s = model.layout.split(state.array)
     n = equations.n
     linear = Linearised(equations)
@@ -177,7 +173,7 @@ def test_momenta_and_their_forces_differentiate_as_differences_say(drawn):
 def test_forward_columns_are_inverse_columns_solved(drawn):
     """Two ways to one Jacobian, both exact: to rounding times the condition of the mass matrix."""
     scene, model, state, _ = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     n = equations.n
     assume(n and not model.cut and not equations.driven.size)
@@ -186,8 +182,8 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
     linear.inverse(q, r, s, a)
     inverse, mass = linear.columns(solve=False), equations.mass(q, r)
     assert np.array_equal(forward[n:], inverse[n:])
-    size = max(1.0, np.abs(inverse).max(), np.abs(mass).max() * np.abs(forward[:n]).max())
-    assert np.abs(mass @ forward[:n] + inverse[:n]).max() <= 10 * np.finfo(float).eps * np.linalg.cond(mass) * size
+    size = max(1.0, largest(inverse), largest(mass) * largest(forward[:n]))
+    assert largest(mass @ forward[:n] + inverse[:n]) <= 10 * EPS * np.linalg.cond(mass) * size
 
 
 @settings(max_examples=10)
@@ -195,7 +191,7 @@ def test_forward_columns_are_inverse_columns_solved(drawn):
 def test_columns_add_up_along_any_direction(drawn):
     """Several directions at a time, and single ones."""
     scene, model, state, rng = drawn
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     linear, (q, r, s) = Linearised(equations), model.layout.split(state.array)
     linear.forward(q, r, s)
     slopes = equations.dense.residual.slopes()

@@ -1,20 +1,17 @@
 """The functions of a scene's state agree with one another, with plain NumPy, and with what simulations do."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.methods.registry import METHODS
 from ephs.semantics.spaces.rank import EXPLICIT
 from tests.mechanics.dynamics.drawn import moving
+from tests.methods import FIXED_OF_SCENES
+from tests.numerics import EPS, largest, slope
+from tests.scenes import SCENES, shipped
 from tests.written import scene_of_text
-
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
-EPS = np.finfo(float).eps
 
 
 def whole(model, by_joint):
@@ -44,8 +41,8 @@ def test_accelerations_solve_the_equations_of_motion(drawn):
     expected = free + np.linalg.solve(root.T, correction)
     found = whole(model, model.acceleration(state, model.layout.by_joint(forces)))
     terms = np.abs(np.linalg.inv(mass)) @ (np.abs(pushed) + np.abs(model.bias(state)))
-    tolerance = 100.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), np.abs(expected).max())
-    assert np.abs(found[:n] - expected).max(initial=0.0) <= tolerance / (EXPLICIT if k else 1.0)
+    tolerance = 100.0 * np.linalg.cond(mass) * EPS * max(1.0, terms.max(), largest(expected))
+    assert largest(found[:n] - expected, initial=0.0) <= tolerance / (EXPLICIT if k else 1.0)
 
 
 @settings(max_examples=50)
@@ -58,8 +55,8 @@ def test_inverse_dynamics_inverts_accelerations(drawn):
     forces = model.inverse_dynamics(state, reached)
     again = model.acceleration(state, forces)
     condition = np.linalg.cond(model.mass_matrix(state))
-    size = max(1.0, np.abs(whole(model, reached)).max(), np.abs(model.bias(state)).max(initial=0.0) * condition)
-    assert np.abs(whole(model, again) - whole(model, reached)).max() <= 1e3 * condition * EPS * size
+    size = max(1.0, largest(whole(model, reached)), largest(model.bias(state), initial=0.0) * condition)
+    assert largest(whole(model, again) - whole(model, reached)) <= 1e3 * condition * EPS * size
     assert all(not forces[name].any() for name in model.cut if not (model.layout.freedoms[name] < n).any())
 
 
@@ -70,10 +67,10 @@ def test_jacobians_carry_rates_to_bodies(drawn):
     rates = whole(model, state.rates)[: model.layout.n]
     at = rng.standard_normal(3)
     for name, body in model.bodies(state).items():
-        scale = 100.0 * EPS * max(1.0, np.abs(model.jacobian(state, name)).max() * np.abs(rates).sum())
-        assert np.abs(model.jacobian(state, name) @ rates - body.twist).max() <= scale
+        scale = 100.0 * EPS * max(1.0, largest(model.jacobian(state, name)) * np.abs(rates).sum())
+        assert largest(model.jacobian(state, name) @ rates - body.twist) <= scale
         velocity = body.point(at)[1]
-        assert np.abs(model.jacobian(state, name, at) @ rates - velocity).max() <= 10.0 * scale
+        assert largest(model.jacobian(state, name, at) @ rates - velocity) <= 10.0 * scale
     kinetic = 0.5 * rates @ model.mass_matrix(state) @ rates
     assert model.energies(state).kinetic == pytest.approx(kinetic, rel=1e-12, abs=1e-12)
 
@@ -88,9 +85,7 @@ def test_gravity_is_the_slope_of_its_potential(drawn):
         poses = model.bodies(model.moved(state, h * along))
         return -sum(scene.body(name).mass * scene.world.gravity @ b.position for name, b in poses.items())
 
-    h = 1e-3
-    d = [(potential(k) - potential(-k)) / (2.0 * k) for k in (h, 0.5 * h)]
-    assert model.gravity(state) @ along == pytest.approx((4.0 * d[1] - d[0]) / 3.0, rel=1e-8, abs=1e-8)
+    assert model.gravity(state) @ along == pytest.approx(slope(potential, 1e-3, 1), rel=1e-8, abs=1e-8)
     assert np.allclose(model.bias(state) - model.bias(state, gravity=False), model.gravity(state), atol=1e-12, rtol=0)
 
 
@@ -105,11 +100,11 @@ def test_accelerations_are_how_rates_change(drawn):
     a = whole(model, model.acceleration(state))
     after = [whole(model, x.rates) for x in steps]
     forward = (4.0 * (after[0] - rates) - (after[1] - rates)) / (2.0 * h)
-    assert np.abs(forward - a).max() <= 1e-3 * max(1.0, np.abs(a).max())
+    assert largest(forward - a) <= 1e-3 * max(1.0, largest(a))
 
 
 @settings(max_examples=25)
-@given(drawn=moving(), method=st.sampled_from([m.name for m in METHODS.values() if m.fixed and m.scenes]))
+@given(drawn=moving(), method=st.sampled_from(FIXED_OF_SCENES))
 def test_a_step_is_the_first_of_a_simulation_and_changes_no_state(drawn, method):
     scene, model, state, _ = drawn
     before = state.array.copy()
@@ -120,8 +115,8 @@ def test_a_step_is_the_first_of_a_simulation_and_changes_no_state(drawn, method)
     assert np.array_equal(state.array, before)
     sol = ephs.simulate(scene, h, method=method, step=h)
     for name, body in model.bodies(step).items():
-        assert np.abs(sol.body(name).position[-1] - body.position).max() <= 1e-9 * max(1.0, np.abs(body.position).max())
-        assert np.abs(sol.body(name).velocity[-1] - body.velocity).max() <= 1e-9 * max(1.0, np.abs(body.velocity).max())
+        assert largest(sol.body(name).position[-1] - body.position) <= 1e-9 * max(1.0, largest(body.position))
+        assert largest(sol.body(name).velocity[-1] - body.velocity) <= 1e-9 * max(1.0, largest(body.velocity))
 
 
 @pytest.mark.parametrize("file", SCENES, ids=lambda file: file.stem)
@@ -154,14 +149,12 @@ ROTORS = {
 
 @pytest.mark.parametrize("rotor", ROTORS)
 @pytest.mark.parametrize("way", ["adjusted", "natural", "natural4"])
-def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way, tmp_path):
+def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way):
     """What asks for states and not for rates finds them from momenta: of J + g² J of the rotor, too."""
     text = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n[bodies.arm]\nmass = 1.0\ninertia = [0.1, 0.1, 0.1]\n"
     pin = "[joints.pin]\ntype = 'revolute'\nbodies = ['ground', 'arm']\nat = [0.0, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]\n"
-    file = tmp_path / "arm.toml"
     lines, seen, resisting = ROTORS[rotor]
-    file.write_text(text + pin + lines)
-    dynamics, rate, step = ephs.dynamics(ephs.load(file)), 2.0, 1e-3
+    dynamics, rate, step = ephs.dynamics(scene_of_text(text + pin + lines)), 2.0, 1e-3
     state = dynamics.state({}, {"pin": rate}, adjust=way == "adjusted")
     lost = 0.0
     if way != "adjusted":
@@ -185,12 +178,12 @@ def test_rotors_share_in_the_momentum_that_rates_are_found_from(rotor, way, tmp_
     ],
 )
 def test_bad_arguments_are_named(call, message):
-    model = ephs.dynamics(ephs.load(SCENES[0].parent / "four-bar.toml"))
+    model = ephs.dynamics(shipped("four-bar"))
     with pytest.raises(ephs.OptionError, match=message):
         call(model)
 
 
-def test_what_no_mass_determines_is_named(tmp_path):
+def test_what_no_mass_determines_is_named():
     text = """
     format = 1
     [bodies.frame]
@@ -202,9 +195,7 @@ def test_what_no_mass_determines_is_named(tmp_path):
     at = [0.0, 0.0, 0.0]
     axis = [1.0, 0.0, 0.0]
     """
-    file = tmp_path / "light.toml"
-    file.write_text(text)
-    model = ephs.dynamics(ephs.load(file))
+    model = ephs.dynamics(scene_of_text(text))
     with pytest.raises(ephs.SimulationError, match="joint pin, which moves no mass"):
         model.acceleration(model.state0)
 

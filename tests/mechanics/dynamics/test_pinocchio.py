@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
+from tests.numerics import largest, seeds
 
 ALIKE = 1e-11
 
@@ -19,11 +20,11 @@ def trees(draw, kinds):
     scene = draw(mechanisms(max_bodies=6, kinds=kinds, loops=False, friction=False, springs=False, heat=False))
     dynamics = ephs.dynamics(scene)
     assume(dynamics.layout.n > 0)
-    return dynamics, PinModel(scene, dynamics), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    return dynamics, PinModel(scene, dynamics), np.random.default_rng(draw(seeds))
 
 
 def alike(found, expected, scale=1.0):
-    assert np.abs(found - expected).max() <= ALIKE * max(scale, np.abs(expected).max())
+    assert largest(found - expected) <= ALIKE * max(scale, largest(expected))
 
 
 def flat(dynamics, by_joint):
@@ -74,7 +75,7 @@ def test_pinocchio_differentiates_the_same(kinds, data):
     exact = dynamics.derivatives(state, dynamics.layout.by_joint(tau))
     by_q, by_v, by_force = pin.computeABADerivatives(model, other.data, q, v, other.vector(tau))
     condition = np.linalg.cond(exact.force_a)
-    size = max(np.abs(other.matrix(by_q)).max(), condition)
+    size = max(largest(other.matrix(by_q)), condition)
     alike(exact.acceleration_q, other.matrix(by_q), size)
     alike(exact.acceleration_r, other.matrix(by_v), size)
     alike(exact.acceleration_force, other.matrix(whole(by_force)), size)

@@ -7,6 +7,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.build import initial_state, scene_system
+from tests.numerics import jacobian, largest
 from tests.written import scene_of_text
 
 ARMS = """
@@ -69,7 +70,7 @@ def test_accelerations_are_those_of_a_run(load, given):
     for name in ("pin", "knee"):
         rate = run.joint(name).rate
         differenced = (-3.0 * rate[0] + 4.0 * rate[1] - rate[2]) / h  # off by h²/12 of the third derivative
-        assert np.abs(found[name] - differenced).max() <= 1e-5 * (1.0 + np.abs(found[name]).max()), name
+        assert largest(found[name] - differenced) <= 1e-5 * (1.0 + largest(found[name])), name
 
 
 @pytest.mark.parametrize(("load", "given"), [*itertools.product(LOADS, INPUTS)])
@@ -77,14 +78,13 @@ def test_derivatives_and_inverse_dynamics_are_those_of_accelerations(load, given
     model, state = at(scene_of_text(ARMS + LOADS[load]), INPUTS[given])
     n, h, zero = model.layout.n, 1e-5, np.zeros(model.layout.n)  # ∛ε: truncation and rounding are equally small
     a = model.acceleration(state, zero)
-    assert np.abs(model.inverse_dynamics(state, a)).max() <= 1e-11 * np.abs(a).max()
+    assert largest(model.inverse_dynamics(state, a)) <= 1e-11 * largest(a)
     found = model.derivatives(state).acceleration_q
-    ends = [[model.acceleration(model.moved(state, sign * h * way), zero) for sign in (1.0, -1.0)] for way in np.eye(n)]
-    differenced = np.array([(one - other) / (2.0 * h) for one, other in ends]).T
-    assert np.abs(found - differenced).max() <= 1e-8 * np.abs(differenced).max()
+    differenced = jacobian(lambda v: model.acceleration(model.moved(state, v), zero), n, h)
+    assert largest(found - differenced) <= 1e-8 * largest(differenced)
     pushed = load != "none" or given != "none"  # the control: they act
     bare, _ = at(scene_of_text(ARMS), {})
-    assert (np.abs(bare.acceleration(state, zero) - a).max() > 1e-3) == pushed
+    assert (largest(bare.acceleration(state, zero) - a) > 1e-3) == pushed
 
 
 def test_inputs_of_systems_are_numbers():
@@ -93,6 +93,6 @@ def test_inputs_of_systems_are_numbers():
     model = ephs.dynamics(system, inputs={"drives.knee": {"flow": 0.5}})
     zero = np.zeros(model.layout.n)
     a = model.acceleration(model.state0, zero)
-    assert np.abs(model.inverse_dynamics(model.state0, a)).max() <= 1e-11 * np.abs(a).max()
+    assert largest(model.inverse_dynamics(model.state0, a)) <= 1e-11 * largest(a)
     with pytest.raises(ephs.OptionError, match=r"drives\.knee.*a number or numbers"):
         ephs.dynamics(system, inputs={"drives.knee": {"flow": lambda t, state: 0.5}})

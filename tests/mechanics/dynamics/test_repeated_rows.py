@@ -1,22 +1,19 @@
 """Derivatives of accelerations where the equations of a loop repeat each other: exact along what keeps it closed."""
 
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
 
 import ephs
+from tests.numerics import largest, slope
+from tests.scenes import shipped
 
-BRICARD = Path(__file__).parents[3] / "scenes/bricard.toml"
 GOOD = 1e-8
 """What extrapolated differences are good for, relative to the largest entry."""
 
 
-def difference(function, step=1e-2):
-    """The derivative at 0 by central differences, extrapolated twice."""
-    d = [(function(h) - function(-h)) / (2.0 * h) for h in (step, step / 2.0, step / 4.0)]
-    once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
-    return (16.0 * once[1] - once[0]) / 15.0
+difference = partial(slope, h=1e-2, times=2)
 
 
 def closed_direction(model, state):
@@ -36,7 +33,7 @@ def with_rates(model, state, change):
 @pytest.mark.parametrize(("turned", "rate"), [(0.1, 1.5), (-0.7, 1.0)])
 def test_derivatives_along_a_loop_with_a_repeated_equation_are_those_of_differences(turned, rate):
     """Of Bricard's linkage, moved along its loop: rates follow, and without their part derivatives are others."""
-    model = ephs.dynamics(ephs.load(BRICARD))
+    model = ephs.dynamics(shipped("bricard"))
     n = model.layout.n
     state = model.closed(model.state0)
     state = model.closed(model.moved(state, turned * closed_direction(model, state)))
@@ -57,8 +54,8 @@ def test_derivatives_along_a_loop_with_a_repeated_equation_are_those_of_differen
     expected = difference(lambda h: acceleration(moved(h)))
     by_place = exact.acceleration_q @ difference(lambda h: model.difference(state, moved(h)))
     by_rates = exact.acceleration_r @ difference(lambda h: rates(moved(h)))
-    size = np.abs(expected).max()
-    assert np.abs(by_place + by_rates - expected).max() <= GOOD * size
-    assert np.abs(by_place - expected).max() > 1e-3 * size, "the control: rates that do not follow leave the loop"
+    size = largest(expected)
+    assert largest(by_place + by_rates - expected) <= GOOD * size
+    assert largest(by_place - expected) > 1e-3 * size, "the control: rates that do not follow leave the loop"
     quicker = difference(lambda h: acceleration(with_rates(model, state, h * along)))
-    assert np.abs(exact.acceleration_r @ along - quicker).max() <= GOOD * max(1.0, np.abs(quicker).max())
+    assert largest(exact.acceleration_r @ along - quicker) <= GOOD * max(1.0, largest(quicker))

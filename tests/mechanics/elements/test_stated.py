@@ -1,29 +1,26 @@
 """What elements without a formula state of themselves: no state or effort contradicts it; constants are decided."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-import ephs
 from ephs import quantity as Q
 from ephs.operad import Quantity, Space
 from ephs.semantics import StructureError
 from ephs.semantics.library import power_ports
 from ephs.semantics.primitives import structures
 from ephs.semantics.verdicts.verdict import examine
-
-SCENES = Path(__file__).parents[3] / "scenes"
+from tests.scenes import shipped
 
 
 def stating():
     """Elements of scenes by name, whose conditions are stated."""
     found = {}
     for name in ("slider-crank", "motor-four-bar", "body", "n-four-bar", "screw-press"):
-        for _, part in ephs.load(SCENES / f"{name}.toml").system().leaves():
+        for _, part in shipped(name).system().leaves():
             if part.kind != "environment" and any(c.how[0] == "stated" for c in part.verdict.conditions):
                 found.setdefault(part.name, part)
     return found

@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path as File
 
 import mujoco
@@ -22,16 +21,13 @@ from ephs.solve.methods.continuous import Continuous
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.drawn import moving
 from tests.mechanics.dynamics.mujoco_scenes import accelerations, joints, stripped
+from tests.numerics import jacobian, largest, slope
+from tests.scenes import shipped
 
 
 def extrapolated(function, h=1e-2):
     """The derivative at 0, by central differences extrapolated three times."""
-    table = [(function(d) - function(-d)) / (2.0 * d) for d in (h, h / 2, h / 4, h / 8)]
-    power = 4.0
-    while len(table) > 1:
-        table = [(power * b - a) / (power - 1.0) for a, b in pairwise(table)]
-        power *= 4.0
-    return table[0]
+    return slope(function, h, 3)
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +47,7 @@ def without_a_log_file():
 )
 def test_a_moving_loop_linearises_as_differences_say(name, joint, other, body, start):
     """Of accelerations and of all that is put out, over states with the loop closed; one has a ball in its loop."""
-    scene = ephs.load(f"scenes/{name}.toml").with_state({joint: start[0]}, {joint: start[1]}, adjust=True)
+    scene = shipped(name).with_state({joint: start[0]}, {joint: start[1]}, adjust=True)
     outputs = [f"joints.{joint}", f"joints.{other}", f"joints.{joint}.coordinate", f"bodies.{body}"]
     found = ephs.linearize(scene, outputs=[*outputs, f"bodies.{body}.position"])
     assert found.states[:2] == (f"joints.{joint}.coordinate", f"joints.{joint}.rate")
@@ -65,14 +61,14 @@ def test_a_moving_loop_linearises_as_differences_say(name, joint, other, body, s
         return np.concatenate([model.acceleration(state)[joint], *seen])
 
     expected = np.column_stack([extrapolated(lambda d: at(d, 0.0)), extrapolated(lambda d: at(0.0, d))])
-    assert np.abs(found.A[0, :2] - [0.0, 1.0]).max() < 1e-12
-    assert np.abs(found.A[1, :2] - expected[0]).max() < 1e-8 * np.abs(expected[0]).max()
-    assert np.abs(found.C[:, :2] - expected[1:]).max() < 1e-8 * max(1.0, np.abs(expected).max())
+    assert largest(found.A[0, :2] - [0.0, 1.0]) < 1e-12
+    assert largest(found.A[1, :2] - expected[0]) < 1e-8 * largest(expected[0])
+    assert largest(found.C[:, :2] - expected[1:]) < 1e-8 * max(1.0, largest(expected))
 
 
 def spinning_rod():
     """A slider-crank whose rod is held by two balls, so that it may spin about itself: two freedoms, turning."""
-    scene = ephs.load("scenes/slider-crank.toml")
+    scene = shipped("slider-crank")
     zero = np.zeros(3)
     ball = replace(
         scene.joints["wrist"], kind="spherical", friction=np.zeros((3, 3)), stiffness=zero, rest=zero, drive=zero,
@@ -117,7 +113,7 @@ def turns_with_the_loop(model, state):
 
     for j in range(k):
         expected = extrapolated(lambda h, j=j: rates(h * Z[:, j]))
-        assert np.abs(Y[:, j] - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
+        assert largest(Y[:, j] - expected) < 1e-6 * max(1.0, largest(expected))
 
 
 @settings(max_examples=10)
@@ -155,9 +151,8 @@ def test_a_moving_tree_linearises_as_its_flow_does(drawn):
             columns.append((8.0 * (d[1] - d[-1]) - (d[2] - d[-2])) / 12e-3)
         return np.array(columns).T
 
-    rough = [(flow(h) - flow(-h)) / (2.0 * h) for h in (4e-3, 2e-3)]
-    expected = (4.0 * rough[1] - rough[0]) / 3.0
-    assert np.abs(found.A - expected).max() < 1e-6 * max(1.0, np.abs(expected).max())
+    expected = slope(flow, 4e-3, 1)
+    assert largest(found.A - expected) < 1e-6 * max(1.0, largest(expected))
 
 
 @pytest.mark.filterwarnings("ignore::ephs.ModelWarning")
@@ -189,11 +184,11 @@ def test_mujoco_differentiates_a_robot_alike():
     for expected, matrix in zip(
         blocks, (found.A[np.ix_(rates, order)], found.A[np.ix_(rates, rates)], found.B[rates]), strict=True
     ):
-        assert np.abs(matrix - expected).max() < 1e-7 * np.abs(expected).max()
+        assert largest(matrix - expected) < 1e-7 * largest(expected)
 
 
 def test_forces_wrenches_and_markers_push_as_the_motion_says():
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     scene = replace(scene, markers={"tip": Marker(body="coupler", at=[0.1, 0.2, 0.0]).called("tip")})
     found = ephs.linearize(scene, inputs=["joints.pivot", "joints.knee", "bodies.coupler", "markers.tip"])
     model = ephs.dynamics(scene)
@@ -215,7 +210,7 @@ def test_forces_wrenches_and_markers_push_as_the_motion_says():
 
 def test_a_spring_loaded_four_bar_swings_as_its_energy_says():
     """ω² = V''/M along the single freedom, from energies alone."""
-    scene = varied(ephs.load("scenes/four-bar.toml"), {"joints.main.drive": 0.0, "joints.main.friction": 0.0,
+    scene = varied(shipped("four-bar"), {"joints.main.drive": 0.0, "joints.main.friction": 0.0,
                    "joints.pivot.friction": 0.0, "joints.knee.stiffness": 30.0})  # fmt: skip
     rest = ephs.equilibrium(scene).model
     found = ephs.linearize(rest, inputs=["joints.main"])
@@ -233,12 +228,12 @@ def test_a_spring_loaded_four_bar_swings_as_its_energy_says():
 
 
 def test_a_heavy_body_on_a_ball_joint_swings_like_a_pendulum():
-    scene = ephs.equilibrium(ephs.load("scenes/heavy-top.toml")).model
+    scene = ephs.equilibrium(shipped("heavy-top")).model
     body, arm = scene.body("top"), np.linalg.norm(scene.joint("tip").frame2[4:])
     omega = np.sqrt(body.mass * 9.81 * arm / (body.inertia[0, 0] + body.mass * arm**2))
     values = ephs.linearize(scene).eigenvalues
     swinging = values[np.abs(values) > 1e-6]
-    assert np.abs(np.abs(swinging.imag) - omega).max() < 1e-9 * omega and np.all(swinging.real == 0.0)
+    assert largest(np.abs(swinging.imag) - omega) < 1e-9 * omega and np.all(swinging.real == 0.0)
 
 
 # ---- laws --------------------------------------------------------------------------------------------------------
@@ -253,7 +248,7 @@ def test_at_an_equilibrium_the_laws_hold(scene):
         assert "no state found in which nothing moves" in str(error)
         return
     model = ephs.dynamics(rest.model)
-    assert max((np.abs(a).max(initial=0.0) for a in model.acceleration(model.state0).values()), default=0.0) < 1e-6
+    assert max((largest(a, initial=0.0) for a in model.acceleration(model.state0).values()), default=0.0) < 1e-6
     found = ephs.linearize(rest.model)
     assert found.structure is not None, found.reason
     for law in found.laws:
@@ -268,7 +263,7 @@ def test_at_an_equilibrium_the_laws_hold(scene):
 
 @pytest.mark.parametrize("name", ["chain", "heavy-top"])
 def test_without_friction_nothing_decays(name):
-    found = ephs.linearize(ephs.equilibrium(ephs.load(f"scenes/{name}.toml")).model)
+    found = ephs.linearize(ephs.equilibrium(shipped(name)).model)
     assert not found.R.any()
     assert np.all(found.eigenvalues.real == 0.0)
 
@@ -276,38 +271,36 @@ def test_without_friction_nothing_decays(name):
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank"])
 def test_joint_coordinates_and_the_papers_states_have_the_same_modes(name):
     """What the paper's states have beside them is constant: the constraints' integrals."""
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     driven = next(joint for joint in scene.joints if np.any(scene.joint(joint).drive))
     rest = ephs.equilibrium(varied(scene, {f"joints.{driven}.drive": 0.0})).model
     found = ephs.linearize(rest).eigenvalues
     paper = ephs.linearize(rest, form="paper").eigenvalues
     moving = paper[np.abs(paper) > 1e-4 * np.abs(found).min()]
     assert moving.size == found.size
-    assert np.abs(np.sort_complex(moving) - np.sort_complex(found)).max() < 1e-6 * np.abs(found).max()
+    assert largest(np.sort_complex(moving) - np.sort_complex(found)) < 1e-6 * largest(found)
 
 
 @pytest.mark.parametrize("name", ["heavy-top", "chain", "bricard"])
 def test_derivatives_by_states_are_those_of_the_equations_where_mechanisms_turn(name):
     """Against central differences, of 1e-8 at best; the top spins at 150 rad/s."""
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     problem = problem_of_system(scene.system(), {str(path): value for path, value in initial_state(scene).items()})
     d, equations = problem.descriptor, Continuous(compile_model(problem.descriptor, problem.reference, {}))
     x, inputs = d.pack(problem.initial), equations.model.input_values()
     z = equations.guess(x) + 0.1 * np.random.default_rng(0).standard_normal(equations.unknowns)
     found = equations.matrices(x, z, inputs).states.toarray()[:, : d.rate_size]
-    steps = 1e-6 * np.eye(d.rate_size)
-    ends = [[equations.residual(d.advance(x, by), z, inputs) for by in (step, -step)] for step in steps]
-    near = np.array([(after - before) / 2e-6 for after, before in ends]).T
-    assert np.abs(found - near).max() <= 1e-8 * np.abs(found).max()
+    near = jacobian(lambda by: equations.residual(d.advance(x, by), z, inputs), d.rate_size, 1e-6)
+    assert largest(found - near) <= 1e-8 * largest(found)
 
 
 def test_the_papers_states_of_a_fast_crank_are_linearised():
     """It turns by more than a whole turn a second, at which derivatives over a step of a second were asked for."""
-    assert len(ephs.linearize(ephs.load("scenes/slider-crank.toml"), form="paper").eigenvalues) == 27
+    assert len(ephs.linearize(shipped("slider-crank"), form="paper").eigenvalues) == 27
 
 
 def test_a_state_that_is_no_equilibrium_says_why_it_has_no_structure():
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     assert "not balanced" in ephs.linearize(scene).reason
     moving = scene.with_state({}, {"main": 1.0}, adjust=True)
     assert "moves" in ephs.linearize(moving).reason
@@ -317,7 +310,7 @@ def test_a_state_that_is_no_equilibrium_says_why_it_has_no_structure():
 
 
 def test_a_mode_plays_as_a_film_with_loops_closed():
-    rest = ephs.equilibrium(ephs.load("scenes/four-bar.toml")).model
+    rest = ephs.equilibrium(shipped("four-bar")).model
     found = ephs.linearize(rest)
     film = found.film(0, amplitude=0.2, frames=21)
     swing = np.ptp(film.joint("main").coordinate)
@@ -332,7 +325,7 @@ def test_a_mode_plays_as_a_film_with_loops_closed():
 
 @pytest.mark.parametrize("suffix", ["json", "npz", "nc"])
 def test_matrices_are_saved(tmp_path, suffix):
-    found = ephs.linearize(ephs.equilibrium(ephs.load("scenes/chain.toml")).model)
+    found = ephs.linearize(ephs.equilibrium(shipped("chain")).model)
     file = tmp_path / f"chain.{suffix}"
     found.save(file)
     if suffix == "json":
@@ -355,9 +348,9 @@ def test_matrices_are_saved(tmp_path, suffix):
 )  # fmt: skip
 def test_what_cannot_be_is_named(keys, what):
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.linearize(ephs.load("scenes/four-bar.toml"), **keys)
+        ephs.linearize(shipped("four-bar"), **keys)
 
 
 def test_what_turns_for_ever_has_no_equilibrium():
     with pytest.raises(ephs.SimulationError, match="constant drive"):
-        ephs.equilibrium(ephs.load("scenes/slider-crank.toml"))
+        ephs.equilibrium(shipped("slider-crank"))

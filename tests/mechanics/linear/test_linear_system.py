@@ -15,10 +15,10 @@ from ephs.semantics.primitives.primitives import power_ports
 from ephs.semantics.primitives.structures import constant_structure, quadratic
 from ephs.testing import systems
 from examples import physics
+from tests.numerics import jacobian, largest
+from tests.oscillator import oscillator
 
-MASS = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")(
-    pe=lib.spring(k=1.5), ke=lib.point_mass(m=2.0), pkc=lib.pkc()
-)
+MASS = oscillator(m=2.0)
 SHAKER = Pattern.from_text("q: displacement; p: momentum, exposed; s: entropy; pe(q); pkc(q, p); mf(p, s); env(s)")(
     pe=lib.spring(k=0.7), pkc=lib.pkc(), mf=lib.friction(d=0.3), env=lib.environment()
 )
@@ -63,7 +63,7 @@ def test_an_input_that_acts_on_nothing_is_seen_in_nothing(seed):
         "env(s); store_q(q); store_p(p); store_x(x); store_y(y); tie(s, q, p, x, y)"
     )
     found = ephs.linearize(pattern(env=lib.environment(), tie=tie, **stores))
-    assert found.structure is not None and np.abs(found.B).max() < 1e-14 and np.abs(found.C).max() < 1e-14
+    assert found.structure is not None and largest(found.B) < 1e-14 and largest(found.C) < 1e-14
     assert all(law.holds() for law in found.laws), [(law.name, law.defect) for law in found.laws]
     for off in (np.zeros_like(found.C), 1e-6 * np.ones_like(found.C)):
         laws = laws_of(found.A, found.B, found.C + off, found.D, found.structure, found.sizes, conjugate=True)
@@ -81,10 +81,7 @@ def test_rates_differ_as_the_matrix_says_away_from_equilibrium():
     def rates(step):
         return pencil.unknowns(x + step)[: pencil.n_w]
 
-    columns = [
-        (8.0 * (rates(h) - rates(-h)) - (rates(2.0 * h) - rates(-2.0 * h))) / 12e-3 for h in 1e-3 * np.eye(x.size)
-    ]
-    assert np.abs(found.A - np.array(columns).T).max() < 1e-10
+    assert largest(found.A - jacobian(rates, x.size, 2e-3, 1)) < 1e-10
     assert found.structure is None and "depends on the state" in found.reason
 
 
@@ -126,16 +123,16 @@ def test_linearising_commutes_with_interconnecting():
     """A mass whose force is given, and what its velocity drives: each linearised, then joined; or joined first."""
     joined = Pattern.from_text("p: momentum; mass(p); shaker(p)")(mass=MASS, shaker=SHAKER)
     one, two = ephs.linearize(MASS), ephs.linearize(SHAKER, inputs={"p": {"effort": 0.0}})
-    assert np.abs(one.D).max() == 0.0
+    assert largest(one.D) == 0.0
     # u₁ = −y₂, u₂ = y₁ = C₁ x₁
     feedback = np.block([[one.A - one.B @ two.D @ one.C, -one.B @ two.C], [two.B @ one.C, two.A]])
     whole = ephs.linearize(joined)
-    assert np.abs(eigenvalues(whole.A) - eigenvalues(feedback)).max() < 1e-12
+    assert largest(eigenvalues(whole.A) - eigenvalues(feedback)) < 1e-12
     order = [f"mass.{name}" for name in one.states] + [f"shaker.{name}" for name in two.states]
     places = [whole.states.index(name) for name in order]
-    assert np.abs(whole.A[np.ix_(places, places)] - feedback).max() < 1e-12
+    assert largest(whole.A[np.ix_(places, places)] - feedback) < 1e-12
     # The structures join as well: exergies add, dissipation adds where the ports meet.
-    assert np.abs(whole.Q[np.ix_(places, places)] - np.diag([1.5, 0.5, 0.7])).max() < 1e-12
+    assert largest(whole.Q[np.ix_(places, places)] - np.diag([1.5, 0.5, 0.7])) < 1e-12
     assert whole.R[places[1], places[1]] == pytest.approx(0.3)
 
 
@@ -164,9 +161,7 @@ def test_a_spring_settles_under_its_load():
 
 
 def test_what_only_falls_has_no_equilibrium():
-    falling = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")(
-        pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: -9.81 * q), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
-    )
+    falling = oscillator(pe=ephs.storage({"q": ephs.quantity.displacement}, lambda q: -9.81 * q))
     with pytest.raises(ephs.SimulationError, match="no state found in which nothing moves"):
         ephs.equilibrium(falling)
 

@@ -7,6 +7,8 @@ import ephs
 from ephs.mechanics.elements.shell import statics
 from ephs.solve.auditing.growth import apart
 from examples.failing import scene
+from tests.numerics import largest
+from tests.written import scene_of_text
 
 AXES = {
     "parallel": ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]),
@@ -50,7 +52,7 @@ def test_a_scenes_system_settles_where_the_scene_does(axes, held):
     end = ephs.simulate(system, 0.5, initial=settled.states, inputs=inputs, rtol=1e-9, atol=1e-9)
     assert end.constraint_error.max() < 1e-8
     for path in poses:
-        assert np.abs(end.states[path] - settled.states[path]).max() < 1e-7
+        assert largest(end.states[path] - settled.states[path]) < 1e-7
 
 
 def test_a_joint_whose_motion_is_prescribed_is_free_in_a_system_without_it():
@@ -66,11 +68,19 @@ def test_a_joint_that_is_moved_within_the_first_second_has_no_equilibrium(motion
         ephs.equilibrium(chain("parallel", 1, motion=motion))
 
 
-def test_a_stiff_sheets_system_settles_where_the_sheet_does(tmp_path):
+def weighed(sheet):
+    """The shell of a sheet that is held at x = 0, its weight, and what is free to move."""
+    made = next(each for _, each in sheet.all_shells()).shell()
+    free = np.ones((len(made.points), 6), dtype=bool)
+    free[made.points[:, 0] == 0.0] = False
+    load = np.zeros((len(made.points), 6))
+    load[:, 5] = made.shares(-9.81 * 900.0 * 4e-3 * made.areas)
+    return made, load, free
+
+
+def test_a_stiff_sheets_system_settles_where_the_sheet_does():
     """Rounding of membrane forces is large beside the size of its states: forces are measured by forces."""
-    file = tmp_path / "sheet.toml"
-    file.write_text(
-        """
+    sheet = scene_of_text("""
         format = 1
         [shells.sheet]
         corners = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.1, 0.0], [0.0, 0.1, 0.0]]
@@ -81,17 +91,11 @@ def test_a_stiff_sheets_system_settles_where_the_sheet_does(tmp_path):
         rho = 900.0
         damping = 2e-3
         edges = ["free", "free", "free", "ground"]
-        """
-    )
-    sheet = ephs.load(file)
+        """)
     rest, settled = ephs.equilibrium(sheet), ephs.equilibrium(sheet.system())
     for path, value in rest.states.items():
-        assert np.abs(settled.states[path] - value).max() <= 1e-14  # rounding: lengths of models differ, as metrics
-    made = next(each for _, each in sheet.all_shells()).shell()
-    free = np.ones((len(made.points), 6), dtype=bool)
-    free[made.points[:, 0] == 0.0] = False
-    load = np.zeros((len(made.points), 6))
-    load[:, 5] = made.shares(-9.81 * 900.0 * 4e-3 * made.areas)
+        assert largest(settled.states[path] - value) <= 1e-14  # rounding: lengths of models differ, as metrics
+    made, load, free = weighed(sheet)
     poses, _ = statics.equilibrium(made, load, free)
     tip = rest.states[ephs.Path.of("shells.sheet.node7.pe.q")]
     np.testing.assert_allclose(tip[4:], poses[7, 4:], atol=1e-9)
@@ -111,11 +115,7 @@ def test_a_sheet_that_hangs_rests_where_growing_parts_of_its_weight_lead_it(youn
         edges = ["free", "free", "free", "ground"]
         """)
     rest = ephs.equilibrium(sheet)
-    made = next(each for _, each in sheet.all_shells()).shell()
-    free = np.ones((len(made.points), 6), dtype=bool)
-    free[made.points[:, 0] == 0.0] = False
-    load = np.zeros((len(made.points), 6))
-    load[:, 5] = made.shares(-9.81 * 900.0 * 4e-3 * made.areas)
+    made, load, free = weighed(sheet)
     poses = made.poses
     for share in np.linspace(0.0, 1.0, 41)[1:] ** 2:
         poses, _ = statics.equilibrium(made, share * load, free, poses)

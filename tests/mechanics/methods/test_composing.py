@@ -5,12 +5,13 @@ part by part from those that look at the energy of the whole. What else composin
 nesting and elimination, is measured of `natural` in `tests/semantics/test_naturality.py`.
 """
 
-import numpy as np
 import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
 from tests.mechanics.plain import uncorrected
+from tests.numerics import largest
+from tests.written import scene_of_text
 
 ROUNDING = 1e-12
 """Of ten steps whose equations are solved to rounding, with a condition of some hundreds."""
@@ -40,44 +41,40 @@ adjust = true
 """
 
 
-def beside(folder):
+def beside():
     """Two pendulums, and each alone."""
     texts = {
         name: PENDULUM.format(name=name, mass=mass, far=far) for name, mass, far in (("a", 1.0, 0.8), ("b", 2.0, 1.3))
     }
-    out = {}
-    for name, text in {"both": "".join(texts.values()), **texts}.items():
-        file = folder / f"{name}.toml"
-        file.write_text(HEAD + text, encoding="utf-8")
-        out[name] = ephs.load(file)
-    return out.pop("both"), out
+    both = scene_of_text(HEAD + "".join(texts.values()))
+    return both, {name: scene_of_text(HEAD + text) for name, text in texts.items()}
 
 
-def missed(folder, method):
+def missed(method):
     """By how much a run of both is not the runs of each, in m; and whether the balance is kept."""
-    both, parts = beside(folder)
+    both, parts = beside()
     step = STEPS.get(method, 0.1)
     run = {"method": method, "step": step, "audit": "off"}
     whole = ephs.simulate(both, 10 * step, **run)
     apart = [
-        np.abs(whole.body(name).position - ephs.simulate(scene, 10 * step, **run).body(name).position).max()
+        largest(whole.body(name).position - ephs.simulate(scene, 10 * step, **run).body(name).position)
         for name, scene in parts.items()
     ]
     return max(apart), whole.energy_error.max()
 
 
 @pytest.mark.parametrize("method", MAPS)
-def test_a_step_of_the_whole_is_the_steps_of_its_parts_or_keeps_the_energy_of_the_whole(tmp_path, method):
-    found, error = missed(tmp_path, method)
+def test_a_step_of_the_whole_is_the_steps_of_its_parts_or_keeps_the_energy_of_the_whole(method):
+    found, error = missed(method)
     assert (found <= ROUNDING) == MAPS[method]
     if not MAPS[method]:
         assert error <= 1e-13
 
 
 @pytest.mark.parametrize("method", [name for name, composes in MAPS.items() if not composes])
-def test_what_does_not_commute_is_the_correction_alone(tmp_path, method):
+def test_what_does_not_commute_is_the_correction_alone(method):
     with uncorrected():
-        found, error = missed(tmp_path, method)
+        found, error = missed(method)
     assert found <= ROUNDING < error
 
 

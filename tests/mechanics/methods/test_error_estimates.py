@@ -9,12 +9,12 @@ import pytest
 from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.methods.collocation import radau
 from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
+from tests.numerics import largest
+from tests.scenes import equations_of
 from tests.written import scene_of_text
 
 J, K, RATE = 0.5, 3.0, -1.1
@@ -34,7 +34,7 @@ def plain():
 @pytest.fixture(scope="module")
 def equations():
     scene = scene_of_text(SCENE)
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    return equations_of(scene)
 
 
 def stepper(equations, method, **options):
@@ -102,10 +102,10 @@ def test_of_radau_it_is_the_filtered_difference_to_the_embedded_method(equations
     matrix = gamma / h * np.eye(2) - A
     found = np.linalg.solve(matrix, A @ Y + embedded)
     end = (Y + z[-2:])[1]
-    if np.abs(relative(found, end)).max() > 1.0:
+    if largest(relative(found, end)) > 1.0:
         found = np.linalg.solve(matrix, A @ (Y + found) + embedded)
     attempt = stepper(equations, "radau").step(equations.start(0.0), h)
-    assert attempt.error == pytest.approx(np.abs(relative(found, end)).max(), rel=1e-3, abs=1e-4)
+    assert attempt.error == pytest.approx(largest(relative(found, end)), rel=1e-3, abs=1e-4)
     assert attempt.end.r[0] == pytest.approx(end, abs=1e-7)
 
 

@@ -1,7 +1,5 @@
 """Explicit methods on the reduced form: references by others, the natural method's limit, orders, loops, inputs."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,11 +9,11 @@ from benchmarks.cases import CASES
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.finding.mechanism import reduce_system
-from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
+from tests.numerics import largest
+from tests.scenes import SCENES, model_of, shipped
 from tests.written import scene_of_text
 
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 BY_NAME = {case.name: case for case in CASES}
 TIGHT = {"method": "rk87", "rtol": 1e-10, "atol": 1e-10}
 
@@ -25,10 +23,10 @@ def distance(one, other, scene):
     worst = 0.0
     for name, _ in scene.all_bodies():
         a, b = one.body(name), other.body(name)
-        worst = max(worst, np.abs(a.position - b.position).max(), np.abs(a.rotation - b.rotation).max())
+        worst = max(worst, largest(a.position - b.position), largest(a.rotation - b.rotation))
     for path in one:
         if tuple(path)[-1] == "s":
-            worst = max(worst, np.abs(one[path] - other[path]).max())
+            worst = max(worst, largest(one[path] - other[path]))
     return worst
 
 
@@ -91,16 +89,6 @@ def test_a_four_bar_passes_through_its_singular_configuration(tolerance):
     assert sol.energy_error.max() <= 3e3 * tolerance + 1e-8
 
 
-@pytest.mark.parametrize(("method", "order", "steps"), [("rk54", 5, (40, 80)), ("rk87", 8, (10, 20))])
-def test_orders_are_those_of_the_methods(method, order, steps):
-    scene = BY_NAME["spherical-chain-2"].scene()
-    exact = ephs.simulate(scene, 0.5, method="rk87", rtol=1e-13, atol=1e-13, save_at=[0.5])
-    found = [
-        distance(ephs.simulate(scene, 0.5, method=method, step=0.5 / n, save_at=[0.5]), exact, scene) for n in steps
-    ]
-    assert np.log2(found[0] / found[1]) == pytest.approx(order, abs=0.5)
-
-
 def test_dense_output_has_the_order_of_the_steps():
     scene = BY_NAME["spherical-chain-2"].scene()
     times = np.linspace(0.0, 1.0, 23)
@@ -108,33 +96,8 @@ def test_dense_output_has_the_order_of_the_steps():
     for t in (7, 22):
         alone = ephs.simulate(scene, times[t], save_at=[times[t]], **TIGHT)
         for name, _ in scene.all_bodies():
-            assert np.abs(every.body(name).position[t] - alone.body(name).position[-1]).max() <= 1e-8
+            assert largest(every.body(name).position[t] - alone.body(name).position[-1]) <= 1e-8
     assert np.array_equal(every.t, times)
-
-
-def test_a_group_of_bodies_that_nothing_holds_moves_freely():
-    text = """
-    format = 1
-    [world]
-    gravity = [0.0, 0.0, 0.0]
-    [bodies.a]
-    mass = 1.0
-    inertia = [0.1, 0.2, 0.25]
-    angular_velocity = [1.0, 2.0, 0.5]
-    [bodies.b]
-    mass = 2.0
-    inertia = [0.3, 0.2, 0.25]
-    [joints.ball]
-    type = "spherical"
-    bodies = ["a", "b"]
-    frame1 = { position = [0.0, 0.0, 0.5] }
-    frame2 = { position = [0.0, 0.0, -0.5] }
-    friction = 0.1
-    """
-    scene = scene_of_text(text, adjust=True)
-    sol, _ = limit_is_met(scene, 0.3, 4e-3)
-    momentum = [sum(sol.scene.body(n).mass * sol.body(n).velocity[i] for n in "ab") for i in (0, -1)]
-    assert np.allclose(momentum[0], momentum[1], atol=1e-9)
 
 
 def test_inputs_of_time_and_state_act_and_are_counted():
@@ -155,9 +118,9 @@ def test_inputs_of_time_and_state_act_and_are_counted():
 
 
 def test_few_unknowns_are_left():
-    scene = ephs.load(SCENES[0].parent / "four-bar.toml")
+    scene = shipped("four-bar")
     problem = problem_of_scene(scene)
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     reduced = reduce_system(problem, model)
     assert reduced.freedoms == 3
     assert len(reduced.cut) == 1

@@ -1,14 +1,12 @@
 """Both laws in every step of the implicit methods on joint coordinates, and by which option they are kept."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import ephs
 from tests.mechanics.plain import uncorrected
+from tests.scenes import shipped
 
-SCENES = Path(__file__).parents[3] / "scenes"
 ROUNDING = 1e-13
 """Of sums of energies relative to the gross ones: ten times the rounding of fifty steps."""
 KEEPING = {"radau": {}, "variational": {"keep": "energy"}}
@@ -16,7 +14,7 @@ KEEPING = {"radau": {}, "variational": {"keep": "energy"}}
 
 
 def run(name, method, options, step=0.02):
-    scene = ephs.load(SCENES / f"{name}.toml")
+    scene = shipped(name)
     return ephs.simulate(scene, 0.4, method=method, options=options, step=step, audit="off")
 
 

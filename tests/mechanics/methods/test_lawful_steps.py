@@ -12,8 +12,9 @@ from benchmarks.hard.brakes import brake
 from ephs.mechanics.tree.equations.led import Led
 from ephs.semantics.linear.sums import grown
 from ephs.solve.posing.errors import Outcome
+from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
-EPS = np.finfo(float).eps
 BALANCE = 1e-12
 """Of the gross energies."""
 SCENES = ("mbs", "slider-crank", "bricard", "universal", "screw-press", "body")
@@ -28,12 +29,12 @@ def uncorrected(monkeypatch):
 
 
 def run(scene, method, **options):
-    return ephs.simulate(ephs.load(f"scenes/{scene}.toml"), 0.5, method=method, audit="warn", **options)
+    return ephs.simulate(shipped(scene), 0.5, method=method, audit="warn", **options)
 
 
 def rounding(sol):
     """Of a sum of all energies that are stored, relative to the gross energies."""
-    stored = sum(float(np.abs(held).max()) for held in sol.ledgers.storages.values())
+    stored = sum(float(largest(held)) for held in sol.ledgers.storages.values())
     return 8.0 * len(sol.ledgers.storages) * EPS * stored / sol.ledgers.scale
 
 
@@ -42,14 +43,14 @@ def rounding(sol):
 def test_the_balance_is_kept_in_every_step_and_within(scene, method, uncorrected):
     options = {"rtol": 1e-5, "atol": 1e-6}
     for sol in (run(scene, method, **options), run(scene, method, save_at=INSTANTS, **options)):
-        assert np.abs(sol.energy_error).max() <= BALANCE + rounding(sol)
+        assert largest(sol.energy_error) <= BALANCE + rounding(sol)
         made = np.array(list(sol.ledgers.makers.values()) or [np.zeros(len(sol))])
-        assert np.all(np.diff(made, axis=1) >= -100.0 * EPS * np.abs(made).max())
+        assert np.all(np.diff(made, axis=1) >= -100.0 * EPS * largest(made))
         defect = sol.stats["plain_defect"]
         assert defect["largest"] <= defect["sum"]
     plain = defect["largest"] / sol.ledgers.scale
     uncorrected()
-    missed = np.abs(run(scene, method, **options).energy_error).max()
+    missed = largest(run(scene, method, **options).energy_error)
     assert missed > 10.0 * (BALANCE + rounding(sol))
     assert plain > 0.01 * missed
 
@@ -61,7 +62,7 @@ def test_inputs_that_jump_work_on_what_is_kept(method, uncorrected):
     def error():
         torque = {"joints.bearing": lambda t: 0.3 if t < 0.31 else -0.2 - t}
         sol = run("slider-crank", method, inputs=torque, jumps=[0.31], rtol=1e-5, atol=1e-6, save_at=INSTANTS)
-        return np.abs(sol.energy_error).max(), rounding(sol)
+        return largest(sol.energy_error), rounding(sol)
 
     found, allowed = error()
     assert found <= BALANCE + allowed
@@ -78,7 +79,7 @@ def test_orders_stay(scene, method, order, step, uncorrected):
         found = []
         for h in (step, 0.5 * step):
             sol = run(scene, method, step=h)
-            found.append(max(float(np.abs(sol[path][-1] - exact[path][-1]).max()) for path in sol.states))
+            found.append(max(float(largest(sol[path][-1] - exact[path][-1])) for path in sol.states))
         return np.array(found)
 
     corrected = errors()
@@ -89,12 +90,12 @@ def test_orders_stay(scene, method, order, step, uncorrected):
 
 
 def test_ten_thousand_steps_do_not_drift(uncorrected):
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
 
     def error():
         sol = ephs.simulate(scene, 50.0, method="rk54", step=5e-3, save_at=np.linspace(0.0, 50.0, 101), audit="off")
         assert sol.stats["steps"] == 10_000
-        return np.abs(sol.energy_error).max()
+        return largest(sol.energy_error)
 
     kept = error()
     assert kept <= BALANCE
@@ -110,7 +111,7 @@ def test_a_step_in_which_a_component_loses_entropy_is_refused():
     assert failed.value.outcome is Outcome.LAWLESS
     sol = ephs.simulate(scene, 1.0, method="rk54", rtol=1e-5, audit="off")
     assert sol.stats["least_production"] >= 0.0
-    assert np.abs(sol.energy_error).max() <= BALANCE
+    assert largest(sol.energy_error) <= BALANCE
 
 
 def summed(changes):

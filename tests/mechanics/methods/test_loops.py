@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.methods.registry import METHODS
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
+from tests.methods import FIXED_OF_SCENES
+from tests.numerics import largest
+from tests.scenes import equations_of
+from tests.written import scene_of_text
 
 BODY = """
 [bodies.{name}]
@@ -33,7 +34,7 @@ BETWEEN = {
 }
 
 
-def five_bar(folder, mass=1.0):
+def five_bar(mass=1.0):
     """Two cranks that are turned, and two rods between them, in a plane."""
     text = 'format = 1\nname = "five-bar"\n[assembly]\nadjust = true\n[world]\ngravity = [0.0, -9.81, 0.0]\n'
     for i, (name, (one, two)) in enumerate(BARS.items(), 1):
@@ -42,18 +43,12 @@ def five_bar(folder, mass=1.0):
     for name, (first, second, more) in BETWEEN.items():
         x, y = POINTS[name]
         text += JOINT.format(name=name, first=first, second=second, x=x, y=y, more=more)
-    file = folder / f"five-bar-{mass}.toml"
-    file.write_text(text, encoding="utf-8")
-    return ephs.load(file)
-
-
-def equations(scene):
-    return ReducedEquations(problem_of_scene(scene), 0.0)
+    return scene_of_text(text)
 
 
 @pytest.fixture(scope="module")
-def closed(tmp_path_factory):
-    eq = equations(five_bar(tmp_path_factory.mktemp("five")))
+def closed():
+    eq = equations_of(five_bar())
     return eq, eq.start(0.0)
 
 
@@ -61,7 +56,7 @@ def test_rows_are_what_gaps_change_by(closed):
     eq, state = closed
     assert eq.n == 4 and len(eq.reduced.cut) == 1
     residual, rows = eq.gaps(state.q, state.r)
-    assert np.abs(residual).max() <= 1e-12 and rows.shape == (2 + residual[2:].size, eq.n)
+    assert largest(residual) <= 1e-12 and rows.shape == (2 + residual[2:].size, eq.n)
     driven = np.flatnonzero(eq.reduced.tables.driven)
     assert driven.size == 2 and np.array_equal(rows[:2], np.eye(eq.n)[driven])
     for unit in np.eye(eq.n):
@@ -70,10 +65,10 @@ def test_rows_are_what_gaps_change_by(closed):
         assert np.abs((there - back) / 2e-5 - rows @ unit)[2:].max() <= 1e-9
 
 
-def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
+def test_sizes_of_rows_are_measured_by_inertia(closed):
     """A row is measured in the mass metric: four times the mass, half the size."""
     found = []
-    for eq in (closed[0], equations(five_bar(tmp_path, 4.0))):
+    for eq in (closed[0], equations_of(five_bar(4.0))):
         state = eq.start(0.0)
         eq.gaps(state.q, state.r)
         arrays = eq.dense.residual.arrays
@@ -82,7 +77,7 @@ def test_sizes_of_rows_are_measured_by_inertia(closed, tmp_path):
         found.append(arrays["terms"].copy())
         kept = eq.dense.independent(state.q, state.r)
         assert 2 + sum(rows.size for rows in kept) == 4  # two prescribed, two of the loop in its plane
-    assert np.abs(found[0] - 2.0 * found[1]).max() <= 1e-12 * found[0].max()
+    assert largest(found[0] - 2.0 * found[1]) <= 1e-12 * found[0].max()
 
 
 def test_power_of_what_is_prescribed_is_the_change_of_energy(closed):
@@ -93,7 +88,7 @@ def test_power_of_what_is_prescribed_is_the_change_of_energy(closed):
     dense = np.zeros(eq.size)
     dense[:nv] = engine[:nv]
     assert eq.dense.rates(np.array(state.q), y, eq.given, eq.heats, dense)[0] == 0
-    assert np.abs(dense - engine).max() <= 1e-9 * np.abs(engine).max()
+    assert largest(dense - engine) <= 1e-9 * largest(engine)
     h = 1e-4
     energies = []
     for by in (h, -h):
@@ -112,18 +107,18 @@ def test_gaps_are_counted_from_the_last_prescribed_joint_on(closed):
     out, _ = eq.gaps(open_q, state.r)
     eq.fitted(open_q, state.r)
     own, worst = eq.dense.residual.gaps()
-    assert np.array_equal(out, [0.0, 0.0, *own]) and worst == np.abs(own).max() > 1e-5
+    assert np.array_equal(out, [0.0, 0.0, *own]) and worst == largest(own) > 1e-5
 
 
-@pytest.mark.parametrize("method", [name for name, m in METHODS.items() if m.scenes and m.fixed])
-def test_every_method_turns_what_is_prescribed_and_counts_its_work(method, tmp_path):
-    scene, missed = five_bar(tmp_path), []
+@pytest.mark.parametrize("method", FIXED_OF_SCENES)
+def test_every_method_turns_what_is_prescribed_and_counts_its_work(method):
+    scene, missed = five_bar(), []
     best = ephs.simulate(scene, 0.2, method="rk87", rtol=1e-11, atol=1e-13, save_at=[0.2])
     size = abs(best.work[-1])
     for h in (0.02, 0.01):
         sol = ephs.simulate(scene, 0.2, method=method, step=h)
         for name, rate in (("left", 0.7), ("right", -0.4)):
-            assert np.abs(np.ravel(sol.joint(name).coordinate) - rate * sol.t).max() <= 1e-9
+            assert largest(np.ravel(sol.joint(name).coordinate) - rate * sol.t) <= 1e-9
         assert sol.constraint_error.max() <= 1e-9
         missed.append([abs(sol.work[-1] - best.work[-1]), abs(sol.heat[-1] - best.heat[-1])])
     for far, near in zip(*missed, strict=True):  # of order 2 at least, down to what the best run is good for

@@ -5,6 +5,7 @@ import pytest
 
 import ephs
 from benchmarks.hard import CASES
+from tests.numerics import EPS
 
 
 @pytest.mark.parametrize("heavy", ["crank", "coupler", "rocker"])
@@ -22,4 +23,4 @@ def test_component_by_component_too(method, allowed, heavy):
     case = CASES[f"heavy {heavy}"]
     sol = ephs.simulate(case.make(), case.until, method=method, step=0.01)
     assert case.error(sol) <= allowed
-    assert sol.energy_error.max() <= 10.0 * np.sqrt(40) * 10.0 * np.finfo(float).eps
+    assert sol.energy_error.max() <= 10.0 * np.sqrt(40) * 10.0 * EPS

@@ -1,7 +1,6 @@
 """Linear and angular momentum in every step: of mechanisms that nothing holds, with the balance of energy."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +9,12 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods import registry
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.running import loop
 from tests.mechanics.momenta import floating, momenta
+from tests.numerics import largest
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
-SCENES = Path(__file__).parents[3] / "scenes"
 METHODS = {
     **{name: {"rtol": 1e-4, "atol": 1e-4} for name in ("rk54", "rk87", "radau", "auto", "semi")},
     "variational": {"step": 0.04},
@@ -37,7 +35,7 @@ def drift(scene, sol, columns=slice(None)):
     for name, body in scene.all_bodies():
         motion = sol.body(name)
         far = 1.0 + np.linalg.norm(motion.position, axis=1).max()
-        size += body.mass * far * (np.abs(motion.velocity).max() + np.abs(motion.angular_velocity).max())
+        size += body.mass * far * (largest(motion.velocity) + largest(motion.angular_velocity))
     return float(np.abs(found - found[0])[:, columns].max() / size)
 
 
@@ -69,21 +67,21 @@ def test_under_gravity_what_lies_across_is_kept(scene):
 @pytest.mark.parametrize("method", METHODS)
 def test_without_the_option_momenta_drift(method):
     """The control; steps of the variational method keep them by themselves, not with its energies corrected."""
-    scene = ephs.load(SCENES / "mbs.toml")
+    scene = shipped("mbs")
     assert drift(scene, run(scene, method, {"keep": "energy"}, 0.2)) > 1e2 * ROUNDING
     assert drift(scene, run(scene, method, BOTH, 0.2)) <= ROUNDING
 
 
 @pytest.mark.parametrize("method", ["rk87", "radau"])
 def test_instants_within_steps_keep_them_too(method):
-    scene = ephs.load(SCENES / "mbs.toml")
+    scene = shipped("mbs")
     times = np.linspace(0.0, 0.4, 32)
     sol = ephs.simulate(scene, 0.4, method=method, options=BOTH, audit="off", save_at=times, **METHODS[method])
     assert sol.stats["steps"] < len(times) and drift(scene, sol) <= ROUNDING
 
 
 def test_variational_steps_keep_momenta_by_themselves():
-    scene = ephs.load(SCENES / "mbs.toml")
+    scene = shipped("mbs")
     sol = run(scene, "variational", {"keep": "momentum"})
     assert drift(scene, sol) <= ROUNDING and sol.energy_error.max() > 1e2 * ROUNDING
 
@@ -91,25 +89,23 @@ def test_variational_steps_keep_momenta_by_themselves():
 @pytest.mark.parametrize(("name", "kept"), [("heavy-top", 1), ("four-bar", 0), ("slider-crank", 0), ("mbs", 6)])
 def test_what_is_held_keeps_fewer(name, kept):
     """A top keeps what turns it about the vertical; a crank keeps nothing."""
-    eq = ReducedEquations(problem_of_scene(ephs.load(SCENES / f"{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     eq.accounts.keep("energy and momenta")
     assert int(np.any(eq.engine.tables["bases"].reshape(-1, 6, 6), axis=1).sum()) == kept
 
 
 @pytest.mark.parametrize(("method", "order"), [("rk54", 5), ("variational", 2)])
 def test_keeping_momenta_leaves_the_order_as_it_is(method, order):
-    scene, ends = ephs.load(SCENES / "mbs.toml"), []
+    scene, ends = shipped("mbs"), []
     exact = ephs.simulate(scene, 0.8, method="rk87", rtol=1e-13, atol=1e-13)
     for step in (0.1, 0.05):
         sol = ephs.simulate(scene, 0.8, method=method, step=step, options=BOTH, audit="off")
-        ends.append(
-            max(np.abs(sol.body(b).position[-1] - exact.body(b).position[-1]).max() for b, _ in scene.all_bodies())
-        )
+        ends.append(max(largest(sol.body(b).position[-1] - exact.body(b).position[-1]) for b, _ in scene.all_bodies()))
     assert np.log2(ends[0] / ends[1]) > order - 0.6
 
 
 def test_an_option_that_there_is_not_is_refused():
-    scene = ephs.load(SCENES / "mbs.toml")
+    scene = shipped("mbs")
     for method in ("rk87", "auto", "radau"):
         with pytest.raises(ephs.OptionError, match="'energy and momenta'"):
             run(scene, method, {"keep": "momenta"})
@@ -227,7 +223,7 @@ def test_a_run_that_was_stopped_goes_on_with_the_momenta_that_it_had(method, ste
         times = np.linspace(0.0, 0.4, 9)
         return ephs.simulate(scene, 0.4, method=method, step=step, options=BOTH, audit="off", save_at=times, **more)
 
-    scene, journal = ephs.load(SCENES / "mbs.toml"), tmp_path / "run.journal"
+    scene, journal = shipped("mbs"), tmp_path / "run.journal"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(loop, "RESPONSE", -1.0)  # progress is told at every step
         patch.setattr(loop, "BURST", 8)  # of compiled ones after so many

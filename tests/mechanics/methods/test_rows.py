@@ -1,7 +1,5 @@
 """Rows of compiled steps stay arrays: they are the records of the states that are made of them, bit for bit."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,7 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing import rounding
 from ephs.solve.running.stepping import Taken
-
-SCENES = sorted((Path(__file__).resolve().parents[3] / "scenes").glob("*.toml"))
+from tests.scenes import SCENES
 
 
 @pytest.mark.parametrize("save_at", [None, np.linspace(0.0, 0.3, 8)])

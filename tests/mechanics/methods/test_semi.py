@@ -6,19 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.methods.semi import ARRAYS, SCHEME, Semi
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.drags import Drags, resisting
 from ephs.mechanics.tree.engine.programs import of_motion
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Program, Real, Vector
 from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
+from tests.numerics import largest, seeds
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
@@ -69,7 +68,7 @@ class Stage:
     """One stage of a scene's equations at its start, with other rates."""
 
     def __init__(self, scene, seed):
-        self.eq = eq = ReducedEquations(problem_of_scene(scene), 0.0)
+        self.eq = eq = equations_of(scene)
         self.state = eq.start(0.0)
         self.y = eq.vector(self.state)
         self.rates = slice(eq.nv, eq.nv + eq.n)
@@ -164,18 +163,18 @@ def check(stage, seed):
     # Without weight, losses are those of the rates.
     found = stage.at(stage.y[stage.rates], 0.0)
     size = 1.0 + np.abs(rates)
-    assert np.abs(found - rates).max() <= 1e-9 * size.max()
+    assert largest(found - rates) <= 1e-9 * size.max()
     # With weight, they are those of the rates that are reached.
     known, weight = rng.normal(size=eq.n), 10.0 ** rng.uniform(-4, 1)
     there = stage.at(known, weight)
     again = stage.at(known + weight * there[stage.rates], 0.0)
-    loss = np.abs(again[stage.rates] - stage.at(np.zeros(eq.n), 0.0)[stage.rates]).max()
-    assert np.abs(there - again).max() <= 1e-9 * (1.0 + np.abs(again).max() + loss)
+    loss = largest(again[stage.rates] - stage.at(np.zeros(eq.n), 0.0)[stage.rates])
+    assert largest(there - again) <= 1e-9 * (1.0 + largest(again) + loss)
     made = there[eq.nv + eq.n + eq.ns + 2 :]
     assert np.all(made >= 0.0)
 
 
-@given(scene=mechanisms(), seed=st.integers(0, 2**20))
+@given(scene=mechanisms(), seed=seeds)
 @settings(max_examples=25)
 def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
     stage = Stage(scene, seed)
@@ -191,7 +190,7 @@ def closed(request):
     return scene_of_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text)
 
 
-@given(seed=st.integers(0, 2**20))
+@given(seed=seeds)
 @settings(max_examples=5)
 def test_so_they_do_within_loops_and_beside_prescribed_motions(closed, seed):
     stage = Stage(closed, seed)
@@ -199,7 +198,7 @@ def test_so_they_do_within_loops_and_beside_prescribed_motions(closed, seed):
     assert stage.memory["counts"][0] > 0
 
 
-@given(seed=st.integers(0, 2**20))
+@given(seed=seeds)
 @settings(max_examples=10)
 def test_so_do_those_of_contacts_within_a_mechanism(hug, seed):
     stage = Stage(hug, seed)
@@ -219,7 +218,7 @@ def test_steps_converge_with_order_three():
 
     exact = ephs.simulate(hug, 4e-3, method="rk87", rtol=1e-12, atol=1e-14, audit="off")
     exact = np.concatenate([exact.body("hand").velocity[-1], exact.body("trunk").angular_velocity[-1]])
-    errors = [np.abs(end(4e-3 / count) - exact).max() for count in (16, 32, 64)]
+    errors = [largest(end(4e-3 / count) - exact) for count in (16, 32, 64)]
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
 
 
@@ -230,12 +229,12 @@ def test_so_they_do_with_loops_and_prescribed_motions(closed):
         return np.concatenate([*(sol.body(body).velocity[-1] for body in closed.bodies), ledgers])
 
     exact = end(method="rk87", rtol=1e-11, atol=1e-12)
-    errors = [np.abs(end(method="semi", step=0.1 / count) - exact).max() for count in (20, 40, 80)]
+    errors = [largest(end(method="semi", step=0.1 / count) - exact) for count in (20, 40, 80)]
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.6)
 
 
 def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
-    scene = ephs.load(SCENES / "four-bar.toml")
+    scene = shipped("four-bar")
     inputs = {"joints.main": lambda t, state: 4.0 * np.sin(20.0 * t) - 0.1 * state.joints["main"].rate[0]}
 
     def end(**how):
@@ -244,14 +243,14 @@ def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
         return np.concatenate([*(sol.body(body).velocity[-1] for body in scene.bodies), sol.heat[-1:], sol.work[-1:]])
 
     exact = end(method="rk87", rtol=1e-11, atol=1e-12)
-    errors = [np.abs(end(method="semi", step=0.2 / count) - exact).max() for count in (20, 40, 80)]
+    errors = [largest(end(method="semi", step=0.2 / count) - exact) for count in (20, 40, 80)]
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.7)
 
 
 @pytest.mark.parametrize("name", ["four-bar", "hot-brake", "biped"])
 @pytest.mark.parametrize("how", [{"step": 2e-3}, {"rtol": 1e-4, "atol": 1e-5}])
 def test_single_steps_are_those_of_compiled_runs(name, how):
-    scene, times = ephs.load(SCENES / f"{name}.toml"), np.linspace(0.0, 0.1, 8)
+    scene, times = shipped(name), np.linspace(0.0, 0.1, 8)
     looked_at = {"events": [ephs.Event(lambda t, state: 1.0 + t, "never", stop=False)]}
     whole, single = (
         ephs.simulate(scene, 0.1, method="semi", save_at=times, audit="off", **how, **more)
@@ -259,10 +258,10 @@ def test_single_steps_are_those_of_compiled_runs(name, how):
     )  # fmt: skip
     assert whole.stats["steps"] == single.stats["steps"]
     for path in whole.states:
-        size = np.abs(whole[path]).max() + 1.0
-        assert np.abs(whole[path] - single[path]).max() <= 1e-10 * size
-    assert np.abs(whole.heat - single.heat).max() <= 1e-10 * (1.0 + np.abs(whole.heat).max())
-    assert max(np.abs(sol.energy_error).max() for sol in (whole, single)) <= 1e-11
+        size = largest(whole[path]) + 1.0
+        assert largest(whole[path] - single[path]) <= 1e-10 * size
+    assert largest(whole.heat - single.heat) <= 1e-10 * (1.0 + largest(whole.heat))
+    assert max(largest(sol.energy_error) for sol in (whole, single)) <= 1e-11
 
 
 def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes():
@@ -271,8 +270,8 @@ def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_chang
     scene = scene_of_text(re.sub(r"friction = [0-9.]+", "friction = 1e4", text))
     inputs = {"joints.main": lambda t, state: 4.0 + t}
     found = ephs.simulate(scene, 0.5, method="semi", step=0.02, inputs=inputs, audit="off")
-    assert np.abs(found.joint("main").rate).max() <= 1e-2
-    assert found.stats["least_production"] >= 0.0 and np.abs(found.energy_error).max() <= 1e-11
+    assert largest(found.joint("main").rate) <= 1e-2
+    assert found.stats["least_production"] >= 0.0 and largest(found.energy_error) <= 1e-11
 
 
 @pytest.mark.parametrize("slip", [1e-2, 1e-4, 1e-6])
@@ -286,7 +285,7 @@ def test_stiff_friction_does_not_shorten_steps(slip):
     allowed = 2.0 * rtol * speed / 0.1  # a joint's rates are weighed by the largest, which is that of turning
     assert sol.body("ball").velocity[-1, 0] == pytest.approx(speed, abs=allowed)
     assert sol.heat[-1] == pytest.approx(0.5 * 2.0 / 7.0, abs=1.4 * speed * allowed)
-    assert np.abs(sol.energy_error).max() <= 1e-11
+    assert largest(sol.energy_error) <= 1e-11
     assert sol.stats["least_production"] >= 0.0
 
 
@@ -318,7 +317,7 @@ def test_what_comes_to_rest_stays_where_its_energy_cannot_be_mended():
     assert sol.stats["method"] == "semi"
     height = sol.body("wheel").position[:, 2]
     assert height[-1] == pytest.approx(0.1 - 0.5 * 9.81 / 1e5, abs=1e-4)  # on two rims
-    assert np.abs(sol.energy_error).max() <= 0.1**2
+    assert largest(sol.energy_error) <= 0.1**2
 
 
 def test_an_ensemble_equals_its_single_runs(tmp_path):

@@ -11,7 +11,7 @@ from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.rewrite.rewrite import MOST, Rule, RuleSite, StateMap, Strength, rewrite
 from ephs.mechanics.runs.assembling import flat_joints
 from ephs.semantics.spaces import SE3
-from tests.solve.conftest import oscillator
+from tests.oscillator import oscillator
 
 
 def same(_draft):

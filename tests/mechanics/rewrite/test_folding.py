@@ -1,7 +1,6 @@
 """Folding: the same relation in fewer unknowns, at an instant and over a step, whatever is folded first."""
 
 from dataclasses import replace
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -25,9 +24,9 @@ from ephs.semantics.verdicts.checks import random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms
 from tests.mechanics.kernels import Draw, agreeing
+from tests.numerics import generators, largest, seeds
+from tests.scenes import SCENES, shipped
 
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
-seeds = st.integers(0, 2**20)
 MOMENTUM = PortType(quantity.body_momentum, True)
 
 
@@ -91,10 +90,9 @@ def test_friction_and_traced_constraints_keep_their_kernels(seed):
     agreeing(Draw(pull_back(traced, {Path.of("p"): Map(rng.standard_normal((6, 6)), MOMENTUM)}), seed, 0.1))
 
 
-@given(seed=seeds)
-def test_maps_in_series_multiply(seed):
+@given(rng=generators)
+def test_maps_in_series_multiply(rng):
     """Pulling back twice is pulling back by the product, in the plain relation and in the numbers of the kernel."""
-    rng = np.random.default_rng(seed)
     inner = components.holonomic(joint_pair("cylindrical"))
     first, second = rng.standard_normal((2, 6, 6))
     port = Path.of("p_j1")
@@ -104,7 +102,7 @@ def test_maps_in_series_multiply(seed):
     assert np.allclose(twice.kernel.parameters, once.kernel.parameters, rtol=1e-13, atol=1e-13)
     x = random_point(twice.bundle, twice.reads, rng)
     one, other = twice.structure(x)[1], once.structure(x)[1]
-    assert np.abs(one - other).max() <= 1e-13 * np.abs(one).max()
+    assert largest(one - other) <= 1e-13 * largest(one)
 
 
 def test_a_map_of_entropy_ports_is_checked():
@@ -136,7 +134,7 @@ def test_a_folded_joint_has_the_relation_and_the_matrix_of_the_literature(kind, 
     ad = [SE3.adjoint(SE3.inverse(o)) for o in (pose, o1, o2)]
     expected = np.hstack([ad[0] @ ad[1], -ad[2], of.basis])
     _, found = left[Path.of("hc")].structure(x)
-    assert np.abs(found - expected).max() <= 1e-14 * max(1.0, np.abs(expected).max())
+    assert largest(found - expected) <= 1e-14 * max(1.0, largest(expected))
 
 
 @settings(max_examples=25)
@@ -295,14 +293,14 @@ def agree(scene, method, step, steps):
     )
     assert list(paper) == list(folded)
     for path in paper:
-        scale = max(1.0, float(np.abs(paper[path]).max(initial=0.0)))
-        assert np.abs(paper[path] - folded[path]).max(initial=0.0) <= steps * 1e-12 * scale, path
+        scale = max(1.0, float(largest(paper[path], initial=0.0)))
+        assert largest(paper[path] - folded[path], initial=0.0) <= steps * 1e-12 * scale, path
     fewer = paper.stats["unknowns"] - folded.stats["unknowns"]
     assert fewer > 0 if dict(scene.all_joints()) else fewer == 0  # a body alone has no frame but its own
     assert folded.summary()["unknowns"] == {"paper": paper.stats["unknowns"], "used": folded.stats["unknowns"]}
-    scale = 1.0 + np.abs(paper.energy).max()
+    scale = 1.0 + largest(paper.energy)
     for totals in ("energy", "heat", "work", "entropy", "kinetic", "potential"):
-        assert np.abs(getattr(paper, totals) - getattr(folded, totals)).max() <= steps * 1e-12 * scale, totals
+        assert largest(getattr(paper, totals) - getattr(folded, totals)) <= steps * 1e-12 * scale, totals
     return paper, folded
 
 
@@ -317,12 +315,12 @@ def test_folded_steps_are_the_same_steps(file, method):
 @pytest.mark.parametrize("stem", ["mbs", "chain"])
 def test_coarse_steps_are_the_same_too(stem, method):
     """There the corrections are large: measured in the frames of the bodies they would be others."""
-    agree(ephs.load(SCENES[0].parent / f"{stem}.toml"), method, 0.1 if stem == "mbs" else 0.05, 4)
+    agree(shipped(stem), method, 0.1 if stem == "mbs" else 0.05, 4)
 
 
 @pytest.mark.parametrize("stem", ["four-bar", "universal"])
 def test_everything_that_is_read_from_a_motion_is_there(stem):
-    scene = ephs.load(SCENES[0].parent / f"{stem}.toml")
+    scene = shipped(stem)
     paper, folded = agree(scene, "natural", 2e-3, 2)
     for name, _ in scene.all_joints():
         one, other = paper.joint(name), folded.joint(name)
@@ -344,7 +342,7 @@ def test_and_in_generated_mechanisms(method, scene):
 
 def test_chosen_steps_inputs_and_events_are_served():
     """What reads states reads the same states; the energies of dense output are the same too."""
-    scene = ephs.load(SCENES[0].parent / "four-bar.toml")
+    scene = shipped("four-bar")
     found = [
         ephs.simulate(
             scene,
@@ -368,14 +366,14 @@ def test_chosen_steps_inputs_and_events_are_served():
 
 
 def test_a_failed_run_keeps_the_papers_solution():
-    scene = ephs.load(SCENES[0].parent / "heavy-top.toml")
+    scene = shipped("heavy-top")
     with pytest.raises(ephs.SimulationError) as failed:
         ephs.simulate(scene, 1.0, step=0.1, method="natural", form="folded")
     assert failed.value.partial["bodies.top.pe.q"].shape[1] == 7
 
 
 def test_methods_in_joint_coordinates_have_no_folded_form():
-    scene = ephs.load(SCENES[0].parent / "mbs.toml")
+    scene = shipped("mbs")
     with pytest.raises(ephs.OptionError, match="form is 'folded', expected reduced"):
         ephs.simulate(scene, 1.0, method="rk87", form="folded")
     assert ephs.simulate(scene, 0.01, form="folded").stats["method"] == "natural4"

@@ -1,11 +1,8 @@
 """What `reduce` says: groups, loops, redundancy and cyclic coordinates against independent computations of each."""
 
-from pathlib import Path as File
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 
 import ephs
 from benchmarks.cases import CASES
@@ -19,19 +16,17 @@ from ephs.mechanics.scene.geometry import coupling_of
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.semantics.spaces import SE3
 from ephs.solve.equations.mobility import mobility
-from ephs.solve.equations.model import compile_model
 from ephs.testing import mechanisms
+from tests.numerics import generators, largest, seeds
+from tests.scenes import SCENES, model_of, shipped
 from tests.written import scene_of_text
 
-SCENES = sorted((File(__file__).parents[3] / "scenes").glob("*.toml"))
 BY_NAME = {case.name: case for case in CASES}
 
 
 def reduced_of(scene):
     problem = problem_of_scene(scene)
-    return reduce_system(
-        problem, compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
-    )
+    return reduce_system(problem, model_of(problem))
 
 
 def scene_of(text):
@@ -53,7 +48,7 @@ def named(reduction, name):
     ],
 )
 def test_the_group_of_a_motion_is_named(stem, words):
-    step = named(ephs.reduce(ephs.load(SCENES[0].parent / f"{stem}.toml")), "the group of the motion")
+    step = named(ephs.reduce(shipped(stem)), "the group of the motion")
     assert words in step.reason
     assert step.strength == Strength.TRAJECTORIES
 
@@ -88,7 +83,7 @@ def test_slides_and_pins_make_the_groups_that_they_generate(kind, name):
 
 
 @settings(max_examples=15)
-@given(scene=mechanisms(max_bodies=3), seed=st.integers(0, 2**20))
+@given(scene=mechanisms(max_bodies=3), seed=seeds)
 def test_bodies_never_leave_the_group_of_their_mechanism(scene, seed):
     """Displacements from the start are in it: the logarithm of q q⁰⁻¹, where it is short, lies in the algebra."""
     found = coordinates.mechanisms(reduced_of(scene))
@@ -98,7 +93,7 @@ def test_bodies_never_leave_the_group_of_their_mechanism(scene, seed):
             poses = solution[component_path("bodies", name) / "pe" / "q"]
             twist = SE3.log(SE3.compose(poses[-1], SE3.inverse(poses[0])))
             outside = twist - part.group.basis @ (part.group.basis.T @ twist)
-            assert np.abs(outside).max() <= 1e-10 * max(1.0, np.abs(twist).max())
+            assert largest(outside) <= 1e-10 * max(1.0, largest(twist))
 
 
 # ---- loops and redundancy ----------------------------------------------------------------------------------------
@@ -141,7 +136,7 @@ def test_the_squeezer_closes_three_loops_with_two_equations_each():
 
 def test_what_no_group_explains_is_found_by_rank():
     """Both ends of the shafts of a universal joint are held: turning about them closes only where they meet."""
-    scene = ephs.load(SCENES[0].parent / "universal.toml")
+    scene = shipped("universal")
     reduced = reduced_of(scene)
     step = named(ephs.reduce(scene), "redundant constraints")
     (loop,) = coordinates.loops(reduced)
@@ -226,15 +221,14 @@ def test_a_spring_to_the_ground_and_a_loop_read_where_a_mechanism_is():
     joint = PIVOT.format(kind="spherical", axis=UP, more="")
     spring = "[springs.s]\nbodies = ['ground', 'top']\nat1 = [1.0, 0.0, 0.0]\nat2 = [0.0, 0.2, 0.0]\nstiffness = 1.0\n"
     assert count(scene_of(TOP.format(gravity="[0.0, 0.0, -9.81]", joint=joint + spring))) == 0
-    assert count(ephs.load(SCENES[0].parent / "four-bar.toml")) == 0
+    assert count(shipped("four-bar")) == 0
 
 
 @settings(max_examples=20)
-@given(scene=mechanisms(max_bodies=3, loops=False, springs=False, heat=False), seed=st.integers(0, 2**20))
-def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, seed):
+@given(scene=mechanisms(max_bodies=3, loops=False, springs=False, heat=False), rng=generators)
+def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, rng):
     """Started elsewhere along them, momenta and all other coordinates go as before."""
     reduced = reduced_of(scene)
-    rng = np.random.default_rng(seed)
     changed = {str(path): value for path, value in initial_state(scene).items()}
     shifted = set()
     for part in coordinates.mechanisms(reduced):
@@ -263,9 +257,9 @@ def test_moving_along_cyclic_coordinates_changes_nothing_else(scene, seed):
     assert one.stats["cut_steps"] == other.stats["cut_steps"] == 0
     for path in one:
         if str(path) not in shifted:
-            assert np.abs(one[path] - other[path]).max(initial=0.0) <= 1e-9 * max(
-                1.0, np.abs(one[path]).max(initial=0.0)
-            ), path
+            assert largest(one[path] - other[path], initial=0.0) <= 1e-9 * max(1.0, largest(one[path], initial=0.0)), (
+                path
+            )
 
 
 # ---- the whole ----------------------------------------------------------------------------------------------------

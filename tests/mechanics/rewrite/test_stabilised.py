@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -19,9 +18,9 @@ from ephs.semantics.spaces import SE3, manifold
 from ephs.solve.equations.model import compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.posing.errors import OptionError
+from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
-SCENES = File(__file__).parents[3] / "scenes"
-EPS = float(np.finfo(float).eps)
 UNTIL = 0.2
 LENGTHS = (0.01, 5e-3, 2.5e-3)
 NAMES = ("chain", "n-four-bar")
@@ -31,7 +30,7 @@ ROUNDING = 10.0 * 1e2 * EPS
 
 
 def prepared(name, make):
-    problem = problem_of_scene(ephs.load(SCENES / f"{name}.toml"))
+    problem = problem_of_scene(shipped(name))
     system = make(problem.system)
     inputs = problem.inputs(0.0, problem.initial)
     return system, problem.initial, inputs
@@ -62,14 +61,14 @@ def stepped(name, make, h):
     stored = np.array([slot.primitive.kind == "storage" for slot in d.components])
     changes = (chunk.rows.energies - method.energies(x))[:, stored]
     return Run(
-        d.unpack(after.x), float(np.abs(after.z[0, at]).max(initial=0.0)), float(changes[-1].sum()),
+        d.unpack(after.x), float(largest(after.z[0, at], initial=0.0)), float(changes[-1].sum()),
         float(np.abs(changes).sum(axis=1).max()), after.sums, workers,
     )  # fmt: skip
 
 
 def largest_gap(name, states):
     """Largest entry of log of where two bodies put a joint's frame, from the scene's own offsets."""
-    scene = ephs.load(SCENES / f"{name}.toml")
+    scene = shipped(name)
     worst = 0.0
     for joint in scene.joints.values():
         ends = []
@@ -78,7 +77,7 @@ def largest_gap(name, states):
             ends.append(SE3.compose(pose, frame))
         relative = coupling_of(joint).pair.include(states[Path.of(f"joints.{joint.name}.pe.q_r")])
         gap = SE3.log(SE3.compose(SE3.inverse(ends[1]), SE3.compose(ends[0], relative)))
-        worst = max(worst, float(np.abs(gap).max()))
+        worst = max(worst, float(largest(gap)))
     return worst
 
 
@@ -120,7 +119,7 @@ def test_a_step_is_that_of_the_definition():
     after, chunk = method.advance(method.init(model.descriptor.pack(initial)), h, 1)
     assert chunk.failure is None
     for path, value in model.descriptor.unpack(after.x).items():
-        assert np.abs(value - new[path]).max(initial=0.0) <= 1e-9
+        assert largest(value - new[path], initial=0.0) <= 1e-9
 
 
 def test_in_continuous_time_the_closing_components_are_empty():
@@ -137,7 +136,7 @@ def test_in_continuous_time_the_closing_components_are_empty():
         v = {port: 0.01 * rng.standard_normal(part.interface[port].quantity.space.dim) for port in part.reads}
         e = rng.standard_normal(part.bundle.size)
         moved, closed = part.discrete(0.01, x0, v, e)
-        assert np.abs(moved @ e - closed).max() > 0.1  # C_h e = F would be a Dirac structure
+        assert largest(moved @ e - closed) > 0.1  # C_h e = F would be a Dirac structure
 
 
 def test_frames_without_mass_are_refused():

@@ -6,8 +6,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
-from ephs.solve.equations.model import compile_model
+from tests.scenes import equations_of, model_of
 from tests.written import scene_of_text
 
 SCENE = """format = 1
@@ -31,7 +30,7 @@ axis = [0.0, 0.0, 1.0]
 def test_the_first_step_begins_with_all_unknowns(motion):
     scene = scene_of_text(SCENE.format(motion=motion))
     problem = problem_of_scene(scene)
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem)
     assert ephs.reduce(scene).before == model.unknowns
     assert bool(motion) == bool(problem.prescribed)
 
@@ -41,6 +40,6 @@ def test_the_first_step_begins_with_all_unknowns(motion):
 )
 def test_the_last_step_ends_with_the_unknowns_of_a_run(file):
     scene = ephs.load(file)
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     equations.start(0.0)
     assert ephs.reduce(scene).steps[-1].after == equations.stats()["unknowns"]

@@ -9,9 +9,10 @@ import ephs
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
 from tests.mechanics.tree import machines
+from tests.scenes import ROOT
 from tests.written import scene_of_text
 
-SCENE = machines.SCENES / "motor-four-bar.toml"
+SCENE = ROOT / "scenes" / "motor-four-bar.toml"
 END = ("motors.drive.coil.b", "motors.drive.rotor.p", "thermal.housing.s")
 
 

@@ -10,6 +10,8 @@ from ephs.mechanics.sensitivity.family import ParameterFamily
 from ephs.mechanics.tree.engine.tangents import StepTangent
 from ephs.solve.posing.errors import OptionError
 from tests.mechanics.tree.machines import gas_spring_on_slider_crank, motor_on_four_bar
+from tests.numerics import largest
+from tests.scenes import shipped
 from tests.solve.test_own_methods import Kutta
 from tests.written import scene_of_text
 
@@ -64,7 +66,7 @@ shape = { plane = {} }
 
 
 def backwards(method, paths=PATHS):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     return ephs.gradient(scene, paths, TIMES, WEIGHTS, method=method, step=STEPS[method])
 
 
@@ -85,13 +87,13 @@ def forwards(scene, paths, times, weights, method, step):
 
 @pytest.mark.parametrize("method", STEPS, ids=str)
 def test_steps_with_loops_friction_and_the_balance_kept_as_tangents_say(method, monkeypatch):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     found, expected = backwards(method), forwards(scene, PATHS, TIMES, WEIGHTS, method, STEPS[method])
-    scale = np.abs(expected).max()
-    assert np.abs(np.array([found.derivatives[path] for path in PATHS]) - expected).max() <= NEAR * scale
+    scale = largest(expected)
+    assert largest(np.array([found.derivatives[path] for path in PATHS]) - expected) <= NEAR * scale
     monkeypatch.setattr(explicit, "StepTangent", lambda *given, corrected: StepTangent(*given, corrected=False))
     plain = backwards(method)
-    apart = np.abs(np.array([plain.derivatives[path] for path in PATHS]) - expected).max()
+    apart = largest(np.array([plain.derivatives[path] for path in PATHS]) - expected)
     assert apart > 10.0 * NEAR * scale, "steps without the correction have other derivatives"
 
 
@@ -110,7 +112,7 @@ def test_systems_with_what_is_attached_as_tangents_say(machine, paths, joint):
     expected = along.of(lambda sol: sol.joint(joint).coordinate[-1, 0] - 0.4 * sol.joint(joint).rate[-1, 0])
     found = ephs.gradient(system, paths, [0.02], {f"{joint}.coordinate": [1.0], f"{joint}.rate": [-0.4]}, **run)
     mine = np.array([found.derivatives[path] for path in paths])
-    assert np.abs(mine - expected).max() <= READ * np.abs(expected).max()
+    assert largest(mine - expected) <= READ * largest(expected)
 
 
 def test_through_a_contact_that_slips_as_tangents_say():
@@ -124,7 +126,7 @@ def test_through_a_contact_that_slips_as_tangents_say():
     expected = forwards(scene, paths, times, weights, "rk54", step)
     assert np.all(np.abs(expected) > 0.0), "it strikes, and slips"
     mine = np.array([found.derivatives[path] for path in paths])
-    assert np.abs(mine - expected).max() <= NEAR * np.abs(expected).max()
+    assert largest(mine - expected) <= NEAR * largest(expected)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +141,7 @@ def test_through_a_contact_that_slips_as_tangents_say():
     ],
 )
 def test_gradients_refuse(change, says):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     given = {"model": scene, "parameters": PATHS[:1], "times": TIMES, "weights": WEIGHTS} | change
     with pytest.raises(OptionError) as raised:
         ephs.gradient(**given)

@@ -7,16 +7,16 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.explicit import tableau
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.parameters import read
 from ephs.mechanics.sensitivity import explicit
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
 from ephs.mechanics.sensitivity.family import ParameterFamily, relation_of
 from ephs.mechanics.tree.engine.tangents import DIRECTIONS, StepTangent
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from tests.mechanics.ball import BALL
 from tests.mechanics.tree.engine.test_engine import moved
+from tests.numerics import largest
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
 EXACT = 1e-12
@@ -79,13 +79,13 @@ def test_a_pendulum_as_a_complex_step_says(method, monkeypatch):
         unit = np.eye(len(values))[number]
         expected = pendulum(np.array(values) + 1e-40j * unit, method, 0.05, 8).imag / 1e-40
         mine = [found[f"joints.pin.{key}"][-1, 0, number] for key in ("coordinate", "rate")]
-        assert np.abs(signs.get(path, 1.0) * np.array(mine) - expected).max() < EXACT * np.abs(expected).max(), path
+        assert largest(signs.get(path, 1.0) * np.array(mine) - expected) < EXACT * largest(expected), path
 
 
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "heavy-top"])
 def test_rates_along_directions_as_the_dense_equations_say(name):
     """Derivatives of the accelerations by elements and rates: through sweeps, and through the mass matrix."""
-    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     state = moved(eq)
     linear = Linearised(eq)
     linear.forward(state.q, state.r, eq.heats.entropies(state.heats))
@@ -101,13 +101,13 @@ def test_rates_along_directions_as_the_dense_equations_say(name):
         assert tangent.rates() == 0
         mine = tangent.stage[1][eq.nv : eq.nv + eq.n, 0]
         column = expected[:, k if k < eq.n else eq.nv + k - eq.n]
-        assert np.abs(mine - column).max() < EXACT * max(1.0, np.abs(expected).max())
+        assert largest(mine - column) < EXACT * max(1.0, largest(expected))
         assert not tangent.stage[1][:, 1:].any()
 
 
 def test_all_directions_are_the_same_whatever_their_place():
     """More parameters than directions of one call: each derivative is what it is alone."""
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     paths = [
         "bodies.coupler.mass",
         "joints.main.friction",
@@ -124,7 +124,7 @@ def test_all_directions_are_the_same_whatever_their_place():
 
 def test_inputs_of_time_are_taken_stage_by_stage():
     """A constant given as a function of time changes nothing; one that reads the state is refused."""
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     family = [
         ParameterFamily(scene, ["bodies.coupler.mass"], None, {"joints.main": u}, None, joints=True)
         for u in (2.0, lambda t, s: [2.0])
@@ -133,7 +133,7 @@ def test_inputs_of_time_are_taken_stage_by_stage():
     for one in family:
         steps = ExplicitTangent(one, 0.0, tableau("rk87"))
         ends.append(steps.step(steps.start(), 0.04))
-    assert np.abs(ends[0].y - ends[1].y).max() < EXACT * np.abs(ends[0].y).max()
+    assert largest(ends[0].y - ends[1].y) < EXACT * largest(ends[0].y)
     with pytest.raises(ephs.OptionError, match="functions of time"):
         ephs.sensitivity(
             scene, ["bodies.coupler.mass"], 0.1, inputs={"joints.main": lambda t, s: -s.joints.main.rate}, method="rk54"

@@ -7,7 +7,9 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
+from tests.numerics import largest
 from tests.oscillator import damped_oscillator
+from tests.scenes import shipped
 
 FOUR_BAR = ("joints.pivot.friction", "bodies.rocker.inertia[2]", "joints.main.friction")
 DOUBLE = ("joints.j0.friction", "joints.j1.friction", "bodies.rod1.inertia[1]", "bodies.rod1.mass")
@@ -16,7 +18,7 @@ STEPS = {"method": "rk87", "step": 0.025}
 
 def double_pendulum():
     """Two links of the chain, damped."""
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     bodies = {name: body for name, body in scene.bodies.items() if name in ("rod0", "rod1")}
     joints = {name: joint for name, joint in scene.joints.items() if name in ("j0", "j1")}
     short = replace(scene, name="double-pendulum", bodies=bodies, joints=joints)
@@ -32,7 +34,7 @@ def record(scene, joints, until, count):
 
 CASES = {
     "double pendulum": (double_pendulum, DOUBLE, ("j0", "j1"), 0.6),
-    "four-bar": (lambda: ephs.load("scenes/four-bar.toml"), FOUR_BAR, ("main", "pivot"), 0.5),
+    "four-bar": (lambda: shipped("four-bar"), FOUR_BAR, ("main", "pivot"), 0.5),
 }
 
 
@@ -51,7 +53,7 @@ def test_a_motion_without_noise_gives_the_numbers_back(case):
         assert found.values[path] == pytest.approx(read(scene, path), rel=1e-6)
         assert read(found.model, path) == found.values[path]
     assert found.converged and found.deviation < 1e-8
-    assert all(np.abs(values).max() < 1e-7 for values in found.residuals.values())
+    assert all(largest(values) < 1e-7 for values in found.residuals.values())
 
 
 def test_a_noisy_motion_gives_them_within_three_deviations(case):
@@ -71,7 +73,7 @@ def test_a_noisy_motion_gives_them_within_three_deviations(case):
     rows = np.concatenate([tangent[name].reshape(-1, len(paths)) for name in names])
     left = np.concatenate([found.residuals[name].ravel() for name in names])
     expected = left @ left / (left.size - len(paths)) * np.linalg.inv(rows.T @ rows)
-    assert np.abs(found.covariance / expected - 1.0).max() < 1e-3
+    assert largest(found.covariance / expected - 1.0) < 1e-3
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx(errors)
 
 

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-import ephs
 from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent, _whole
 from ephs.mechanics.sensitivity.family import CENTRAL, OUTER, ParameterFamily
+from tests.numerics import EPS, largest
+from tests.scenes import shipped
+from tests.written import scene_of_text
 
 HUNG = """
 format = 1
@@ -42,7 +44,7 @@ def placed(scene):
 @pytest.mark.parametrize("name", ["chain", "heavy-top", "hot-brake"])
 def test_two_neighbours_tell_what_six_do(name, monkeypatch):
     """Of initial states and of the links' numbers, to rounding."""
-    scene = ephs.load(f"scenes/{name}.toml")
+    scene = shipped(name)
     paths = placed(scene)[:6]
     stepper, other = tangent(scene, paths), tangent(scene, paths)
     assert any(stepper._stencil(j) is OUTER for j in range(len(paths)))
@@ -54,15 +56,13 @@ def test_two_neighbours_tell_what_six_do(name, monkeypatch):
                 near = stepper._by(j, read)
             six = other._by(j, read)
             sizes = np.abs(read(*stepper._other(j, OUTER[1][0] * stepper.family.parameters[j].step)[1:]))
-            rounding = 8.0 * np.finfo(float).eps * sizes.max() / stepper.family.parameters[j].step
-            assert np.abs(near - six).max() <= rounding
+            rounding = 8.0 * EPS * sizes.max() / stepper.family.parameters[j].step
+            assert largest(near - six) <= rounding
 
 
-def test_what_is_of_no_low_degree_takes_six(tmp_path):
+def test_what_is_of_no_low_degree_takes_six():
     """A spring's length is a root of places; coordinates of loops follow from each other; a ball's are a turn."""
-    file = tmp_path / "hung.toml"
-    file.write_text(HUNG)
-    hung, closed, top = (ephs.load(f) for f in (file, "scenes/four-bar.toml", "scenes/heavy-top.toml"))
+    hung, closed, top = scene_of_text(HUNG), shipped("four-bar"), shipped("heavy-top")
     assert tangent(hung, ["springs.hold.at2[0]"])._stencil(0) is CENTRAL
     assert tangent(closed, ["bodies.coupler.position[0]"])._stencil(0) is CENTRAL
     assert tangent(top, ["joints.tip.coordinate[0]"])._stencil(0) is CENTRAL

@@ -6,18 +6,13 @@ import pytest
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
+from tests.numerics import largest, slope
 from tests.oscillator import damped_oscillator
+from tests.scenes import shipped
 from tests.written import scene_of_text
 
 GOOD = 1e-8
 """What extrapolated differences of runs are good for, relative to the largest; 1e-7 is asked for."""
-
-
-def extrapolated(function, h):
-    """The derivative at 0, by central differences extrapolated twice."""
-    d = [(function(s) - function(-s)) / (2.0 * s) for s in (h, h / 2.0, h / 4.0)]
-    once = [(4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0]
-    return (16.0 * once[1] - once[0]) / 15.0
 
 
 def reading(solution, name):
@@ -36,22 +31,22 @@ def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options)
             motion = ephs.simulate(varied(scene, {path: value + by}, strict=False), until, **run)
             return np.concatenate([reading(motion, name).ravel() for name in names])
 
-        expected = extrapolated(at, 1e-2 * (abs(value) if abs(value) > 1e-9 else 1.0))
+        expected = slope(at, 1e-2 * (abs(value) if abs(value) > 1e-9 else 1.0), 2)
         mine = np.concatenate([got[name][..., number].ravel() for name in names])
         start = 0
         for name in names:
             size = got[name][..., number].size
             part = slice(start, start + size)
             start += size
-            own = np.abs(reading(found.solution, name)).max() / max(abs(value), 1.0)
-            scale = max(np.abs(expected[part]).max(), 1e-3 * own)
-            assert np.abs(mine[part] - expected[part]).max() < tolerance * scale, (path, name)
+            own = largest(reading(found.solution, name)) / max(abs(value), 1.0)
+            scale = max(largest(expected[part]), 1e-3 * own)
+            assert largest(mine[part] - expected[part]) < tolerance * scale, (path, name)
     return found
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87"])
 def test_constant_steps_of_explicit_methods_with_a_closed_loop(method):
-    scene = ephs.load("scenes/four-bar.toml")
+    scene = shipped("four-bar")
     paths = ["bodies.coupler.mass", "bodies.rocker.inertia[2]", "joints.main.friction", "joints.main.drive",
              "joints.knee.frame1.position[0]", "joints.main.coordinate", "world.gravity[1]"]  # fmt: skip
     names = ["joints.main.coordinate", "joints.knee.rate", "bodies.coupler.position", "heat", "work", "kinetic"]
@@ -61,7 +56,7 @@ def test_constant_steps_of_explicit_methods_with_a_closed_loop(method):
 
 def test_chosen_steps_are_held():
     """The derivative of a run whose steps were chosen is that of the motion itself, to the tolerances."""
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     paths = ["bodies.rod1.mass", "joints.j0.coordinate", "joints.j2.frame2.position[1]", "joints.j1.rate"]
     names = ["joints.j3.coordinate", "joints.j0.rate", "bodies.rod3.velocity", "energy"]
     exact = {"rtol": 1e-12, "atol": 1e-13}
@@ -71,7 +66,7 @@ def test_chosen_steps_are_held():
 
 def test_bodies_that_turn_freely():
     """Of a body on a group: initial velocities, inertia, all left-trivialised."""
-    scene = ephs.load("scenes/heavy-top.toml")
+    scene = shipped("heavy-top")
     paths = ["bodies.top.inertia[0]", "bodies.top.mass", "joints.tip.rate[1]"]
     names = ["bodies.top.quaternion", "bodies.top.angular_velocity", "joints.tip.coordinate"]
     agrees(scene, paths, 0.02, names, 1e-7, method="rk87", step=2e-3, compared={"method": "rk87", "step": 2e-3})
@@ -92,7 +87,7 @@ def test_natural_steps_of_scenes(scene):
     names = [f"joints.{joint}.coordinate", f"joints.{joint}.rate", "heat", "work", "potential"]
     names += ["thermal.housing.temperature"] if scene == "slider-crank" else []
     options = {"method": "natural", "step": 0.01}
-    agrees(ephs.load(f"scenes/{scene}.toml"), paths, 0.05, names, 1e-7, options, **options)
+    agrees(shipped(scene), paths, 0.05, names, 1e-7, options, **options)
 
 
 def test_systems_by_components_and_initial_values():
@@ -111,8 +106,8 @@ def test_systems_by_components_and_initial_values():
     at = np.array([1.5, 0.1, 2.0, 1.0])
     for i, unit in enumerate(np.eye(4)):
         expected = motion(*(at + 1e-40j * unit)).imag / 1e-40
-        assert np.abs(found["osc.pe.q"][:, i] - expected[:, 0]).max() < 1e-12 * np.abs(expected).max()
-        assert np.abs(found["osc.ke.p"][:, i] - expected[:, 1]).max() < 1e-12 * np.abs(expected).max()
+        assert largest(found["osc.pe.q"][:, i] - expected[:, 0]) < 1e-12 * largest(expected)
+        assert largest(found["osc.ke.p"][:, i] - expected[:, 1]) < 1e-12 * largest(expected)
 
 
 def test_anything_read_from_a_solution_has_a_derivative():
@@ -126,7 +121,7 @@ def test_anything_read_from_a_solution_has_a_derivative():
 
 
 def test_a_friction_of_zero_has_a_derivative_from_above():
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     found = ephs.sensitivity(scene, ["joints.j0.friction"], 0.2, method="rk87", step=0.05)
     values = [
         ephs.simulate(varied(scene, {"joints.j0.friction": mu}), 0.2, method="rk87", step=0.05).joint("j0").rate[-1, 0]
@@ -138,7 +133,7 @@ def test_a_friction_of_zero_has_a_derivative_from_above():
 
 def test_a_rest_of_zero_has_a_derivative():
     """Springs whose force is 0 at the coordinate 0 are other relations."""
-    scene = ephs.load("scenes/chain.toml")
+    scene = shipped("chain")
     agrees(
         varied(scene, {"joints.j0.stiffness": 5.0}),
         ["joints.j0.rest"],
@@ -203,7 +198,7 @@ def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method, text,
 def test_what_cannot_be_is_named(keys, what):
     given = {"parameters": ["bodies.crank.mass"], "until": 0.1} | keys
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.sensitivity(ephs.load("scenes/four-bar.toml"), **given)
+        ephs.sensitivity(shipped("four-bar"), **given)
 
 
 def test_unknown_readings_name_the_nearest():
@@ -211,4 +206,4 @@ def test_unknown_readings_name_the_nearest():
     with pytest.raises(ephs.OptionError, match="did you mean"):
         found["osc.pe.x"]
     with pytest.raises(ephs.SceneError, match="did you mean"):
-        ephs.sensitivity(ephs.load("scenes/four-bar.toml"), ["bodies.crnk.mass"], 0.1)
+        ephs.sensitivity(shipped("four-bar"), ["bodies.crnk.mass"], 0.1)

@@ -1,13 +1,13 @@
 """Masses and moments of inertia change the links' numbers and nothing else that steps of a tree read."""
 
-import numpy as np
 import pytest
 
-import ephs
-from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.scene.parameters import names, read
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
-from ephs.mechanics.sensitivity.family import ParameterFamily
+from tests.mechanics.sensitivity.test_places import tangent
+from tests.numerics import largest
+from tests.scenes import shipped
+from tests.written import scene_of_text
 
 TREES = ("chain", "heavy-top", "hot-brake", "body")
 FUSED = """
@@ -35,38 +35,32 @@ at = [0.5, 0.0, 0.0]
 """
 
 
-def tangent(scene, paths):
-    return ExplicitTangent(ParameterFamily(scene, paths, None, None, None, joints=True), 0.0, tableau("rk54"))
-
-
 def weights(scene):
     found = [path for path in names(scene) if path.startswith("bodies.") and ("mass" in path or "inertia" in path)]
     return [path for path in found if read(scene, path) > 0.0 and path[-3:] not in ("[3]", "[4]", "[5]")]
 
 
 @pytest.mark.parametrize("name", [*TREES, "fused"])
-def test_they_are_exact_and_all_that_matters(name, tmp_path, monkeypatch):
+def test_they_are_exact_and_all_that_matters(name, monkeypatch):
     """Tables, and two steps with their derivatives, are those that neighbours of the model give."""
-    file = tmp_path / "fused.toml"
-    file.write_text(FUSED)
-    scene = ephs.load(file if name == "fused" else f"scenes/{name}.toml")
+    scene = scene_of_text(FUSED) if name == "fused" else shipped(name)
     paths = weights(scene)[-5:]
     stepper, other = tangent(scene, paths), tangent(scene, paths)
     assert paths
     for j in range(len(paths)):
         near, weight = stepper._by(j, lambda of, _: stepper._numbers(of, "reals")), stepper._weighed(j)
         assert weight is not None and weight.shape == near.shape
-        assert np.abs(weight - near).max() <= 1e-12 * max(1.0, float(np.abs(near).max()))
+        assert largest(weight - near) <= 1e-12 * max(1.0, float(largest(near)))
     point = stepper.start()
     monkeypatch.setattr(ExplicitTangent, "_weighed", lambda self, number: None)
     beside = other.start()
     for _ in range(2):
         point, beside = stepper.step(point, 0.01), other.step(beside, 0.01)
     for one, two in ((point.q, beside.q), (point.y, beside.y)):
-        assert np.abs(one - two).max() <= 1e-9 * max(1.0, float(np.abs(two).max()))
+        assert largest(one - two) <= 1e-9 * max(1.0, float(largest(two)))
 
 
 def test_what_changes_more_is_left_to_neighbours():
-    chain, closed = ephs.load("scenes/chain.toml"), ephs.load("scenes/four-bar.toml")
+    chain, closed = shipped("chain"), shipped("four-bar")
     assert tangent(chain, ["bodies.rod1.position[0]"])._weighed(0) is None
     assert tangent(closed, ["bodies.coupler.mass"])._weighed(0) is None

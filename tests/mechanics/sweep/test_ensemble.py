@@ -8,18 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.images import STARTS, Images
 from ephs.mechanics.sweep.outputs import outputs_of
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.finding.tables import TREE
 from ephs.show.charts.family_scenes import parallelogram
 from ephs.solve.march import Ending
+from tests.scenes import ROOT, equations_of
 
-ROOT = Path(__file__).parents[3]
 CHAIN, GRAVITY = ROOT / "benchmarks/scenes/revolute-chain-4.toml", "world.gravity[2]"
 SCENES = {
     "tree": (CHAIN, ("bodies.rod1.mass", "joints.j0.rate", "joints.j1.coordinate", "joints.j2.friction", GRAVITY)),
@@ -37,7 +35,7 @@ TIMES = np.array([0.0, 0.02, 0.05, 0.3])
 
 def made(scene, vary, options, *, paired=True):
     """An ensemble with the outputs that compiled members have: of the tree's joints."""
-    reduced = ReducedEquations(problem_of_scene(scene), 0.0).reduced
+    reduced = equations_of(scene).reduced
     names = [e.name for e, kind in zip(reduced.edges, reduced.tables.kind, strict=True) if kind == TREE]
     outputs = outputs_of(scene, [*(f"joints.{name}.coordinate" for name in names), "heat", "work"])
     axes = Axes.of(vary, paired=paired)

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 from concurrent.futures import CancelledError, Future
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,22 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern
-from ephs import library as lib
 from ephs.cli import main
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.sweep.axes import Axes
 from ephs.mechanics.sweep.ensemble import Ensemble, _Runs
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.testing import mechanisms
+from tests.numerics import largest
+from tests.oscillator import free_oscillator
+from tests.scenes import ROOT
 from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[3]
 SCENES = ROOT / "scenes"
 CHAIN = ROOT / "benchmarks" / "scenes" / "revolute-chain-4.toml"
-OSCILLATOR = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")(
-    pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc()
-)
+OSCILLATOR = free_oscillator()
 WELDED = """
 format = 1
 name = "welded"
@@ -66,7 +63,7 @@ def agree(model, table, places, tolerance=1e-11, **options):
         sol = alone(model, table, where, **options)
         for output in outputs_of(model, [str(n) for n in table.data_vars if n not in ("status", "steps", "rejected")]):
             found, expected = table[output.name].isel(where).values, np.squeeze(output.read(sol))
-            assert np.abs(found - expected).max(initial=0.0) <= tolerance * max(1.0, np.abs(expected).max()), output
+            assert largest(found - expected, initial=0.0) <= tolerance * max(1.0, largest(expected)), output
 
 
 def assert_built(images, members):
@@ -169,13 +166,13 @@ def test_careful_steps_of_a_member_have_its_own_numbers():
     for (mass,), row in zip(axes.members[::-1], rows[::-1], strict=True):
         runs._fill(row)
         alone = ephs.dynamics(varied(scene, {"bodies.coupler.mass": mass}))
-        assert np.abs(equations.mass(start.q, start.r) - alone.mass_matrix(alone.state0)).max() <= 1e-13
+        assert largest(equations.mass(start.q, start.r) - alone.mass_matrix(alone.state0)) <= 1e-13
 
 
 def test_a_system_of_no_bodies_by_its_closed_form():
     stiffness = [1.0, 4.0, 9.0]
     table = ephs.sweep(OSCILLATOR, {"pe.k": stiffness}, 1.0, save_at=[0.0, 0.5, 1.0], method="natural4", step=0.01)
-    assert float(np.abs(table["pe.q"]).max()) == 0.0  # it starts at rest
+    assert float(largest(table["pe.q"])) == 0.0  # it starts at rest
     table = ephs.sweep(
         OSCILLATOR, {"pe.k": stiffness}, 1.0, save_at=[0.0, 0.5, 1.0], method="radau", rtol=1e-10, atol=1e-10,
         outputs=["pe.q", "energy"],

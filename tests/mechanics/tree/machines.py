@@ -2,18 +2,17 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.scene.build import initial_state, scene_system
+from tests.scenes import shipped
 
-SCENES = Path(__file__).parents[3] / "scenes"
 THETA = 293.15
 
 # ---- a motor on the four-bar linkage -----------------------------------------------------------------------------
@@ -25,7 +24,7 @@ A, B, C, D = 0.3, 0.9, 0.7, 1.0
 
 def four_bar():
     """The linkage of the scene, its crank's momentum an outer port."""
-    scene = ephs.load(SCENES / "four-bar.toml")
+    scene = shipped("four-bar")
     joints = {name: replace(j, drive=None) if name == "main" else j for name, j in scene.joints.items()}
     scene = replace(scene, joints=joints)
     return scene_system(scene, driven=["main"]), {f"linkage.{path}": x for path, x in initial_state(scene).items()}
@@ -36,29 +35,13 @@ def motor_on_four_bar():
     """(system, initial values, inputs): a circuit with a magnet, a rotor, a gear, a housing that is cooled."""
     linkage, start = four_bar()
     port = "drives.main"
-    junctions = {
-        "q": junction(Q.charge, exposed=True),
-        "b": junction(Q.flux_linkage),
-        "magnet": junction(Q.flux_linkage),
-        "p": junction(Q.angular_momentum),
-        "p_r": junction(linkage.interface[port].quantity),
-        "s": junction(Q.entropy),
-        "around": junction(Q.entropy),
-    }
-    boxes = {
-        "supply": {"q": "q", "b": "b"},
-        "coil": {"b": "b"},
-        "copper": {"b": "b", "s": "s"},
-        "field": {"b": "magnet"},
-        "coupling": {"b": "b", "p": "p", "bs": "~magnet"},
-        "rotor": {"p": "p"},
-        "gear": {"p": "p", "p_r": "p_r"},
-        "linkage": {port: "p_r"},
-        "housing": {"s": "s"},
-        "fan": {"s1": "s", "s2": "around"},
-        "air": {"s": "around"},
-    }
-    system = Pattern(junctions=junctions, boxes=boxes)(
+    pattern = Pattern.from_text(
+        "q: charge, exposed; b: flux_linkage; magnet: flux_linkage; p: angular_momentum; "
+        "p_r: joint_momentum(revolute); s: entropy; around: entropy; supply(q, b); coil(b); copper(b, s); "
+        "field(b=magnet); coupling(b, p, bs=~magnet); rotor(p); gear(p, p_r); linkage(drives.main=p_r); housing(s); "
+        "fan(s1=s, s2=around); air(s=around)"
+    )
+    system = pattern(
         supply=lib.emc(),
         coil=lib.inductor(l=INDUCTANCE),
         copper=lib.resistor(r=RESISTANCE),
@@ -130,7 +113,7 @@ SHAFT = 0.06
 
 def slider_crank():
     """The mechanism of the scene without friction, the momentum of its cylinder joint an outer port."""
-    scene = ephs.load(SCENES / "slider-crank.toml")
+    scene = shipped("slider-crank")
     joints = {name: replace(j, friction=0.0 * j.friction, heat="environment") for name, j in scene.joints.items()}
     scene = replace(scene, joints=joints, thermal={}, conduction={})
     return scene_system(scene, driven=["cylinder"]), {f"engine.{path}": x for path, x in initial_state(scene).items()}
@@ -140,32 +123,16 @@ def slider_crank():
 def gas_spring_on_slider_crank():
     """(system, initial values, inputs): hot gas before the piston, the atmosphere behind, oil that a damper warms."""
     engine, start = slider_crank()
-    port, shaft = "drives.cylinder", "drives.bearing"
+    port = "drives.cylinder"
     energy = EXPONENT * PRESSURE * GAS
     capacity = energy / THETA
-    junctions = {
-        "v": junction(Q.volume),
-        "w": junction(Q.volume),
-        "s": junction(Q.entropy),
-        "hot": junction(Q.entropy),
-        "around": junction(Q.entropy),
-        "p": junction(Q.momentum),
-        "p_r": junction(engine.interface[port].quantity),
-        "shaft": junction(engine.interface[shaft].quantity, exposed=True),
-    }
-    boxes = {
-        "gas": {"v": "v", "s": "s"},
-        "atmosphere": {"v": "w"},
-        "piston": {"v1": "v", "v2": "w", "p": "p"},
-        "rod": {"p": "p", "p_r": "p_r"},
-        "damper": {"p": "p", "s": "hot"},
-        "oil": {"s": "hot"},
-        "wall": {"s1": "s", "s2": "hot"},
-        "fins": {"s1": "hot", "s2": "around"},
-        "air": {"s": "around"},
-        "engine": {port: "p_r", shaft: "shaft"},
-    }
-    system = Pattern(junctions=junctions, boxes=boxes)(
+    pattern = Pattern.from_text(
+        "v: volume; w: volume; s: entropy; hot: entropy; around: entropy; p: momentum; "
+        "p_r: joint_momentum(prismatic); shaft: joint_momentum(revolute), exposed; gas(v, s); atmosphere(v=w); "
+        "piston(v1=v, v2=w, p); rod(p, p_r); damper(p, s=hot); oil(s=hot); wall(s1=s, s2=hot); "
+        "fins(s1=hot, s2=around); air(s=around); engine(drives.cylinder=p_r, drives.bearing=shaft)"
+    )
+    system = pattern(
         gas=lib.ideal_gas(c1=energy, c2=capacity, v0=GAS, c=EXPONENT),
         atmosphere=lib.environment(v=Q.volume),
         piston=lib.piston(a=AREA),

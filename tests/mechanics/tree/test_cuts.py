@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.road.cuts import Relative
 from ephs.mechanics.road.loops import kinds_of, loop_program
 from ephs.mechanics.road.records import LinkPlace, LinkState
-from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import codes, se3, so3
 from ephs.semantics.stage import PLAIN
+from tests.numerics import largest, seeds
+from tests.scenes import equations_of, shipped
 
 Z = np.eye(6)[:, 2:3]
 JOINTS = {
@@ -112,7 +111,7 @@ def inverse(frame):
     return frame[0].T, -frame[0].T @ frame[1]
 
 
-drawn = given(name=st.sampled_from(sorted(JOINTS)), seed=st.integers(0, 2**32 - 1))
+drawn = given(name=st.sampled_from(sorted(JOINTS)), seed=seeds)
 some = settings(max_examples=25)
 both = pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
 STEP = 1e-4
@@ -128,7 +127,7 @@ def test_rows_make_the_power_of_the_forbidden_twists(run, name, seed):
     twist = loop.motions[0, 19:25]
     for a, normal in enumerate(loop.normal):
         power = loop.covector[2 * a] @ loop.places[0, 12:18] + loop.covector[2 * a + 1] @ loop.places[1, 12:18]
-        assert power == pytest.approx(normal @ twist, abs=1e-13 * np.abs(loop.covector).max() * 10.0)
+        assert power == pytest.approx(normal @ twist, abs=1e-13 * largest(loop.covector) * 10.0)
 
 
 @both
@@ -145,12 +144,12 @@ def test_what_is_open_changes_by_the_forbidden_twists_and_these_by_the_targets(r
         run["relative_rates"](other.cut, other.numbers, other.motions, other.value)
         rates.append(-other.value[:, 0])
     here = loop.found(run)
-    size = 1.0 + np.abs(here.places).max() ** 3
-    assert np.abs((rates[1] - rates[0]) / (2.0 * STEP) + here.value[:, 0]).max(initial=0.0) <= CLOSE * size
+    size = 1.0 + largest(here.places) ** 3
+    assert largest((rates[1] - rates[0]) / (2.0 * STEP) + here.value[:, 0], initial=0.0) <= CLOSE * size
     run["relative_rates"](here.cut, here.numbers, here.motions, here.value)
     # What fits to the bodies is along the joint's own freedoms, of whose groups these rows are the complement.
     found = (gaps[1] - gaps[0]) / (2.0 * STEP)
-    assert np.abs(found + here.value[:, 0]).max(initial=0.0) <= CLOSE * size
+    assert largest(found + here.value[:, 0], initial=0.0) <= CLOSE * size
 
 
 @both
@@ -164,7 +163,7 @@ def test_a_closed_joint_is_fitted_to_its_element(run, name, seed):
     run["gaps"](loop.cut, loop.numbers, loop.motions, loop.element, loop.value, worst)
     assert worst[0] <= 1e-13
     sign = np.sign(wanted @ loop.element) if JOINTS[name][0] == codes.SO3 else 1.0
-    assert np.abs(sign * loop.element - wanted).max(initial=0.0) <= 1e-9
+    assert largest(sign * loop.element - wanted, initial=0.0) <= 1e-9
     wide = Loop(name, seed, opened=0.1).found(run)
     run["gaps"](wide.cut, wide.numbers, wide.motions, wide.element, wide.value, worst)
     assert worst[0] > 1e-6
@@ -189,9 +188,7 @@ def test_elements_move_as_their_velocities_say(run, name, seed):
         direct = at.copy()
         run["move"](loop.chart, h * rates, direct)
         ends[-1] -= direct
-    assert np.abs((ends[1] - ends[0]) / (2.0 * STEP)).max(initial=0.0) <= CLOSE * (
-        1.0 + np.abs(rates).max(initial=0.0) ** 3
-    )
+    assert largest((ends[1] - ends[0]) / (2.0 * STEP), initial=0.0) <= CLOSE * (1.0 + largest(rates, initial=0.0) ** 3)
 
 
 @drawn
@@ -223,10 +220,10 @@ def test_the_memory_of_a_link_begins_with_its_place():
 @pytest.mark.parametrize("name", ["slider-crank", "universal"])
 def test_loops_that_are_a_little_open_are_closed_by_their_own_rows(name):
     """With joints of several freedoms in the tree; what does not converge so is closed with more care."""
-    eq = ReducedEquations(problem_of_scene(ephs.load(f"scenes/{name}.toml")), 0.0)
+    eq = equations_of(shipped(name))
     state, moved = eq.start(0.0), np.zeros(eq.nv)
     moved[: eq.n] = 1e-3 * np.random.default_rng(1).standard_normal(eq.n)
     apart = replace(state, q=eq.advance(state.q, moved))
     found = eq.closed(apart)
-    assert np.abs(eq.dense.gaps(found.q, found.r)[0]).max() <= 1e-12 and not eq.careful
-    assert np.abs(eq.dense.gaps(apart.q, apart.r)[0]).max() > 1e-5
+    assert largest(eq.dense.gaps(found.q, found.r)[0]) <= 1e-12 and not eq.careful
+    assert largest(eq.dense.gaps(apart.q, apart.r)[0]) > 1e-5

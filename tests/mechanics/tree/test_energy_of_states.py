@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Pattern, junction
+from ephs import Pattern
 from ephs import library as lib
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.build import initial_state, scene_system
@@ -14,8 +14,10 @@ from ephs.operad import quantity
 from ephs.semantics.primitives.primitives import power_ports
 from ephs.semantics.primitives.structures import constant_structure, quadratic
 from examples import physics
+from tests.numerics import EPS, generators, largest
 from tests.semantics.test_chemistry import R, Species, vessel
 from tests.semantics.test_chemistry import start as filled
+from tests.written import scene_of_text
 
 KEEP = {"variational": {"keep": "energy"}}
 EVERY = ["auto", *(name for name, method in METHODS.items() if method.scenes and not method.posed)]
@@ -60,7 +62,7 @@ def test_energy_and_sums_stay(method, case):
     sol = ephs.simulate(system, until, initial=start, method=method, options=KEEP.get(method, {}), audit="off", **pace)
     assert sol.energy_error.max() <= 1e-12
     whole = sum((np.ravel(sol[path]) for path in summed), start=np.zeros(len(sol)))
-    assert np.abs(whole - whole[0]).max() <= 8.0 * len(sol) * np.finfo(float).eps * np.abs(whole).max()
+    assert largest(whole - whole[0]) <= 8.0 * len(sol) * EPS * largest(whole)
     if method == "rk54":
         missed = sol.stats["plain_defect"]["largest"] / sol.ledgers.scale
         assert missed > 1e-9, "the control: the steps miss it"
@@ -68,10 +70,10 @@ def test_energy_and_sums_stay(method, case):
 
 @pytest.mark.parametrize("method", ["rk54", "radau"])
 @settings(max_examples=15)
-@given(seed=st.integers(0, 2**32 - 1), charges=st.integers(1, 5), fluxes=st.integers(1, 5), lossy=st.booleans())
-def test_nets_keep_every_sum_that_their_flows_keep(method, seed, charges, fluxes, lossy):
+@given(rng=generators, charges=st.integers(1, 5), fluxes=st.integers(1, 5), lossy=st.booleans())
+def test_nets_keep_every_sum_that_their_flows_keep(method, rng, charges, fluxes, lossy):
     """Random nets: covectors of a structure's kernel are charges of closed parts, fluxes of closed loops."""
-    rng, n = np.random.default_rng(seed), charges + fluxes
+    n = charges + fluxes
     skew = np.zeros((n, n))
     coupling = rng.integers(-1, 2, (charges, fluxes)).astype(float)
     skew[:charges, charges:], skew[charges:, :charges] = coupling, -coupling.T
@@ -95,8 +97,8 @@ def test_nets_keep_every_sum_that_their_flows_keep(method, seed, charges, fluxes
     states = np.array([np.ravel(sol[f"of_{name}.x"]) for name in names])
     u, sigma, _ = np.linalg.svd(lost)
     sums = u[:, sigma <= 1e-12 * max(sigma.max(), 1.0)].T @ states
-    rounding = 8.0 * n * len(sol) * np.finfo(float).eps * np.abs(states).max()
-    assert np.abs(sums - sums[:, :1]).max(initial=0.0) <= rounding
+    rounding = 8.0 * n * len(sol) * EPS * largest(states)
+    assert largest(sums - sums[:, :1], initial=0.0) <= rounding
 
 
 HANGING = """
@@ -114,15 +116,10 @@ axis = [0.0, 1.0, 0.0]
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87", "radau"])
-def test_a_circuit_beside_a_mechanism_at_rest_keeps_its_energy(method, tmp_path):
+def test_a_circuit_beside_a_mechanism_at_rest_keeps_its_energy(method):
     """Nothing of the body moves that could take what the circuit's steps miss."""
-    file = tmp_path / "hanging.toml"
-    file.write_text(HANGING, encoding="utf-8")
-    scene = ephs.load(file)
-    pattern = Pattern(
-        {"q": junction(quantity.charge), "b": junction(quantity.flux_linkage)},
-        {"cap": {"q": "q"}, "coil": {"b": "b"}, "emc": {"q": "q", "b": "b"}, "linkage": {}},
-    )
+    scene = scene_of_text(HANGING)
+    pattern = Pattern.from_text("q: charge; b: flux_linkage; cap(q); coil(b); emc(q, b); linkage()")
     boxes = {"cap": lib.capacitor(c=0.5), "coil": lib.inductor(l=2.0), "emc": lib.emc()}
     start = {f"linkage.{path}": x for path, x in initial_state(scene).items()} | {"cap.q": 1.0}
     system = pattern(**boxes, linkage=scene_system(scene))
@@ -143,4 +140,4 @@ def test_a_reaction_keeps_energy_and_atoms(method):
     sol = ephs.simulate(system, 5.0, initial=start, method=method, audit="fail", rtol=1e-5, atol=1e-5)
     assert sol.energy_error.max() <= 1e-12
     atoms = np.ravel(sol["mixture.A"]) + 2.0 * np.ravel(sol["mixture.B"])
-    assert np.abs(atoms - 1.2).max() <= 8.0 * len(sol) * np.finfo(float).eps * 1.2
+    assert largest(atoms - 1.2) <= 8.0 * len(sol) * EPS * 1.2

@@ -14,12 +14,11 @@ from ephs import Pattern, junction
 from ephs import quantity as Q
 from ephs.mechanics import joint, rigid_body
 from ephs.mechanics.elements import components
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.mechanics.tree.finding.frames import Unplaced
-from ephs.operad import Path
-from tests.mechanics.methods.systems import problem_of
 from tests.mechanics.tree.general import held_to_the_general_form
+from tests.mechanics.tree.test_attached import equations_of
+from tests.numerics import jacobian
 
 UNTIL = 0.5
 MASS, AWAY, GRAVITY, MESHED = 1.3, 0.4, 9.81, 0.7
@@ -108,14 +107,12 @@ def trains(draw):
     return bodies, gears
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(trains(), st.integers(0, 10**6))
 def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     system, start = train(*made)
     _, gears = made
-    start = {Path.of(path): value for path, value in start.items()}
-    problem = problem_of(system, system.state() | start)
-    eq = ReducedEquations(problem, 0.0)
+    eq = equations_of(system, start)
     assert len(eq.reduced.attaching.ties) == len(gears)
     state, rng = eq.start(0.0), np.random.default_rng(seed)
     state = eq.closed(replace(state, r=rng.standard_normal(eq.n)))
@@ -127,14 +124,13 @@ def test_gears_accelerate_joints_as_the_general_form_says(made, seed):
     assert eq.dense.rates(state.q, y, eq.given, eq.heats, slow) == (0, 0)
     where = slice(eq.nv, eq.nv + eq.n)
     assert np.allclose(fast[where], slow[where], rtol=1e-10, atol=1e-10)
-    held_to_the_general_form(eq, problem, state)
+    held_to_the_general_form(eq, eq.problem, state)
 
 
 @pytest.mark.parametrize("off", [1e-3, -0.1])
 def test_wheels_out_of_mesh_are_turned_to_where_they_mesh(off):
     system, start = pair()
-    start = {Path.of(path): value for path, value in start.items()}
-    eq = ReducedEquations(problem_of(system, system.state() | start), 0.0)
+    eq = equations_of(system, start)
     state = eq.start(0.0)
     apart = replace(state, q=eq.advance(state.q, np.array([0.0, off])))
     found = eq.closed(apart).q
@@ -144,8 +140,7 @@ def test_wheels_out_of_mesh_are_turned_to_where_they_mesh(off):
 
 def test_changes_of_geared_motion_are_those_of_the_equations():
     system, start = train([(False, 0.3), (True, 0.2), (False, 0.1)], [((0, 1, 2), (1.0, -2.0, 0.5))])
-    start = {Path.of(path): value for path, value in start.items()}
-    eq = ReducedEquations(problem_of(system, system.state() | start), 0.0)
+    eq = equations_of(system, start)
     state, rng = eq.start(0.0), np.random.default_rng(3)
     linear, r = Linearised(eq), rng.standard_normal(eq.n)
     s = eq.heats.entropies(state.heats)
@@ -155,18 +150,16 @@ def test_changes_of_geared_motion_are_those_of_the_equations():
         return eq.dense.rate.copy()
 
     linear.forward(state.q, r, s)
-    exact, middle = linear.columns(solve=True)[: eq.n], np.concatenate([np.zeros(eq.nv), r])
-    for j in range(middle.size):
-        step = 1e-5 * np.eye(middle.size)[j]
-        near = (rates(middle + step) - rates(middle - step)) / 2e-5
-        assert np.allclose(exact[:, j], near, rtol=0.0, atol=1e-8 * max(1.0, np.abs(near).max()))
+    middle = np.concatenate([np.zeros(eq.nv), r])
+    exact = linear.columns(solve=True)[: eq.n, : middle.size]
+    near = jacobian(lambda v: rates(middle + v), middle.size, 1e-5)
+    assert np.all(np.abs(exact - near) <= 1e-8 * np.maximum(1.0, np.abs(near).max(axis=0)))
 
 
 def test_gears_of_a_loop_contradict_each_other_or_repeat():
     def equations(ratio):
         system, start = train([(False, 0.1)] * 3, [((0, 1), (1, -2)), ((1, 2), (1, -3)), ((0, 2), (1, -ratio))])
-        start = {Path.of(path): value for path, value in start.items()}
-        return ReducedEquations(problem_of(system, system.state() | start), 0.0)
+        return equations_of(system, start)
 
     assert len(equations(6).reduced.attaching.ties) == 2
     with pytest.raises(Unplaced, match=r"gear\d.*contradicts the other gears"):

@@ -2,7 +2,6 @@
 
 import numpy as np
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ephs
 from ephs import Pattern, junction
@@ -16,6 +15,7 @@ from ephs.solve.posing.problem import Signal
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import nested, problem_of
 from tests.mechanics.tree.general import held_to_the_general_form
+from tests.numerics import generators
 
 THETA = 293.15
 
@@ -124,10 +124,10 @@ class Bench:
         return problem_of(made, made.state() | start, signals)
 
 
-@settings(max_examples=20, deadline=None)
-@given(mechanisms(max_bodies=3), st.integers(0, 2**32 - 1))
-def test_joint_coordinates_and_the_general_form_are_one(scene, seed):
-    problem = Bench(scene, np.random.default_rng(seed)).problem()
+@settings(max_examples=20)
+@given(mechanisms(max_bodies=3), generators)
+def test_joint_coordinates_and_the_general_form_are_one(scene, rng):
+    problem = Bench(scene, rng).problem()
     eq = ReducedEquations(problem, 0.0)
     state = eq.start(0.0)
     held_to_the_general_form(eq, problem, state)

@@ -12,8 +12,8 @@ from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.spaces.rotations import matrix_to_quaternion, quaternion_to_matrix
 from ephs.semantics.stage import PLAIN, Vector
 from ephs.semantics.stage.memory import ArrayReals
+from tests.numerics import EPS, largest
 
-EPS = np.finfo(float).eps
 BACKWARD = {"planar": 7, "spherical": 8, "free": 9}
 """Pair -> where `STANDARD` has its joint that is walked backward."""
 numbers = st.lists(st.floats(-2.0, 2.0), min_size=6, max_size=6).map(np.array)
@@ -43,16 +43,16 @@ def test_a_joint_that_is_walked_backward(name, place, coordinates, r, way):
     outward(PLAIN, tree, Vector(ArrayReals(x), 0, x.size), Vector(ArrayReals(r), 0, r.size))
     state, ground = states[0], states[1]
     pose = SE3.compose(there, SE3.inverse(of.include(x)))
-    near = 64.0 * EPS * (1.0 + np.abs(pose[4:]).max()) ** 2 * 10.0
+    near = 64.0 * EPS * (1.0 + largest(pose[4:])) ** 2 * 10.0
     turn = quaternion_to_matrix(pose[:4])
-    assert np.abs(np.array(state.turn) - turn).max() <= near and np.abs(np.array(state.at) - pose[4:]).max() <= near
+    assert largest(np.array(state.turn) - turn) <= near and largest(np.array(state.at) - pose[4:]) <= near
     # The link has the joint's first frame, in whose own axes it moves by -Ad B r; here in those of the world.
     own = -SE3.adjoint(of.include(x)) @ (of.basis @ r)
     expected = np.concatenate([turn @ own[:3], turn @ own[3:]])
     for found in (state.twist, moved_by(joint, only.link, state, r.tolist())):
-        assert np.abs(np.array(found) - expected).max() <= near * (1.0 + np.abs(r).max())
+        assert largest(np.array(found) - expected) <= near * (1.0 + largest(r))
     axes = np.array(axes_of(joint, only.link, state))
-    assert np.abs(r @ axes - expected).max() <= near * (1.0 + np.abs(r).max())
+    assert largest(r @ axes - expected) <= near * (1.0 + largest(r))
     back = rates_of(joint, only.link, state, ground, expected.tolist())
-    assert np.abs(np.array(back) - r).max() <= near * (1.0 + np.abs(r).max())
+    assert largest(np.array(back) - r) <= near * (1.0 + largest(r))
     assert np.abs(matrix_to_quaternion(turn) @ pose[:4]) >= 1.0 - near

@@ -5,6 +5,8 @@ import pytest
 
 import ephs
 from ephs.mechanics.methods.registry import METHODS
+from tests.numerics import largest
+from tests.written import scene_of_text
 
 MASSLESS = "mass = 0.0\ninertia = [0.0, 0.0, 0.0]"
 AXLE = """
@@ -99,48 +101,46 @@ axis = [0.0, 0.0, 1.0]
 """
 
 
-def scene_of(tmp_path, text, massless=MASSLESS):
-    file = tmp_path / "scene.toml"
-    file.write_text(text.format(massless=massless))
-    return ephs.load(file)
+def scene_of(text, massless=MASSLESS):
+    return scene_of_text(text.format(massless=massless))
 
 
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "variational"])
-def test_a_massless_lever_follows_the_motion_of_its_end(method, tmp_path):
+def test_a_massless_lever_follows_the_motion_of_its_end(method):
     """All methods close loops to rounding; positions of `natural` are off by A (ω h)²/12."""
     constant = {} if method in ("rk54", "rk87", "radau") else {"step": 1e-3 if method == "natural" else 5e-3}
-    run = ephs.simulate(scene_of(tmp_path, AXLE), 0.05, method=method, **constant)
+    run = ephs.simulate(scene_of(AXLE), 0.05, method=method, **constant)
     angle = run.joint("hinge").coordinate.ravel()
     allowed = 1e-6 if method == "natural" else 1e-12
-    assert np.abs(angle - np.arcsin(0.1 * np.sin(10.0 * run.t))).max() <= allowed
+    assert largest(angle - np.arcsin(0.1 * np.sin(10.0 * run.t))) <= allowed
 
 
-def test_the_car_axis_arrives_where_it_is_published(tmp_path):
-    run = ephs.simulate(scene_of(tmp_path, AXLE + CAR), 3.0, method="rk87", rtol=1e-10, atol=1e-11)
+def test_the_car_axis_arrives_where_it_is_published():
+    run = ephs.simulate(scene_of(AXLE + CAR), 3.0, method="rk87", rtol=1e-10, atol=1e-11)
     chassis, end = run.body("chassis"), np.array([0.5, 0.0, 0.0])
     arm = chassis.rotation[-1] @ end
     turning = np.cross(chassis.angular_velocity[-1], arm)
     places = [chassis.position[-1] - arm, chassis.position[-1] + arm]
     rates = [chassis.velocity[-1] - turning, chassis.velocity[-1] + turning]
     found = np.concatenate([each[:2] for each in (*places, *rates)])
-    assert np.abs(found - PUBLISHED).max() <= 1e-9
+    assert largest(found - PUBLISHED) <= 1e-9
 
 
-def test_forces_are_the_limit_of_those_of_light_bodies(tmp_path):
+def test_forces_are_the_limit_of_those_of_light_bodies():
     """Joint wrenches, which masses of 1e-9 kg change by that times accelerations, of some 40 m/s² here."""
     light = "mass = 1e-9\ninertia = [1e-9, 1e-9, 1e-9]"
     wrenches = []
     for massless in (MASSLESS, light):
-        run = ephs.simulate(scene_of(tmp_path, AXLE + CAR, massless), 0.05, method="rk87", rtol=1e-10, atol=1e-11)
+        run = ephs.simulate(scene_of(AXLE + CAR, massless), 0.05, method="rk87", rtol=1e-10, atol=1e-11)
         wrenches.append([run.joint(name).wrench[-1] for name in ("guide", "knee", "hinge", "road")])
     found, limit = map(np.array, wrenches)
     assert np.array_equal(np.isnan(found), np.isnan(limit))
     assert np.nanmax(np.abs(found - limit)) <= 1e-6
 
 
-def test_a_massless_body_that_no_row_determines_is_refused(tmp_path):
+def test_a_massless_body_that_no_row_determines_is_refused():
     with pytest.raises((ephs.SimulationError, ephs.SceneError), match=r"no mass"):
-        ephs.simulate(scene_of(tmp_path, AXLE + LOOSE), 0.1)
+        ephs.simulate(scene_of(AXLE + LOOSE), 0.1)
 
 
 LEG = """
@@ -169,7 +169,7 @@ at = {head}
 """
 
 
-def stewart(tmp_path, mass):
+def stewart(mass):
     """A platform of 20 kg on six legs, each of two halves of this mass in kg."""
     given = f"mass = {mass!r}\ninertia = [{mass / 100!r}, {mass / 100!r}, {mass / 100!r}]" if mass else MASSLESS
     text = "format = 1\n[bodies.plat]\nmass = 20.0\ninertia = [0.6, 0.7, 1.1]\nposition = [0.0, 0.0, 0.7]\n"
@@ -183,39 +183,34 @@ def stewart(tmp_path, mass):
         points = {"foot": foot, "head": head, "low": 0.75 * foot + 0.25 * head, "high": 0.25 * foot + 0.75 * head}
         points |= {"middle": 0.5 * (foot + head), "along": along, "axis": axis, "axis2": np.cross(axis, along)}
         text += LEG.format(i=i, mass=given, drive=40.0 + 2.0 * i, **{k: v.tolist() for k, v in points.items()})
-    file = tmp_path / "stewart.toml"
-    file.write_text(text)
-    return ephs.load(file)
+    return scene_of_text(text)
 
 
-def test_a_platform_on_massless_legs_is_the_limit_of_light_ones(tmp_path):
+def test_a_platform_on_massless_legs_is_the_limit_of_light_ones():
     """What mass m of the legs changes is proportional to it, up to (12 m / 20)² and the tolerance of 1e-9."""
-    at = {
-        m: ephs.simulate(stewart(tmp_path, m), 0.2, method="rk87", rtol=1e-9, save_at=[0.2]) for m in (0.0, 1e-3, 1e-2)
-    }
+    at = {m: ephs.simulate(stewart(m), 0.2, method="rk87", rtol=1e-9, save_at=[0.2]) for m in (0.0, 1e-3, 1e-2)}
     places = {m: sol.body("plat").position[-1] for m, sol in at.items()}
     light, heavy = ((places[m] - places[0.0]) / m for m in (1e-3, 1e-2))
-    assert np.abs(light).max() > 0.01
-    assert np.abs(light - heavy).max() < 12.0 * 1e-2 / 20.0 * np.abs(light).max()
+    assert largest(light) > 0.01
+    assert largest(light - heavy) < 12.0 * 1e-2 / 20.0 * largest(light)
 
 
-def test_linearised_massless_legs_are_the_limit_of_light_ones(tmp_path):
-    found = {m: ephs.linearize(stewart(tmp_path, m)).A for m in (0.0, 1e-6, 1e-4)}
+def test_linearised_massless_legs_are_the_limit_of_light_ones():
+    found = {m: ephs.linearize(stewart(m)).A for m in (0.0, 1e-6, 1e-4)}
     rates = {m: np.sort(np.abs(np.linalg.eigvals(A))) for m, A in found.items()}
     assert [A.shape for A in found.values()] == 3 * [(12, 12)]
-    heavy = np.abs(rates[1e-4] - rates[0.0]).max() / 1e-4
+    heavy = largest(rates[1e-4] - rates[0.0]) / 1e-4
     assert heavy > 0.01
-    assert np.abs(rates[1e-6] - rates[0.0]).max() < 2.0 * 1e-6 * heavy + 1e-9
+    assert largest(rates[1e-6] - rates[0.0]) < 2.0 * 1e-6 * heavy + 1e-9
 
 
-def test_tangents_of_massless_legs_are_the_limit_of_light_ones(tmp_path):
+def test_tangents_of_massless_legs_are_the_limit_of_light_ones():
     """By natural; an explicit method refuses them."""
     found = {
-        m: ephs.sensitivity(stewart(tmp_path, m), ["bodies.plat.mass"], 0.05, method="natural", step=0.01)
-        for m in (0.0, 1e-6)
+        m: ephs.sensitivity(stewart(m), ["bodies.plat.mass"], 0.05, method="natural", step=0.01) for m in (0.0, 1e-6)
     }
     one, other = (of["bodies.plat.pe.q"][-1].ravel() for of in found.values())
-    assert np.abs(one).max() > 1e-4
-    assert np.abs(one - other).max() < 1e-5 * np.abs(one).max()
+    assert largest(one) > 1e-4
+    assert largest(one - other) < 1e-5 * largest(one)
     with pytest.raises(ephs.OptionError, match="method is 'rk87'"):
-        ephs.sensitivity(stewart(tmp_path, 0.0), ["bodies.plat.mass"], 0.05, method="rk87")
+        ephs.sensitivity(stewart(0.0), ["bodies.plat.mass"], 0.05, method="rk87")

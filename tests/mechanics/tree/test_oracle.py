@@ -1,22 +1,21 @@
 """The oracle that joint coordinates are held against: a closed form, the other evaluation, and what it tells apart."""
 
 from dataclasses import replace
-from pathlib import Path as File
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
-import ephs
-from ephs import Pattern, junction, library, quantity
+from ephs import Pattern, library, quantity
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.operad import Path
 from ephs.semantics.descriptor.descriptor import Input
 from ephs.solve.equations.instant import instant
 from ephs.testing import mechanisms
 from tests.mechanics.methods.systems import oracle_of, problem_of
+from tests.scenes import shipped
+from tests.written import scene_of_text
 
-FOUR_BAR = File(ephs.__file__).parents[1] / "scenes" / "four-bar.toml"
 PENDULUM = """format = 1
 name = "pendulum"
 [bodies.bar]
@@ -39,10 +38,8 @@ def general(problem, states):
     return instant(d, problem.reference, d.pack(states), inputs).rates
 
 
-def test_a_pendulum_falls_as_in_books(tmp_path):
-    file = tmp_path / "pendulum.toml"
-    file.write_text(PENDULUM)
-    problem = problem_of_scene(ephs.load(file))
+def test_a_pendulum_falls_as_in_books():
+    problem = problem_of_scene(scene_of_text(PENDULUM))
     rates = oracle_of(problem).rates(problem.initial)
     turn = -2.0 * 9.81 * 0.4 / (0.3 + 2.0 * (0.4**2 + 0.3**2))  # −m g x / (I + m l²)
     expected = np.array([0.0, 0.0, 0.3 * turn, -2.0 * turn * 0.3, 2.0 * turn * 0.4, 0.0])
@@ -50,7 +47,7 @@ def test_a_pendulum_falls_as_in_books(tmp_path):
     assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(mechanisms(max_bodies=3))
 def test_two_evaluations_of_the_relations_agree(scene):
     problem = problem_of_scene(scene)
@@ -65,9 +62,8 @@ def test_differences_stay_within_the_domain_of_states():
     """A thimble of gas between pistons: a step of a litre would be longer than its volume."""
     size, q = 1e-3, quantity
     gas = library.ideal_gas(c1=2.5 * 101325.0 * size, c2=2.5 * 101325.0 * size / 293.15, v0=size, c=2.5)
-    pattern = Pattern(
-        {"v": junction(q.volume), "w": junction(q.volume), "s": junction(q.entropy), "p": junction(q.momentum)},
-        {"gas": {"v": "v", "s": "s"}, "air": {"v": "w"}, "bar": {"p": "p"}, "piston": {"v1": "v", "v2": "w", "p": "p"}},
+    pattern = Pattern.from_text(
+        "v: volume; w: volume; s: entropy; p: momentum; gas(v, s); air(v=w); bar(p); piston(v1=v, v2=w, p)"
     )
     system = pattern(
         gas=gas, air=library.environment(v=q.volume), bar=library.point_mass(m=2.0), piston=library.piston(a=0.01)
@@ -82,7 +78,7 @@ def test_differences_stay_within_the_domain_of_states():
 
 @pytest.mark.parametrize("part", [1e-6, -1e-6])
 def test_a_millionth_of_a_mass_is_seen(part):
-    scene = ephs.load(FOUR_BAR)
+    scene = shipped("four-bar")
     crank = scene.bodies["crank"]
     other = replace(scene, bodies={**scene.bodies, "crank": replace(crank, mass=(1.0 + part) * crank.mass)})
     problem = problem_of_scene(scene)

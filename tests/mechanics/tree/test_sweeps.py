@@ -9,34 +9,30 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks import families
 from ephs.mechanics.road.programs import sweeps
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import Program
 from ephs.testing import mechanisms
 from tests.mechanics.dynamics.pinocchio_models import KINDS, PinModel
+from tests.numerics import EPS, largest, seeds
+from tests.scenes import equations_of
 
-EPS = np.finfo(float).eps
-seeds = st.integers(0, 2**32 - 1)
-slow = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+slow = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow])
 
 
 class Tree:
     """A scene's tree: its equations, its records and a state aside of the initial one."""
 
     def __init__(self, scene, seed=0):
-        self.equations = eq = ReducedEquations(problem_of_scene(scene), 0.0)
+        self.equations = eq = equations_of(scene)
         self.packed = links_of(eq.reduced).packed(eq.gravity)
         self.sweeps = sweeps(self.packed.kind)
         rng = np.random.default_rng(seed)
         self.q = eq.moved(eq._paper.initial()[0], 0.5 * rng.standard_normal(eq.n))
         self.r, self.force = rng.standard_normal((2, eq.n))
         bodies = [body for _, body in scene.all_bodies()]
-        reach = 1.0 + sum(
-            np.abs(joint.frame1[4:]).max() + np.abs(joint.frame2[4:]).max() for _, joint in scene.all_joints()
-        )
+        reach = 1.0 + sum(largest(joint.frame1[4:]) + largest(joint.frame2[4:]) for _, joint in scene.all_joints())
         self.weight = sum(body.mass for body in bodies) * (10.0 + reach) * reach
 
     @property
@@ -74,9 +70,9 @@ class Tree:
         free = np.flatnonzero(self.equations.reduced.tables.driven == 0)
         condition = np.linalg.cond(mass[np.ix_(free, free)]) if free.size else 1.0
         speed = 1.0 + np.abs(self.r).sum()
-        size = np.abs(mass).max(initial=0.0) * (speed**2 + np.abs(other).max(initial=0.0))
-        size += self.weight * speed**2 + np.abs(self.force).max(initial=0.0)
-        assert np.abs(mass @ (one - other)).max(initial=0.0) <= 10 * EPS * condition * size
+        size = largest(mass, initial=0.0) * (speed**2 + largest(other, initial=0.0))
+        size += self.weight * speed**2 + largest(self.force, initial=0.0)
+        assert largest(mass @ (one - other), initial=0.0) <= 10 * EPS * condition * size
 
 
 @st.composite
@@ -145,9 +141,9 @@ def test_tangents_are_those_of_pinocchio(kinds, data):
     by_q, by_r, by_force = pin.computeABADerivatives(other.model, other.data, q, r, other.vector(tree.force))
     whole = np.triu(by_force) + np.triu(by_force, 1).T
     expected = other.back(by_q @ other.vector(v) + by_r @ other.vector(dr) + whole @ other.vector(df))
-    size = max(np.abs(by_q).max(), np.abs(by_r).max(), np.abs(whole).max()) * max(np.abs(v).max(), np.abs(dr).max())
+    size = max(largest(by_q), largest(by_r), largest(whole)) * max(largest(v), largest(dr))
     condition = np.linalg.cond(tree.equations.mass(tree.q, tree.r))
-    assert np.abs(found[0] - expected).max() <= 1e-12 * condition * max(1.0, size)
+    assert largest(found[0] - expected) <= 1e-12 * condition * max(1.0, size)
 
 
 def slope(joint, x, v):

@@ -10,6 +10,9 @@ from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
+from tests.mechanics.tree.test_energy_of_states import tanks
+from tests.numerics import largest
+from tests.oscillator import damped_oscillator
 
 CHOOSING = [
     name
@@ -19,13 +22,7 @@ CHOOSING = [
 CONSTANT = [name for name, method in METHODS.items() if method.scenes and method.fixed and not method.posed]
 MASS, STIFFNESS, DRAG, THETA = 2.0, 1.5, 0.3, 293.15
 START = {"osc.pe.q": 1.0}
-
-
-def oscillator():
-    inner = Pattern.from_text("q: displacement; p: momentum, exposed; pe(q); ke(p); pkc(q, p)")
-    outer = Pattern.from_text("p: momentum; s: entropy; osc(p); mf(p, s); env(s)")
-    spring, mass = lib.spring(k=STIFFNESS), lib.point_mass(m=MASS)
-    return outer(osc=inner(pe=spring, ke=mass, pkc=lib.pkc()), mf=lib.friction(d=DRAG), env=lib.environment())
+SWINGING = damped_oscillator(STIFFNESS, MASS, DRAG)
 
 
 def swung(until, stiffness=STIFFNESS):
@@ -38,7 +35,7 @@ def swung(until, stiffness=STIFFNESS):
 def test_an_oscillator_is_its_matrix_exponential(method):
     order = METHODS[method].order
     rtol = 1e-5 if order <= 2 else 1e-9
-    sol = ephs.simulate(oscillator(), 1.0, method=method, initial=START, rtol=rtol, atol=rtol, audit="warn")
+    sol = ephs.simulate(SWINGING, 1.0, method=method, initial=START, rtol=rtol, atol=rtol, audit="warn")
     q, p = swung(1.0)
     assert abs(sol["osc.pe.q"][-1] - q) + abs(sol["osc.ke.p"][-1] - p) <= 100.0 * rtol * len(sol) ** 0.5
     energy = 0.5 * STIFFNESS * q * q + 0.5 * p * p / MASS
@@ -53,7 +50,7 @@ def test_constant_steps_have_their_order(method):
     q, p = swung(1.0)
 
     def missed(step):
-        sol = ephs.simulate(oscillator(), 1.0, method=method, initial=START, step=step, audit="off")
+        sol = ephs.simulate(SWINGING, 1.0, method=method, initial=START, step=step, audit="off")
         return abs(sol["osc.pe.q"][-1] - q) + abs(sol["osc.ke.p"][-1] - p)
 
     order, step = METHODS[method].order, 0.25 if METHODS[method].order >= 4 else 0.0625
@@ -63,16 +60,8 @@ def test_constant_steps_have_their_order(method):
 
 def test_a_pipe_between_tanks_is_its_equations():
     """Fluid, inertance, a loss that is no line, and its heat; the equations written by hand, by SciPy."""
-    pattern = Pattern.from_text(
-        "a: liquid; b: liquid; g: pressure_impulse; s: entropy;"
-        "tank1(v=a); tank2(v=b); pipe(g); join(v1=a, v2=b, g); loss(g, s); room(s)"
-    )
-    one, two = (lib.tank(area=area, density=1e3) for area in (2.0, 1.0))
-    loss = lib.pipe_loss(r=2e3, k=5e3)
-    pipe, room = lib.inertance(i=1e5), lib.environment()
-    system = pattern(tank1=one, tank2=two, pipe=pipe, join=lib.conduit(), loss=loss, room=room)
     found = ephs.simulate(
-        system, 20.0, method="rk87", initial={"tank1.v": 3.0, "tank2.v": 0.5}, rtol=1e-10, atol=1e-10, audit="warn"
+        tanks(), 20.0, method="rk87", initial={"tank1.v": 3.0, "tank2.v": 0.5}, rtol=1e-10, atol=1e-10, audit="warn"
     )
 
     def rates(_, y):
@@ -82,12 +71,12 @@ def test_a_pipe_between_tanks_is_its_equations():
 
     by_hand = solve_ivp(rates, (0.0, 20.0), [3.0, 0.5, 0.0], method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
     ends = np.array([found[path][-1] for path in ("tank1.v", "tank2.v", "pipe.g")])
-    assert np.abs(ends - by_hand).max() <= 1e-8 * np.abs(by_hand).max()
+    assert largest(ends - by_hand) <= 1e-8 * largest(by_hand)
 
 
 def test_a_derivative_is_that_of_the_exponential():
     """By a complex step, which shares no difference with the tangent."""
-    found = ephs.sensitivity(oscillator(), ["osc.pe.k"], 1.0, method="rk87", step=0.05, initial=START)
+    found = ephs.sensitivity(SWINGING, ["osc.pe.k"], 1.0, method="rk87", step=0.05, initial=START)
     expected = swung(1.0, STIFFNESS + 1e-30j).imag / 1e-30
     for path, exact in zip(("osc.pe.q", "osc.ke.p"), expected, strict=True):
         assert found[path][-1, 0] == pytest.approx(exact, abs=1e-11)

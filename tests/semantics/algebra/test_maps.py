@@ -3,7 +3,6 @@
 from dataclasses import replace
 from fractions import Fraction
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -38,6 +37,7 @@ from ephs.testing import check_algebra_map, patterns
 from ephs.testing import systems as drawn_systems
 from ephs.testing.controls import refuted
 from ephs.testing.elements import ELEMENTS, FEW
+from tests.numerics import EPS
 
 Q = quantity
 
@@ -101,7 +101,7 @@ def test_linearising_commutes_at_the_state_of_the_whole_and_not_at_each_parts_ow
     )
     rest = (5.0**0.5 - 1.0) / 2.0
     (state,) = whole.states
-    assert abs(whole.rates({state: (rest,)})[state][0]) <= 4.0 * np.finfo(float).eps
+    assert abs(whole.rates({state: (rest,)})[state][0]) <= 4.0 * EPS
     assert slope(whole, rest) == pytest.approx(-(5.0**0.5), rel=1e-15)
     assert slope(DECAY, rest) + slope(LOSS, rest) == slope(whole, rest)
     # by themselves the parts rest at 1 and at 0

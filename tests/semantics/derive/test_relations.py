@@ -21,9 +21,8 @@ from ephs.semantics.spaces import codes, manifold
 from ephs.semantics.stage import PLAIN
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
-
-EPS = np.finfo(float).eps
-seeds = st.integers(0, 2**20)
+from tests.numerics import EPS, generators, largest, seeds
+from tests.semantics.zoo import PS, conduction_matrix, friction_matrix
 
 
 def _rising(x, a, b):
@@ -51,12 +50,10 @@ ENERGIES = {
     "direct": ({"q": Q.direct_pose}, lambda q: q[4] ** 2 * q[0] ** 2 + np.arctan2(q[6], 9.0 + q[5])),
 }
 RELATIONS = {
-    "drag": ephs.irreversible(
-        {"p": Q.momentum, "s": Q.entropy}, lambda p, s: abs(p) * np.array([[s, -p], [-p, p * p / s]])
-    ),
+    "drag": ephs.irreversible(PS, lambda p, s: abs(p) * friction_matrix(p, s)),
     "conduction": ephs.irreversible(
         {"a": Q.entropy, "b": Q.entropy, "~q": Q.displacement},
-        lambda a, b, q: 2.0 * (1.0 + np.tanh(q) ** 2) * np.array([[b / a, -1.0], [-1.0, a / b]]),
+        lambda a, b, q: 2.0 * (1.0 + np.tanh(q) ** 2) * conduction_matrix(a, b),
     ),
     "turning": ephs.gyrator(
         {"x": Q.displacement, "p": Q.momentum, "~q": Q.pose},
@@ -103,10 +100,10 @@ def moved(storage, point, v):
 
 
 @pytest.mark.parametrize("name", ENERGIES)
-@given(seed=seeds, length=st.sampled_from([1.0, 1e-3, 1e-7, 1e-12]))
-def test_the_effort_along_the_step_is_the_difference_of_energies(name, seed, length):
+@given(rng=generators, length=st.sampled_from([1.0, 1e-3, 1e-7, 1e-12]))
+def test_the_effort_along_the_step_is_the_difference_of_energies(name, rng, length):
     storage, _ = made(name)
-    a, point = arguments(storage.kernel.relation, storage, np.random.default_rng(seed), 0.15 * length)
+    a, point = arguments(storage.kernel.relation, storage, rng, 0.15 * length)
     status, out = run(compiled(storage.kernel.relation), storage.kernel.relation, a)
     before, (_, after) = storage.energy(point), moved(storage, point, a["v"])
     effort = out["e"] + storage.bundle.intensive(ephs.Reference(300.0, 1e-3))
@@ -133,7 +130,7 @@ def test_the_ends_of_a_step_may_be_exchanged(name, seed):
     v = 0.15 * rng.standard_normal(storage.bundle.size)
     there, _ = moved(storage, point, v)
     one, two = storage.discrete_gradient(point, v), storage.discrete_gradient(there, -v)
-    assert np.abs(one - two).max() <= 1e4 * EPS * (1.0 + np.abs(one).max())
+    assert largest(one - two) <= 1e4 * EPS * (1.0 + largest(one))
 
 
 SINGLE = [*FUNCTIONS, "tan", "asin", "acos"]
@@ -197,11 +194,11 @@ ALL = {name: made(name)[0] for name in ENERGIES} | RELATIONS
 
 
 @pytest.mark.parametrize("name", ALL)
-@given(seed=seeds)
-def test_floats_and_machine_code_give_the_same_bits(name, seed):
+@given(rng=generators)
+def test_floats_and_machine_code_give_the_same_bits(name, rng):
     primitive = ALL[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    a, _ = arguments(relation, primitive, rng, 0.3)
     one = run(compiled(relation), relation, a)
     two = run(program(relation).plain()["value"], relation, a)
     assert one[0] == two[0]  # a volume may become negative in such a step
@@ -210,27 +207,27 @@ def test_floats_and_machine_code_give_the_same_bits(name, seed):
 
 
 @pytest.mark.parametrize("name", ALL)
-@given(seed=seeds)
-def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, seed):
+@given(rng=generators)
+def test_at_rest_a_relation_is_that_of_a_step_of_no_length(name, rng):
     primitive = ALL[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.0)
+    a, _ = arguments(relation, primitive, rng, 0.0)
     status, over = run(compiled(relation), relation, a)
     stepped = a | {"v": a["v"] + 0.3}  # increments are not read
     found, rest = run(compiled(relation, rest=True), relation, stepped)
     assert found == status
     values = ("e", "c") if primitive.kind == "storage" else ("f", "c")
     for argument in values:
-        size = 8.0 * EPS * (1.0 + np.abs(over[argument]).max(initial=0.0))
+        size = 8.0 * EPS * (1.0 + largest(over[argument], initial=0.0))
         assert over[argument] == pytest.approx(rest[argument], rel=0.0, abs=size), argument
 
 
 @pytest.mark.parametrize("name", ALL)
-@given(seed=seeds)
-def test_jacobians_are_derivatives(name, seed):
+@given(rng=generators)
+def test_jacobians_are_derivatives(name, rng):
     primitive = ALL[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.1)
+    a, _ = arguments(relation, primitive, rng, 0.1)
     call = compiled(relation)
     n, k, m, _ = relation.dimensions
     stores = primitive.kind == "storage"
@@ -249,15 +246,15 @@ def test_jacobians_are_derivatives(name, seed):
         values[i] = kept
         slope = (8.0 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12.0 * h)
         # a difference carries ε/h of the values, and h⁴ of fifth derivatives: near half a turn the third ones are large
-        assert np.abs(found[:, j] - slope).max() <= 1e-9 * (1.0 + np.abs(ends[0]).max() + np.abs(found).max())
+        assert largest(found[:, j] - slope) <= 1e-9 * (1.0 + largest(ends[0]) + largest(found))
 
 
 @pytest.mark.parametrize("name", ["drag", "conduction"])
-@given(seed=seeds)
-def test_processes_keep_energy_and_make_entropy(name, seed):
+@given(rng=generators)
+def test_processes_keep_energy_and_make_entropy(name, rng):
     primitive = RELATIONS[name]
     relation = primitive.kernel.relation
-    a, point = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    a, point = arguments(relation, primitive, rng, 0.3)
     _, out = run(compiled(relation), relation, a)
     reference = ephs.Reference(300.0, 1e-3)
     energy = a["e"] + primitive.bundle.intensive(reference)
@@ -268,19 +265,19 @@ def test_processes_keep_energy_and_make_entropy(name, seed):
 
 
 @pytest.mark.parametrize("name", ["turning", "rod"])
-@given(seed=seeds)
-def test_reversible_relations_exchange_power_and_lose_none(name, seed):
+@given(rng=generators)
+def test_reversible_relations_exchange_power_and_lose_none(name, rng):
     primitive = RELATIONS[name]
     relation = primitive.kernel.relation
-    a, _ = arguments(relation, primitive, np.random.default_rng(seed), 0.3)
+    a, _ = arguments(relation, primitive, rng, 0.3)
     _, out = run(compiled(relation), relation, a)
     power, terms = a["e"] @ out["f"] - a["lam"] @ out["c"], np.abs(a["e"]) @ np.abs(out["f"])
     assert abs(power) <= 16 * EPS * (terms + np.abs(a["lam"]) @ np.abs(out["c"]))
 
 
 @pytest.mark.parametrize("code", [codes.SO3, codes.SE3, codes.SE2, codes.SO3xR3])
-@given(seed=seeds, length=st.sampled_from([1e-9, 1e-4, 0.1, 1.0]))
-def test_points_over_a_step_are_those_of_the_groups(code, seed, length):
+@given(rng=generators, length=st.sampled_from([1e-9, 1e-4, 0.1, 1.0]))
+def test_points_over_a_step_are_those_of_the_groups(code, rng, length):
     """The ends by other code; their difference by the slopes."""
     from ephs.semantics.derive.charts import moved as retracted
     from ephs.semantics.derive.charts import over
@@ -289,10 +286,9 @@ def test_points_over_a_step_are_those_of_the_groups(code, seed, length):
         manifold(q.space) for q in (Q.pose, Q.direct_pose, Q.relative_pose("planar"), Q.relative_pose("spherical"))
         if manifold(q.space).code == code
     )  # fmt: skip
-    rng = np.random.default_rng(seed)
     x, v = space.random(rng), length * rng.standard_normal(space.dim)
     numbers = over(PLAIN, code, list(x), list(v), 0)
-    size = 1.0 + np.abs(x).max()
+    size = 1.0 + largest(x)
     there = space.retract(x, v)
     if code != codes.SE2 and there[:4] @ [float(number.end) for number in numbers[:4]] < 0.0:
         there[:4] *= -1.0  # the same rotation

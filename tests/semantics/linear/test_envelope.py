@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from ephs.semantics.linear.dense import lu
 from ephs.semantics.linear.envelope import envelope_lu, envelope_solve
 from ephs.semantics.stage import Entry, Program, indices, matrix, vector
+from tests.numerics import EPS, seeds
 
 
 def of_real(on, a, pivots, ends):
@@ -36,14 +37,14 @@ PROGRAM = Program(
     solve_complex=Entry(solve_complex, real=matrix(), imaginary=matrix(), **ROWS, x=vector(), y=vector()),
 )
 RUNS = {"compiled": PROGRAM.compiled(), "plain": PROGRAM.plain()}
-U = np.finfo(float).eps / 2.0
+U = EPS / 2.0
 
 
 @st.composite
 def matrices(draw):
     """Complex matrices, half of whose entries or all beyond a band are zero, with rows of sizes from 1e-3 to 1e3."""
     n = draw(st.integers(1, 9))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     a = (rng.standard_normal((n, n)) + 1j * rng.standard_normal((n, n))) * 10.0 ** rng.uniform(-3, 3, n)[:, None]
     i, j = np.indices((n, n))
     return np.where(np.abs(i - j) <= 2 if draw(st.booleans()) else rng.random((n, n)) < 0.5, a, 0.0)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from ephs.semantics.linear.dense import cholesky
 from ephs.semantics.linear.skyline import skyline_solve, skyline_times
 from ephs.semantics.stage import Entry, Program, indices, matrix, vector
+from tests.numerics import EPS, seeds
 
 
 def in_place(on, a, first):
@@ -21,14 +22,14 @@ PROGRAM = Program(
     times=Entry(skyline_times, a=matrix(), first=indices(), x=vector(), out=vector()),
 )
 RUNS = {"compiled": PROGRAM.compiled(), "plain": PROGRAM.plain()}
-U = np.finfo(float).eps / 2.0
+U = EPS / 2.0
 
 
 @st.composite
 def definite(draw):
     """Definite matrices whose rows begin anywhere, rows of sizes from 1e-3 to 1e3; where rows begin."""
     n = draw(st.integers(1, 9))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     first = np.array([rng.integers(0, i + 1) for i in range(n)])
     factor = rng.standard_normal((n, n)) * (np.arange(n) >= first[:, None])
     factor = np.tril(factor, -1) + np.diag(rng.uniform(0.5, 2.0, n))
@@ -43,7 +44,7 @@ def hidden(a, first):
 
 
 @pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
-@given(definite(), st.integers(0, 2**32 - 1))
+@given(definite(), seeds)
 @settings(max_examples=25)
 def test_solutions_solve(run, given_one, seed):
     a, first = given_one
@@ -58,7 +59,7 @@ def test_solutions_solve(run, given_one, seed):
 
 
 @pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
-@given(definite(), st.integers(0, 2**32 - 1))
+@given(definite(), seeds)
 @settings(max_examples=25)
 def test_products_are_those_of_the_whole_matrix(run, given_one, seed):
     a, first = given_one

@@ -43,7 +43,7 @@ DRAWN = {
 
 
 # Systems of three levels are large to draw, and are meant here.
-@settings(max_examples=settings().max_examples // 2, suppress_health_check=list(HealthCheck), deadline=None)
+@settings(max_examples=settings().max_examples // 2, suppress_health_check=list(HealthCheck))
 @given(st.data(), st.integers(0, 2**16))
 @pytest.mark.parametrize("strategy", DRAWN)
 def test_floats_find_the_relation_that_rational_numbers_find(strategy, data, seed):

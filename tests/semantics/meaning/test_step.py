@@ -21,6 +21,7 @@ from ephs.semantics.primitives.differences import slope
 from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.laws import random_probe
 from ephs.testing import systems
+from tests.numerics import EPS
 
 NOW = ContinuousBehaviour(Reference())
 
@@ -31,7 +32,7 @@ def test_outer_ports_have_what_is_prescribed(effort):
     body = Pattern.from_text("p: momentum, exposed; a(p)")(a=lib.point_mass(m=2.0))
     given = Input(np.array([0.75 if effort else -3.0]), effort)
     found = solved(body, {Path.of("a.p"): np.array([1.5])}, NOW, {Path.of("p"): given})
-    assert found.residual <= 4.0 * np.finfo(float).eps
+    assert found.residual <= 4.0 * EPS
     flow, speed = found.outer[Path.of("p")]
     assert (speed if effort else flow) == pytest.approx(given.value, rel=1e-14)
     assert speed == pytest.approx(0.75, rel=1e-14)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs.semantics.spaces import SE2, SE3, SO3, SO3xR3, vector_space
+from tests.numerics import EPS, generators, largest
 
 GROUPS = [
     vector_space("real", 1),
@@ -16,10 +17,10 @@ GROUPS = [
     SE3,
     SO3xR3,
 ]
-EPS = np.finfo(float).eps
+
 
 groups = pytest.mark.parametrize("group", GROUPS, ids=lambda g: f"{g.name}{g.dim}")
-seeds = st.integers(0, 2**32 - 1)
+
 # Logarithms are principal below π, so displacements stay within; zero and the tiny ones test the series.
 lengths = st.sampled_from([0.0, 1e-300, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 0.499, 0.501, 0.999, 1.001, 2.0, 3.0, 3.1415])
 
@@ -46,9 +47,8 @@ def displacement(group, rng, length):
 
 
 @groups
-@given(seed=seeds)
-def test_group_laws(group, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_group_laws(group, rng):
     a, b, c = (group.random(rng) for _ in range(3))
     scale = float(sum(np.abs(x).sum() for x in (a, b, c)))
     left, right = group.compose(group.compose(a, b), c), group.compose(a, group.compose(b, c))
@@ -63,24 +63,24 @@ def test_group_laws(group, seed):
 
 
 @groups
-@given(seed=seeds, length=lengths)
-def test_log_inverts_exp(group, seed, length):
-    v = displacement(group, np.random.default_rng(seed), length)
+@given(rng=generators, length=lengths)
+def test_log_inverts_exp(group, rng, length):
+    v = displacement(group, rng, length)
     assert close(group.log(group.exp(v)), v, np.abs(v).sum())
 
 
 @groups
-@given(seed=seeds)
-def test_exp_inverts_log(group, seed):
-    x = group.random(np.random.default_rng(seed))
+@given(rng=generators)
+def test_exp_inverts_log(group, rng):
+    x = group.random(rng)
     # V⁻¹ and V are each other's inverse only up to the condition of V, at most π within the principal angles.
     assert same_point(group, group.exp(group.log(x)), x, 10.0 * np.abs(x).sum())
 
 
 @pytest.mark.parametrize("group", [SO3, SE3, SO3xR3], ids=lambda g: g.name)
-@given(seed=seeds, gap=st.sampled_from([0.0, 1e-15, 1e-12, 1e-8, 1e-4]))
-def test_log_is_accurate_up_to_half_a_turn(group, seed, gap):
-    v = displacement(group, np.random.default_rng(seed), np.pi - gap)
+@given(rng=generators, gap=st.sampled_from([0.0, 1e-15, 1e-12, 1e-8, 1e-4]))
+def test_log_is_accurate_up_to_half_a_turn(group, rng, gap):
+    v = displacement(group, rng, np.pi - gap)
     back = group.log(group.exp(v))
     assert np.linalg.norm(back[:3]) <= np.pi * (1 + EPS)
     if gap == 0.0 and back[:3] @ v[:3] < 0:
@@ -91,9 +91,8 @@ def test_log_is_accurate_up_to_half_a_turn(group, seed, gap):
 
 
 @groups
-@given(seed=seeds, length=lengths)
-def test_retract_increment_midpoint(group, seed, length):
-    rng = np.random.default_rng(seed)
+@given(rng=generators, length=lengths)
+def test_retract_increment_midpoint(group, rng, length):
     x0, v = group.random(rng), displacement(group, rng, length)
     x1 = group.retract(x0, v)
     scale = 10.0 * float(np.abs(x0).sum() + np.abs(x1).sum() + np.abs(v).sum())
@@ -107,9 +106,8 @@ def test_retract_increment_midpoint(group, seed, length):
 
 
 @groups
-@given(seed=seeds)
-def test_adjoint_is_a_homomorphism_and_its_dual_reverses(group, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_adjoint_is_a_homomorphism_and_its_dual_reverses(group, rng):
     a, b = group.random(rng), group.random(rng)
     ad_a, ad_b, ad_ab = group.adjoint(a), group.adjoint(b), group.adjoint(group.compose(a, b))
     scale = float(np.abs(ad_a).sum() * np.abs(ad_b).sum())
@@ -123,13 +121,12 @@ def test_the_dual_is_not_a_homomorphism(group):
     rng = np.random.default_rng(1)
     a, b = group.random(rng), group.random(rng)
     wrong = group.coadjoint(a) @ group.coadjoint(b) - group.coadjoint(group.compose(a, b))
-    assert np.abs(wrong).max() > 0.1
+    assert largest(wrong) > 0.1
 
 
 @groups
-@given(seed=seeds)
-def test_bracket(group, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_bracket(group, rng):
     u, v, w = (rng.standard_normal(group.dim) for _ in range(3))
     ad, scale = group.ad, 1.0 + np.abs(u).sum() * np.abs(v).sum() * np.abs(w).sum()
     assert close(ad(u) @ v, -ad(v) @ u, scale)
@@ -140,19 +137,18 @@ def test_bracket(group, seed):
 
 
 @groups
-@given(seed=seeds, length=lengths)
-def test_adjoint_of_exp_is_exp_of_ad(group, seed, length):
+@given(rng=generators, length=lengths)
+def test_adjoint_of_exp_is_exp_of_ad(group, rng, length):
     from scipy.linalg import expm
 
-    v = displacement(group, np.random.default_rng(seed), length)
+    v = displacement(group, rng, length)
     expected = expm(group.ad(v)) if group.dim else np.zeros((0, 0))
     assert close(group.adjoint(group.exp(v)), expected, 10 * np.abs(group.ad(v)).sum())
 
 
 @groups
-@given(seed=seeds)
-def test_conjugation_passes_through_exp(group, seed):
-    rng = np.random.default_rng(seed)
+@given(rng=generators)
+def test_conjugation_passes_through_exp(group, rng):
     a, v = group.random(rng), rng.standard_normal(group.dim)
     left = group.compose(group.compose(a, group.exp(v)), group.inverse(a))
     right = group.exp(group.adjoint(a) @ v)

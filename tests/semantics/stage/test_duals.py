@@ -26,8 +26,9 @@ from ephs.semantics.stage import (
 )
 from ephs.semantics.stage.duals import StagedDual
 from ephs.semantics.stage.evaluator import FUNCTIONS
+from tests.numerics import EPS
 
-EPSILON = np.finfo(float).eps
+EPSILON = EPS
 COMPLEX = {
     "sqrt": cmath.sqrt,
     "absolute": lambda x: x if x.real > 0 else -x,
@@ -221,17 +222,20 @@ class Reaching(Record):
     law = function(signature_of(x=vector(2), out=vector(1)))
 
 
+def law(on, x, out):
+    out[0] = x[0] * on.sin(x[1])
+    return 0
+
+
+def squared(on, table, x, out):
+    """The square of the law of a table."""
+    on.reach(table[0].law, x, out)
+    out[0] = out[0] * out[0]
+
+
 def test_tangents_go_through_functions_that_are_called_by_address():
-    def law(on, x, out):
-        out[0] = x[0] * on.sin(x[1])
-        return 0
-
-    def outer(on, table, x, out):
-        on.reach(table[0].law, x, out)
-        out[0] = out[0] * out[0]
-
     inside = Program("inside", law=Entry(law, x=vector(2), out=vector(1)))
-    entry = Entry(outer, table=table(Reaching), x=vector(2), out=vector(1))
+    entry = Entry(squared, table=table(Reaching), x=vector(2), out=vector(1))
     tangent = Program("along", outer=entry.tangent("x", "out", directions=2))
     rows = Reaching.table(1)
     rows[0].law = inside.tangent(2).compiled()["law"].address

@@ -52,14 +52,14 @@ def error(found: float, true: Any) -> float:
 
 @pytest.mark.parametrize("name", DRAWN)
 @given(data=st.data())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_errors_are_as_promised(name, data):
     x = data.draw(DRAWN[name])
     assert error(getattr(PLAIN, name)(x), getattr(mp, name)(mpf(x))) < ULPS[name]
 
 
 @given(y=st.floats(-1e300, 1e300), x=st.floats(-1e300, 1e300), share=st.floats(0.0, 1.0))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_errors_of_the_arctangent_are_as_promised(y, x, share):
     for a, b in ((y, x), (share * x, x), (x, share * x)):
         if a and b:
@@ -99,7 +99,7 @@ def test_edges_of_the_others():
 
 
 @given(st.floats(2.0**26, 2.0**55), st.booleans())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_errors_of_large_angles_are_absolute(x, negative):
     x = -x if negative else x
     for name in ("sin", "cos"):
@@ -112,7 +112,7 @@ def test_angles_whose_neighbours_are_turns_apart_are_whole_turns():
 
 
 @given(ANGLES)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_sine_is_odd_and_cosine_even(x):
     assert PLAIN.sin(-x) == -PLAIN.sin(x) and PLAIN.cos(-x) == PLAIN.cos(x)
 

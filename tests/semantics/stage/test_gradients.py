@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from ephs.semantics.stage import Entry, Program, Record, function, indices, integer, real, signature_of, table, vector
+from ephs.semantics.stage import Entry, Program, Record, indices, integer, real, table, vector
 from ephs.semantics.stage.gradients import Gradients
 from ephs.semantics.stage.taped import COUNT
+from tests.numerics import largest, seeds
+from tests.semantics.stage.test_duals import Reaching, law, squared
 
 NEAR = 1e-13
 """Part of the largest derivative: some hundred terms of either way round."""
@@ -74,7 +75,7 @@ def columns(seed):
 
 @pytest.mark.parametrize("compiled", [True, False])
 @settings(max_examples=5)
-@given(seed=st.integers(0, 2**32 - 1))
+@given(seed=seeds)
 def test_a_tape_says_what_tangents_say(compiled, seed):
     expected = columns(seed)
     made = Gradients(WINDINGS, compiled=compiled, **drawn(seed))
@@ -82,7 +83,7 @@ def test_a_tape_says_what_tangents_say(compiled, seed):
     for row, share in zip(expected, np.eye(2), strict=True):
         found = made.pull({"out": share})
         mine = np.concatenate([found["springs"], found["x"]])
-        assert np.abs(mine - row).max() <= NEAR * max(1.0, np.abs(expected).max())
+        assert largest(mine - row) <= NEAR * max(1.0, largest(expected))
 
 
 def test_a_tape_that_is_too_short_grows():
@@ -128,26 +129,12 @@ def test_a_second_run_starts_with_what_the_first_found():
     assert count[0] == 10_005
 
 
-class Reaching(Record):
-    """A function that another program calls."""
-
-    law = function(signature_of(x=vector(2), out=vector(1)))
-
-
 def test_tapes_go_through_functions_that_are_called_by_address():
-    def law(on, x, out):
-        out[0] = x[0] * on.sin(x[1])
-        return 0
-
-    def outer(on, rows, x, out):
-        on.reach(rows[0].law, x, out)
-        out[0] = out[0] * out[0]
-
     inside = Program("inside", law=Entry(law, x=vector(2), out=vector(1)).taped())
     rows = Reaching.table(1)
     rows[0].law = inside.compiled()["law"].address
-    entry = Entry(outer, rows=table(Reaching), x=vector(2), out=vector(1))
-    made = Gradients(entry, rows=rows, x=np.array([1.5, 0.4]), out=np.zeros(1))
+    entry = Entry(squared, table=table(Reaching), x=vector(2), out=vector(1))
+    made = Gradients(entry, table=rows, x=np.array([1.5, 0.4]), out=np.zeros(1))
     made.run()
     s, c = np.sin(0.4), np.cos(0.4)
     assert made.pull({"out": [1.0]})["x"] == pytest.approx([2.0 * 1.5 * s * s, 2.0 * 1.5 * s * 1.5 * c], rel=1e-14)

@@ -84,7 +84,7 @@ def test_another_level_is_refused_by_name(folder, monkeypatch, given):
 
 
 @given(data=st.data())
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_spoilt_file_is_compiled_anew(folder, compilations, data):
     compiled(SMALL.text())
     (file,) = folder.iterdir()

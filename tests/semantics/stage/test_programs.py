@@ -29,6 +29,7 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
+from tests.numerics import EPS
 
 
 def solve(on: Evaluator, a: Matrix, x: Vector, pivots: Integers) -> Integer:
@@ -128,12 +129,12 @@ def test_equations_are_solved_with_the_same_bits(n):
     for one, other in zip(*found, strict=True):
         assert np.array_equal(one, other)
     scale = np.abs(matrix) @ np.abs(found[0][2])
-    assert np.all(np.abs(matrix @ found[0][2] - right) <= 10 * np.linalg.cond(matrix) * np.finfo(float).eps * scale)
+    assert np.all(np.abs(matrix @ found[0][2] - right) <= 10 * np.linalg.cond(matrix) * EPS * scale)
 
 
 @pytest.mark.parametrize("x", [2.0, 1e-8, 3e9])
 def test_a_loop_ends_when_its_condition_holds(run, x):
-    assert abs(run["newton"](x) - x**0.5) <= 4 * np.finfo(float).eps * x**0.5
+    assert abs(run["newton"](x) - x**0.5) <= 4 * EPS * x**0.5
 
 
 @pytest.mark.parametrize("i", [-7, -6, 0, 6, 7])

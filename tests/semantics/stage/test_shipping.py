@@ -190,7 +190,7 @@ def test_a_program_that_has_changed_is_compiled(delivered):
 
 
 @given(data=st.data())
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_spoilt_is_compiled(delivered, data):
     """No byte of the files can change without notice; names of the index that point nowhere count as absent."""
     folder, _ = delivered

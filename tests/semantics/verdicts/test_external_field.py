@@ -13,6 +13,7 @@ from ephs import quantity as Q
 from ephs.semantics import StructureError, library
 from ephs.semantics.primitives.pullback import Map, pull_back
 from tests.semantics.test_documents import VALID, alone
+from tests.semantics.zoo import PS, friction_matrix
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 ODD = {"p": Q.momentum, "b": Q.flux_linkage}
@@ -28,7 +29,7 @@ PARTS = {
     "transformer": lambda **f: ephs.transformer({"q": Q.displacement, "p": Q.momentum}, [[2.0]], **f),
     "constraint": lambda **f: ephs.constraint({"q": Q.displacement, "p": Q.momentum}, [[1.0, 2.0]], **f),
 }
-RAYS = {"p": Q.momentum, "s": Q.entropy}
+RAYS = PS
 
 
 @pytest.mark.parametrize("name", PARTS)
@@ -52,7 +53,7 @@ def test_the_flag_excuses_nothing_else(size, leak):
 
 def valve(one_sided=True):
     def matrix(p, s):
-        return (1.0 + 0.5 * np.tanh(p)) * np.array([[s, -p], [-p, p * p / s]])
+        return (1.0 + 0.5 * np.tanh(p)) * friction_matrix(p, s)
 
     return ephs.irreversible(RAYS, matrix, one_sided=one_sided)
 

@@ -16,7 +16,7 @@ from ephs.semantics.verdicts.recorded import DEFINED
 from ephs.semantics.verdicts.trials import trial_of
 from tests.semantics.verdicts.right_parts import turn
 from tests.semantics.verdicts.wrong_parts import PS, QP, TURN, X, friction, gyrator, stored
-from tests.semantics.zoo import hidden
+from tests.semantics.zoo import friction_matrix, hidden
 
 POSE = {"q": Q.pose}
 
@@ -112,7 +112,7 @@ def test_a_difference_names_arguments_and_both_answers():
 def test_what_changes_later_changes_nothing(p, s):
     """Relations say what runs do, whatever happens to a closure: d p² of heat."""
     ratio = [2.0]
-    part = ephs.irreversible(PS, lambda p, s: ratio[0] * np.array([[s, -p], [-p, p * p / s]]))
+    part = ephs.irreversible(PS, lambda p, s: ratio[0] * friction_matrix(p, s))
     ratio[0] = -5.0
     reference = Reference(1.0, 0.0)
     flow = part.flow({}, np.array([p, s - 1.0]), reference)

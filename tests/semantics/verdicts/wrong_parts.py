@@ -13,21 +13,15 @@ import numpy as np
 
 import ephs
 from ephs import quantity as Q
+from tests.semantics.zoo import AB, PS, QP, conduct, friction_matrix
 
-QP = {"q": Q.displacement, "p": Q.momentum}
-PS = {"p": Q.momentum, "s": Q.entropy}
-AB = {"a": Q.entropy, "b": Q.entropy}
 X = {"~x": Q.displacement}
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 def friction(d, **more):
     """Friction of the coefficient d of velocity and temperature."""
-    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * np.array([[s, -p], [-p, p * p / s]]), **more)
-
-
-def conduct(k):
-    return lambda: ephs.irreversible(AB, lambda a, b: k(a, b) * np.array([[b / a, -1.0], [-1.0, a / b]]))
+    return lambda: ephs.irreversible(PS, lambda p, s: d(p, s) * friction_matrix(p, s), **more)
 
 
 def gyrator(ports, matrix, **more):
@@ -131,7 +125,7 @@ def energy_beside_friction(source):
 
     def matrix(p, s, a, b):
         m = np.zeros((4, 4), dtype=object)
-        m[:2, :2] = other * np.array([[s, -p], [-p, p * p / s]])
+        m[:2, :2] = other * friction_matrix(p, s)
         m[2:, 2:] = np.array([[b / a, -1.0], [-1.0, (1.0 + size) * a / b]])
         return m
 

@@ -1,14 +1,11 @@
 """Units that several files test."""
 
-from pathlib import Path
-
 import fmpy
 import pytest
 
 import ephs
 from tests.solve.exchange.units import spring
 
-ROOT = Path(__file__).resolve().parents[3]
 CART = """
 format = 1
 [bodies.cart]

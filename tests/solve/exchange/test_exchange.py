@@ -1,21 +1,20 @@
 """Units by themselves: exported mechanisms that are read back move as they do here, and signals go where wires say."""
 
-from pathlib import Path
-
 import fmpy
 import numpy as np
 import pytest
 
 import ephs
+from tests.numerics import largest
+from tests.scenes import shipped
 
-ROOT = Path(__file__).resolve().parents[3]
 SHARP = {"method": "rk87", "rtol": 1e-11, "atol": 1e-13}
 """Two runs at this tolerance over less than a second, whose steps end at different times, differ by less than 1e-9."""
 
 
 @pytest.mark.parametrize(("name", "joint", "size"), [("slider-crank", "bearing", 0.2), ("motor-four-bar", "main", 0.5)])
 def test_exported_and_read_back_it_moves_as_here(tmp_path, name, joint, size):
-    scene, period, until = ephs.load(ROOT / f"scenes/{name}.toml"), 0.02, 0.4
+    scene, period, until = shipped(name), 0.02, 0.4
     file = tmp_path / "unit.fmu"
     made = ephs.export_fmu(scene, file, inputs=[f"joints.{joint}"], **SHARP, platforms=[fmpy.platform_tuple])
     unit = ephs.library.fmu(file)
@@ -28,11 +27,11 @@ def test_exported_and_read_back_it_moves_as_here(tmp_path, name, joint, size):
     held = {f"joints.{joint}": ephs.Sampled(period, force)}
     sol = ephs.simulate(scene, until, inputs=held, save_at=found.t, **SHARP)
     free = ephs.Exchange({"unit": unit}, period).run(until)
-    scale = np.abs(sol.joint(joint).rate).max()
+    scale = largest(sol.joint(joint).rate)
     for what in ("coordinate", "rate"):
         here = getattr(sol.joint(joint), what)[:, 0]
-        assert np.abs(found[f"unit.joints.{joint}.{what}"] - here).max() <= 1e-9 * scale
-        assert np.abs(free[f"unit.joints.{joint}.{what}"] - here).max() > 1e-3 * scale, "the control"
+        assert largest(found[f"unit.joints.{joint}.{what}"] - here) <= 1e-9 * scale
+        assert largest(free[f"unit.joints.{joint}.{what}"] - here) > 1e-3 * scale, "the control"
 
 
 def test_signals_go_from_unit_to_unit(springs, carts):

@@ -14,13 +14,13 @@ from ephs.mechanics.elements.shell.mesh import grid, quadrilaterals
 from ephs.mechanics.elements.shell.section import Ply
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
-from tests.mechanics.elements.shell.test_shell import EPS, WX, WY, WZ, X, Y, Z
-from tests.mechanics.elements.shell.test_shell_scenes import SHEET, WORLD, sheet
+from tests.mechanics.elements.shell.test_shell import patch_is_exact
+from tests.mechanics.elements.shell.test_shell_scenes import SHEET, WORLD, lines_of, sheet
+from tests.numerics import generators, largest
 from tests.written import scene_of_text
 
 MATERIAL = ("thickness", "E", "nu", "rho")
 LAYER = "{thickness = 1e-3, E1 = 3e7, E2 = 1e7, G12 = 4e6, nu12 = 0.3, angle = ANGLE, rho = 900.0}"
-seeds = st.integers(0, 2**32 - 1)
 
 
 def table(*without, **keys):
@@ -28,8 +28,7 @@ def table(*without, **keys):
 
 
 def scene(keys):
-    lines = "".join(f"{key} = {value}\n" for key, value in keys.items())
-    return scene_of_text(f"{WORLD}[shells.skin]\n{lines}")
+    return scene_of_text(f"{WORLD}[shells.skin]\n{lines_of(keys)}")
 
 
 def layered(*angles, **keys):
@@ -79,17 +78,14 @@ def test_layers_are_kept_and_change_with_units():
 
 
 def test_a_part_that_is_turned_turns_the_fibres(tmp_path):
-    lines = "".join(
-        f"{key} = {value}\n"
-        for key, value in table(*MATERIAL, layers=f"[{LAYER.replace('ANGLE', '0.4')}]", along="[1.0, 0.2, 0.0]").items()
-    )
-    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{lines}")
+    keys = table(*MATERIAL, layers=f"[{LAYER.replace('ANGLE', '0.4')}]", along="[1.0, 0.2, 0.0]")
+    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{lines_of(keys)}")
     (tmp_path / "whole.toml").write_text(
         f'{WORLD}[parts.left]\nuse = "wing.toml"\nposition = [1.0, 2.0, 0.5]\nrotation = [0.8, 0.0, 0.0, 0.6]\n'
     )
     turned = dict(ephs.load(tmp_path / "whole.toml").all_shells())["left.skin"].shell()
     still = ephs.load(tmp_path / "wing.toml").shells["skin"].shell()
-    assert turned.matrix == pytest.approx(still.matrix, abs=1e-12 * np.abs(still.matrix).max())
+    assert turned.matrix == pytest.approx(still.matrix, abs=1e-12 * largest(still.matrix))
 
 
 # ---- meshes ----------------------------------------------------------------------------------------------------------
@@ -124,8 +120,7 @@ def test_a_mesh_file_is_its_points_and_elements(tmp_path, ending):
     mesh.write(tmp_path / f"skin.{ending}", **({"file_format": "gmsh22"} if data else {}))
     side = '["hub"]' if ending == "msh" else f"[{held}]"
     keys = table("corners", "elements", file=f'"skin.{ending}"', sides=side, edges='["ground"]')
-    lines = "".join(f"{key} = {value}\n" for key, value in keys.items())
-    (tmp_path / "scene.toml").write_text(f"{WORLD}[shells.skin]\n{lines}")
+    (tmp_path / "scene.toml").write_text(f"{WORLD}[shells.skin]\n{lines_of(keys)}")
     read = ephs.load(tmp_path / "scene.toml")
     (tmp_path / f"skin.{ending}").unlink()  # all that is needed is in the scene
     again = scene_from_text(scene_to_text(read)).shells["skin"]
@@ -153,8 +148,7 @@ def test_a_mesh_file_outside_or_of_another_kind_is_refused(tmp_path):
         if text is not None and not name.startswith(".."):
             (tmp_path / "inside" / name).write_text(text)
         keys = table("corners", "elements", "edges", file=f'"{name}"')
-        lines = "".join(f"{key} = {value}\n" for key, value in keys.items())
-        (tmp_path / "inside" / "scene.toml").write_text(f"{WORLD}[shells.skin]\n{lines}")
+        (tmp_path / "inside" / "scene.toml").write_text(f"{WORLD}[shells.skin]\n{lines_of(keys)}")
         with pytest.raises(ephs.SceneError, match=words) as error:
             ephs.load(tmp_path / "inside" / "scene.toml")
         (fault,) = error.value.faults
@@ -162,33 +156,17 @@ def test_a_mesh_file_outside_or_of_another_kind_is_refused(tmp_path):
 
 
 @settings(max_examples=6)
-@given(seeds, st.sampled_from(["membrane", "bending"]))
-def test_constant_strains_are_exact_on_meshes_with_triangles(seed, kind):
+@given(generators, st.sampled_from(["membrane", "bending"]))
+def test_constant_strains_are_exact_on_meshes_with_triangles(rng, kind):
     """Patch tests: half of the elements of a distorted square are two triangles each."""
-    rng = np.random.default_rng(seed)
     points, where, quads = grid(lambda u, v: (u, v, 0.0), (3, 3))
     inner = ((where > 0.0) & (where < 1.0)).all(axis=1)
     points[inner, :2] += rng.uniform(-0.08, 0.08, (inner.sum(), 2))
     cells = [t for k, c in enumerate(quads.tolist()) for t in ([c] if k % 2 else [c[:3], [c[0], *c[2:]]])]
     whole, elements, _ = quadrilaterals(points, cells)
     shell = Shell.of(whole, elements, ShellSection.isotropic(0.05, 1e3, 0.3))
-    x, y = whole[:, 0], whole[:, 1]
     rim = ((whole[:, :2] <= 1e-12) | (whole[:, :2] >= 1.0 - 1e-12)).any(axis=1)
-    exact, other = np.zeros((2, len(x), 6))
-    if kind == "membrane":
-        exact[:, X], exact[:, Y], exact[:, WZ] = x + 0.7 * y, y + 0.5 * x, -0.1
-    else:
-        exact[:, Z], exact[:, WX], exact[:, WY] = 0.5 * (x * x + x * y + y * y), y + 0.5 * x, -(x + 0.5 * y)
-    other[:, X] = other[:, Z] = np.sin(3.0 * x)
-    tangent = shell.tangent(shell.poses).toarray()
-    outer, inside = np.flatnonzero(np.repeat(rim, 6)), np.flatnonzero(np.repeat(~rim, 6))
-    held, beside = tangent[np.ix_(inside, inside)], tangent[np.ix_(inside, outer)]
-    errors = [
-        np.abs(np.linalg.solve(held, -beside @ field.ravel()[outer]) - field.ravel()[inside]).max()
-        for field in (exact, other)
-    ]
-    assert errors[0] <= 10 * np.linalg.cond(held) * EPS
-    assert errors[1] > 1e-3
+    patch_is_exact(shell, rim, kind)
 
 
 def test_new_points_are_of_a_side_on_the_border_or_on_a_line_through_the_mesh():
@@ -248,7 +226,8 @@ def test_a_pinned_strip_has_the_frequency_of_a_hinged_beam_and_a_welded_one_that
                  edges='["free", "ground", "free", "ground"]')  # fmt: skip
     bare = WORLD.replace("-9.81", "0.0").replace("1.0,", "0.0,")
     for pinned, expected in (("[false, true, false, true]", np.pi**2), ("[]", 22.3733)):
-        lines = "".join(f"{key} = {value}\n" for key, value in {**keys, "pinned": pinned}.items())
-        found = ephs.linearize(scene_of_text(f"{bare}[shells.strip]\n{lines}")).eigenvalues.imag
+        found = ephs.linearize(
+            scene_of_text(f"{bare}[shells.strip]\n{lines_of(keys | {'pinned': pinned})}")
+        ).eigenvalues.imag
         lowest = np.sort(np.abs(found[np.abs(found) > 1e-3]))[0] / np.sqrt(1.2e7 * 1e-4 / 12.0)
         assert lowest == pytest.approx(expected, rel=0.03)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.elements.shell.pressure import node_areas, volume
@@ -11,16 +10,16 @@ from ephs.mechanics.methods import jacobian
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
+from tests import numerics
+from tests.numerics import EPS, largest, seeds
 from tests.written import scene_of_text
 
-EPS = float(np.finfo(float).eps)
 BOX = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 """Counter-clockwise, seen from outside."""
 PRESSURE, UNTIL = 50.0, 0.02
 STILL = "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n"
 SKIN = "thickness = 0.02\nE = 1e5\nnu = 0.3\nrho = 100.0\n"
-seeds = st.integers(0, 2**32 - 1)
 
 
 def drawn(seed):
@@ -39,13 +38,13 @@ def box():
 def test_forces_on_a_closed_surface_have_neither_sum_nor_moment(seed):
     places = drawn(seed)
     force = node_areas(places, FACES)
-    size = 64 * EPS * np.abs(places).max() * np.abs(force).sum()
-    assert np.abs(force.sum(axis=0)).max() <= size and np.abs(np.cross(places, force).sum(axis=0)).max() <= size
+    size = 64 * EPS * largest(places) * np.abs(force).sum()
+    assert largest(force.sum(axis=0)) <= size and largest(np.cross(places, force).sum(axis=0)) <= size
     corner = places[FACES]
     quarter = 0.125 * np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
     equal = np.zeros_like(places)
     np.add.at(equal, FACES, quarter[:, None])
-    assert np.abs(np.cross(places, equal).sum(axis=0)).max() > 1e-6  # the control: equal shares have a moment
+    assert largest(np.cross(places, equal).sum(axis=0)) > 1e-6  # the control: equal shares have a moment
 
 
 @given(seeds)
@@ -54,7 +53,7 @@ def test_their_power_is_that_of_the_volume(seed):
     step = 1e-4
     ends = [volume(places + sign * step * rates, FACES) for sign in (1.0, -1.0)]
     cubic = volume(rates, FACES) * step**2  # the third derivative's part in the difference
-    size = np.abs(places).sum() ** 2 * np.abs(rates).max()
+    size = np.abs(places).sum() ** 2 * largest(rates)
     power = np.sum(node_areas(places, FACES) * rates)
     assert abs((ends[0] - ends[1]) / (2.0 * step) - cubic - power) <= 64 * EPS * size / step
 
@@ -81,7 +80,7 @@ def test_the_work_on_a_closed_surface_is_the_pressure_times_the_change_of_its_vo
     assert work == pytest.approx(expected, rel=1e-6)
     assert run.energy_error.max() <= 1e-13
     momenta = sum(np.asarray(run[f"shells.box.node{i}.ke.p"])[-1, 3:] for i in range(8))
-    assert np.abs(momenta).max() <= 1e-9  # symmetry keeps the turns of nodes 0, and so their axes the world's
+    assert largest(momenta) <= 1e-9  # symmetry keeps the turns of nodes 0, and so their axes the world's
 
 
 def test_by_midpoints_the_work_is_off_by_the_square_of_the_step():
@@ -151,12 +150,11 @@ def test_derivatives_are_exact_off_the_balance_and_a_potential_has_symmetric_one
     forces, accelerations = model.derivatives(at, accelerations={}).force_q, model.derivatives(at).acceleration_q
     exact = (forces, model.inverse_dynamics), (accelerations, model.acceleration)
     for found, function in (*exact, (model.stiffness(at), model.inverse_dynamics)):
-        ends = [[function(model.moved(at, sign * h * unit), zero) for sign in (1.0, -1.0)] for unit in np.eye(n)]
-        differenced = np.array([(one - two) / (2.0 * h) for one, two in ends]).T
-        assert np.abs(found - differenced).max() <= 1e-8 * np.abs(found).max()
+        differenced = numerics.jacobian(lambda v, function=function: function(model.moved(at, v), zero), n, h)
+        assert largest(found - differenced) <= 1e-8 * largest(found)
     bare = ephs.dynamics(varied(scene, {f"shells.{next(iter(scene.shells))}.pressure": 0.0}))
     added = (ephs.dynamics(scene).stiffness(model.state0) - bare.stiffness(model.state0))[np.ix_(*2 * [moved(model)])]
-    assert (np.abs(added - added.T).max() <= 1e-12 * np.abs(added).max()) == (surface == "closed")
+    assert (largest(added - added.T) <= 1e-12 * largest(added)) == (surface == "closed")
 
 
 def moved(model):
@@ -170,12 +168,12 @@ def test_an_inflated_cushion_rests_where_a_damped_run_ends():
     ends = run.shell("box").position[-1]
     places = np.array([rest.states[ephs.Path.of(f"shells.box.node{i}.pe.q")][4:] for i in range(8)])
     apart = [np.linalg.norm(each[:, None] - each, axis=2) for each in (places, ends, BOX)]
-    assert np.abs(apart[0] - apart[1]).max() <= 1e-6  # what lags by the damping time dies out as exp(−2/0.1)
-    assert np.abs(apart[0] - apart[2]).max() > 1e-3  # it is inflated
+    assert largest(apart[0] - apart[1]) <= 1e-6  # what lags by the damping time dies out as exp(−2/0.1)
+    assert largest(apart[0] - apart[2]) > 1e-3  # it is inflated
     linear = ephs.linearize(rest.model)
     assert linear.structure is not None  # at rest, and with a potential
     with_input = ephs.dynamics(scene, inputs={"shells.box": 0.0})
-    assert np.abs(with_input.acceleration(with_input.state0, np.zeros(with_input.layout.n))).max() <= 1e-9
+    assert largest(with_input.acceleration(with_input.state0, np.zeros(with_input.layout.n))) <= 1e-9
 
 
 def test_a_long_tube_has_the_membrane_forces_of_its_radius():
@@ -208,7 +206,7 @@ def test_sparse_matrices_leave_out_how_a_pressure_turns_and_steps_lead_to_the_sa
         for method, given in (("radau", rest), ("rk87", {}))
     ]
     assert bool(made) == feedback
-    moved = np.abs(ends[1] - BOX).max()
-    assert np.abs(ends[0] - ends[1]).max() <= 1e-5 * moved
+    moved = largest(ends[1] - BOX)
+    assert largest(ends[0] - ends[1]) <= 1e-5 * moved
     still = ephs.simulate(free, UNTIL, method="rk87", inputs={"shells.box": 0.0}).shell("box").position[-1]
-    assert np.abs(still - ends[1]).max() > 0.5 * moved  # the control: without the pressure
+    assert largest(still - ends[1]) > 0.5 * moved  # the control: without the pressure

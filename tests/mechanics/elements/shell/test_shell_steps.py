@@ -14,7 +14,6 @@ from ephs.mechanics.methods import jacobian, radau
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.methods.sparse import PIVOTS, SparseSystems
 from ephs.mechanics.motion.reduced import ReducedMotion
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.tree.engine import apart
 from ephs.mechanics.tree.equations.equations import ReducedEquations
@@ -24,9 +23,8 @@ from ephs.solve.methods.dissection import dissected
 from ephs.solve.methods.solvers import Solvers
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
-
-EPS = float(np.finfo(float).eps)
-seeds = st.integers(0, 2**32 - 1)
+from tests.numerics import EPS, generators, largest, seeds
+from tests.scenes import equations_of
 
 
 def patch(elements=(3, 2), damping=1e-3, gravity=(0.0, 0.0, -9.81), **options):
@@ -97,7 +95,7 @@ def test_a_loss_slows_down_and_warms():
         equations = ReducedEquations(problem_of_system(patch((2, 1), damping)), 0.0)
         state = strained(equations, np.random.default_rng(1))
         rates.append(equations.rates(0.0, state.q, equations.vector(state))[equations.nv :][: equations.n].copy())
-    assert np.abs(rates[0] - rates[1]).max() > 1e-3 * np.abs(rates[0]).max()
+    assert largest(rates[0] - rates[1]) > 1e-3 * largest(rates[0])
 
 
 def test_a_linearised_damped_sheet_has_the_modes_of_kelvin_and_voigt():
@@ -106,10 +104,10 @@ def test_a_linearised_damped_sheet_has_the_modes_of_kelvin_and_voigt():
     still, damped = (ephs.linearize(patch((2, 1), damping, (0.0, 0.0, 0.0))).eigenvalues for damping in (0.0, tau))
     squares = np.sort(still.imag[still.imag > 0.0] ** 2)
     waves = damped[damped.imag > 0.0]
-    assert np.abs(2.0 * waves.real + tau * np.abs(waves) ** 2).max() <= 1e-10 * np.abs(waves).max()
+    assert largest(2.0 * waves.real + tau * np.abs(waves) ** 2) <= 1e-10 * largest(waves)
     found = np.sort(np.abs(waves) ** 2)
     # squares are eigenvalues of matrices whose entries are known to 100 roundings of their largest
-    assert np.abs(found - squares[: found.size]).max() <= 1000 * EPS * squares[-1]
+    assert largest(found - squares[: found.size]) <= 1000 * EPS * squares[-1]
 
 
 # ---- sparse matrices ------------------------------------------------------------------------------------------------
@@ -150,13 +148,13 @@ def test_a_pattern_without_the_elements_is_another_matrix(monkeypatch):
     monkeypatch.setattr(jacobian, "columns_of_trees", torn)
     other = ReducedEquations(problem_of_system(patch()), 0.0)
     found = matrix_of(other, state, sparse=True).toarray()
-    assert np.abs(found - sound).max() > 1e-3 * np.abs(sound).max()
+    assert largest(found - sound) > 1e-3 * largest(sound)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(mechanisms(loops=False))
 def test_sparse_matrices_of_mechanisms_are_dense_ones(scene):
-    equations = ReducedEquations(problem_of_scene(scene), 0.0)
+    equations = equations_of(scene)
     assume(equations.n)
     state = equations.start(0.0)
     sparse = matrix_of(equations, state, sparse=True)
@@ -164,10 +162,9 @@ def test_sparse_matrices_of_mechanisms_are_dense_ones(scene):
 
 
 @settings(max_examples=15)
-@given(seeds, st.floats(1e-5, 1e-2), st.booleans(), st.booleans(), st.booleans())
-def test_systems_of_sparse_matrices_are_solved(seed, h, pair, heated, dissecting):
+@given(generators, st.floats(1e-5, 1e-2), st.booleans(), st.booleans(), st.booleans())
+def test_systems_of_sparse_matrices_are_solved(rng, h, pair, heated, dissecting):
     """(1/(h μ) − J) x = b to 10 κ ε, with the rates of a node alone where none depends on heats, and with all else."""
-    rng = np.random.default_rng(seed)
     equations = ReducedEquations(PATCH, 0.0)
     matrix = matrix_of(equations, strained(equations, rng), sparse=True).tolil()
     n, size = equations.n, matrix.shape[0]
@@ -185,7 +182,7 @@ def test_systems_of_sparse_matrices_are_solved(seed, h, pair, heated, dissecting
     scale = np.concatenate([np.full(n, h), np.ones(n), np.full(size - 2 * n, h)])
     condition = np.linalg.cond(whole * scale)
     off = np.abs(found - expected) / scale
-    assert off.max() <= 10.0 * condition * EPS * np.abs(expected / scale).max()
+    assert off.max() <= 10.0 * condition * EPS * largest(expected / scale)
 
 
 def lattice(points, ways):
@@ -195,14 +192,14 @@ def lattice(points, ways):
 
 
 @settings(max_examples=10)
-@given(st.integers(8, 16), st.integers(8, 16), seeds)
-def test_halves_of_a_dissected_mesh_do_not_meet_in_its_factors(wide, high, seed):
+@given(st.integers(8, 16), st.integers(8, 16), generators)
+def test_halves_of_a_dissected_mesh_do_not_meet_in_its_factors(wide, high, rng):
     """Whatever the numbers of its unknowns: entries between the halves stay zero, as their order puts what joins last.
 
     In the order of the rows the control has such entries.
     """
     grid_points = np.array([(x, y, 0.0) for x in range(wide) for y in range(high)])
-    points = grid_points[np.random.default_rng(seed).permutation(wide * high)]
+    points = grid_points[rng.permutation(wide * high)]
     matrix = lattice(points, 1.0)
     order = dissected(matrix, points)
     assert np.array_equal(np.sort(order), np.arange(wide * high))
@@ -240,7 +237,7 @@ def test_sparse_steps_are_dense_ones(heat):
     assert abs(sparse.stats["steps"] - dense.stats["steps"]) <= 1
     for path, rows in sparse.states.items():
         other = dense.states[path][-1]
-        assert np.abs(rows[-1] - other).max() <= 1e-5 * max(1.0, np.abs(other).max()), path
+        assert largest(rows[-1] - other) <= 1e-5 * max(1.0, largest(other)), path
     assert sparse.summary()["max_energy_error"] <= 1e-12
 
 
@@ -263,4 +260,4 @@ def test_rates_of_elements_are_differences_of_their_poses():
         steps = [SE3.log(SE3.compose(back, poses[middle + k])) for k in (-2, -1, 1, 2)]
         rate = (steps[0] - 8.0 * steps[1] + 8.0 * steps[2] - steps[3]) / (12.0 * 5e-5)
         found = motion.rate(Path.of(path))[middle]
-        assert np.abs(found - rate).max() <= 1e-4 * max(np.abs(rate).max(), 1e-3)
+        assert largest(found - rate) <= 1e-4 * max(largest(rate), 1e-3)

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import ephs
 from ephs.mechanics.methods import jacobian
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.apart import directions
-from ephs.mechanics.tree.equations.equations import ReducedEquations
+from tests.numerics import largest
+from tests.scenes import equations_of
+from tests.written import scene_of_text
 
 BODY = """
 [bodies.{name}]
@@ -61,11 +61,9 @@ def scene(kind):
 
 
 @pytest.mark.parametrize(("kind", "most"), [("boxes", 9), ("balls", 3), ("warm", 10)])
-def test_directions_are_shared_without_another_bit(kind, most, tmp_path, monkeypatch):
+def test_directions_are_shared_without_another_bit(kind, most, monkeypatch):
     """A stack needs three bodies' columns at once, bodies that do not meet one's; what warms one store is apart."""
-    file = tmp_path / "scene.toml"
-    file.write_text(scene(kind), encoding="utf-8")
-    equations = ReducedEquations(problem_of_scene(ephs.load(file)), 0.0)
+    equations = equations_of(scene_of_text(scene(kind)))
     state = equations.start(0.0)
     found = []
 
@@ -78,7 +76,7 @@ def test_directions_are_shared_without_another_bit(kind, most, tmp_path, monkeyp
     assert len(found[0]) <= 4 * most
     monkeypatch.setattr(jacobian, "directions", lambda columns, size: [[(c, np.arange(size))] for c, _ in columns])
     assert np.array_equal(matrix, jacobian.Jacobian(equations).at(state))
-    assert np.abs(matrix).max() > 1e4  # they press
+    assert largest(matrix) > 1e4  # they press
 
 
 @given(st.lists(st.tuples(st.integers(0, 30), st.sets(st.integers(0, 9), min_size=1)), max_size=30))

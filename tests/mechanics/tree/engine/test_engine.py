@@ -1,7 +1,6 @@
 """The compiled engine against the sweeps over dense matrices, and in growth."""
 
 from dataclasses import replace
-from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -10,20 +9,16 @@ from hypothesis import given, settings
 import ephs
 from benchmarks.cases import CASES
 from ephs.mechanics.road.elimination import closing
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.links import links_of
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.solve.posing.errors import SolveError
 from ephs.testing import mechanisms
+from tests.numerics import largest
+from tests.scenes import ROOT, equations_of
+from tests.written import scene_of_text
 
-ROOT = File(__file__).parents[4]
 SCENES = {file.stem: file for file in sorted((ROOT / "scenes").glob("*.toml"))} | {
     case.name: ROOT / "benchmarks" / "scenes" / f"{case.name}.toml" for case in CASES
 }
-
-
-def equations(scene):
-    return ReducedEquations(problem_of_scene(scene), 0.0)
 
 
 def moved(eq, seed=0, far=0.3):
@@ -55,15 +50,15 @@ def agree(eq, state):
     mass = eq.mass(state.q, state.r)
     if not eq.n:  # everything is fixed
         return
-    size = np.abs(mass).max() * max(1.0, np.abs(b).max()) * np.linalg.cond(mass) ** 0.5
-    assert np.abs(mass @ (a - b)).max() <= 1e-11 * size
+    size = largest(mass) * max(1.0, largest(b)) * np.linalg.cond(mass) ** 0.5
+    assert largest(mass @ (a - b)) <= 1e-11 * size
     for one, two in ((heat, heat_b), (made, made_b), (powers, powers_b)):
-        assert np.abs(one - two).max(initial=0.0) <= 1e-9 * max(1.0, np.abs(two).max(initial=0.0))
+        assert largest(one - two, initial=0.0) <= 1e-9 * max(1.0, largest(two, initial=0.0))
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_accelerate_as_the_dense_sweeps_say(name):
-    eq = equations(ephs.load(SCENES[name]))
+    eq = equations_of(ephs.load(SCENES[name]))
     for seed in range(3):
         agree(eq, moved(eq, seed))
 
@@ -71,7 +66,7 @@ def test_scenes_accelerate_as_the_dense_sweeps_say(name):
 @settings(max_examples=40)
 @given(scene=mechanisms(max_bodies=4))
 def test_so_do_generated_mechanisms(scene):
-    eq = equations(scene)
+    eq = equations_of(scene)
     agree(eq, moved(eq))
 
 
@@ -79,7 +74,7 @@ def test_so_do_generated_mechanisms(scene):
 @given(scene=mechanisms(max_bodies=3))
 def test_least_corrections_take_rates_onto_the_constraints(scene):
     """J (x + change) = 0 on all rows, and the change is M⁻¹Jᵀμ: the least in the mass metric."""
-    eq = equations(scene)
+    eq = equations_of(scene)
     state = moved(eq)
     if not eq.engine.closing.row.size:
         return
@@ -88,10 +83,10 @@ def test_least_corrections_take_rates_onto_the_constraints(scene):
     change = eq.engine.along(state.q, x) - x
     mass = eq.mass(state.q, state.r)
     rows = eq.rows()
-    assert np.abs(rows @ (x + change)).max() <= 1e-10
+    assert largest(rows @ (x + change)) <= 1e-10
     push = mass @ change
     left = push - rows.T @ np.linalg.lstsq(rows.T, push, rcond=1e-9)[0]
-    assert np.abs(left).max() <= 1e-9 * max(1.0, np.abs(push).max())
+    assert largest(left) <= 1e-9 * max(1.0, largest(push))
 
 
 @pytest.mark.parametrize("method", ["rk54", "rk87"])
@@ -106,7 +101,7 @@ def test_a_compiled_run_takes_the_steps_of_one_step_a_call(name, method):
             for events in ((), (lambda t, x: 1.0,))
         )
         for path in one:
-            assert np.abs(one[path] - other[path]).max(initial=0.0) <= near
+            assert largest(one[path] - other[path], initial=0.0) <= near
 
 
 def test_rows_that_are_kept_do_not_depend_on_how_many_fit():
@@ -163,22 +158,20 @@ stiffness = {stiffness}
 """
 
 
-def sprung(tmp_path, second="revolute", stiffness="5.0"):
-    file = tmp_path / "sprung.toml"
-    file.write_text(TWO_SPRINGS.format(second=second, stiffness=stiffness))
-    return ephs.load(file)
+def sprung(second="revolute", stiffness="5.0"):
+    return scene_of_text(TWO_SPRINGS.format(second=second, stiffness=stiffness))
 
 
-def test_each_spring_has_the_energy_of_its_own_joint(tmp_path):
-    eq = equations(sprung(tmp_path))
+def test_each_spring_has_the_energy_of_its_own_joint():
+    eq = equations_of(sprung())
     start = eq.start(0.0)
     for q in np.random.default_rng(0).standard_normal((4, 2)):
         found = eq.engine.energy(q, 0.0 * start.r, start.heats)[1]
         assert found == pytest.approx(0.5 * (3.0 * q[0] ** 2 + 5.0 * q[1] ** 2), rel=1e-14)
 
 
-def test_only_pins_and_slides_are_taken_for_planar(tmp_path):
+def test_only_pins_and_slides_are_taken_for_planar():
     """A planar pair moves in the plane as well, by elements that the planar sweeps do not have."""
-    plain = links_of(equations(sprung(tmp_path)).reduced)
-    wider = links_of(equations(sprung(tmp_path, "planar", "[5.0, 1.0, 2.0]")).reduced)
+    plain = links_of(equations_of(sprung()).reduced)
+    wider = links_of(equations_of(sprung("planar", "[5.0, 1.0, 2.0]")).reduced)
     assert plain.planar and not wider.planar

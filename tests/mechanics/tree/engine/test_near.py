@@ -39,7 +39,7 @@ def touching(sizes, turn, at, out):
     return pose_of(turn, way)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(SIZES, TURNS | NEARLY, st.tuples(SOME, SOME), st.sampled_from([-1e-2, -1e-6, -1e-12, 1e-12, 1e-6, 1e-2]))
 def test_segments_that_touch_are_never_apart(sizes, turn, at, out):
     pose = touching(sizes, turn, at, out)
@@ -47,7 +47,7 @@ def test_segments_that_touch_are_never_apart(sizes, turn, at, out):
         assert not found(pose, gap) or gap.distance(pose) >= 0.0
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(SIZES, TURNS | NEARLY, WAYS)
 def test_segments_are_apart_where_their_gap_is_positive(sizes, turn, way):
     """But that of near points, of which the gap takes others where segments are nearly parallel."""
@@ -81,7 +81,7 @@ def pose_between(rng, inner, outer, way):
     return turn, inner + way - turn @ outer
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(1, 12), st.floats(0.0, 0.3), st.integers(0, 10_000), st.sampled_from([0.9, 0.999999, 1.000001, 1.5]))
 def test_no_group_is_left_out_of_which_an_edge_acts(count, reach, seed, share):
     """One edge is about as far as it acts; before are joints and points of a plane, behind an edge of other links."""

@@ -8,15 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.tree.engine.programs import of_motion
-from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.stage import Program, real, vector
 from ephs.solve.march.account import ROUNDING
 from ephs.testing import mechanisms
 from tests.mechanics.tree.engine.test_engine import SCENES
-
-EPS = float(np.finfo(float).eps)
+from tests.numerics import EPS, largest
+from tests.scenes import equations_of
 
 
 def sized(on, motion, y0, y1, out):
@@ -36,7 +34,7 @@ PROGRAM = Program(
 
 @cache
 def equations(name):
-    return ReducedEquations(problem_of_scene(ephs.load(SCENES[name])), 0.0)
+    return equations_of(ephs.load(SCENES[name]))
 
 
 def called(eq, name, *arguments):
@@ -47,7 +45,7 @@ def called(eq, name, *arguments):
 @given(scene=mechanisms(max_bodies=3), seed=st.integers(0, 99))
 def test_rates_of_a_joint_count_as_its_largest(scene, seed):
     """Increments count as 1 rad or m, heats as their larger end."""
-    eq = ReducedEquations(problem_of_scene(scene), 0.0)
+    eq = equations_of(scene)
     y0, y1 = np.random.default_rng(seed).standard_normal((2, eq.size))
     found, larger = np.zeros(2 * eq.n + eq.ns), np.maximum(np.abs(y0), np.abs(y1))[eq.nv : eq.nv + eq.n + eq.ns]
     called(eq, "sizes", y0, y1, found)
@@ -81,4 +79,4 @@ def test_totals_count_from_wherever_a_step_finds_them(name, seed):
     end, shift = start + 1e-3 * rng.random(start.size), np.zeros(start.size)
     shift[at:] = rng.standard_normal(start.size - at)
     one, other = eq.settled(start, end.copy()), eq.settled(start + shift, end + shift)
-    assert np.abs(other - shift - one).max() <= 64.0 * EPS * (1.0 + np.abs(one).max() + np.abs(shift).max())
+    assert largest(other - shift - one) <= 64.0 * EPS * (1.0 + largest(one) + largest(shift))
