@@ -9,17 +9,17 @@ from tests.rooms import ROOT, SOURCES, size_of
 
 CEILINGS = {
     "ephs": 1_500,
-    "ephs/cli": 12_700,
-    "ephs/exporting": 13_400,
-    "ephs/mechanics": 420_900,
-    "ephs/modelica": 11_400,
+    "ephs/cli": 12_600,
+    "ephs/exporting": 13_500,
+    "ephs/mechanics": 419_700,
+    "ephs/modelica": 11_300,
     "ephs/operad": 30_600,
-    "ephs/semantics": 193_800,
-    "ephs/show": 65_200,
-    "ephs/solve": 125_100,
+    "ephs/semantics": 191_000,
+    "ephs/show": 64_500,
+    "ephs/solve": 125_300,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 578_300,
+    "tests": 570_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
