@@ -79,18 +79,28 @@ def motion(sol):
     return np.concatenate([sol.body("fist").position, sol.body("fist").velocity, sol.heat[:, None]], axis=1)
 
 
-@pytest.mark.parametrize(
-    ("until", "options", "error"),
-    [(0.6, {"rtol": 1e-5}, 1e-4), (0.25, {"step": 1e-3}, 1e-10)],
-    ids=["chosen", "constant"],
-)
-def test_compiled_steps_are_those_taken_one_by_one(until, options, error, scene, monkeypatch):
-    times = np.linspace(0.0, until, 13)
-    found = ephs.simulate(scene, until, save_at=times, **options, **ASKED)
-    stepwise(monkeypatch)
-    oracle = ephs.simulate(scene, until, save_at=times, **options, **ASKED)
-    assert found.stats["steps"] <= 1.1 * oracle.stats["steps"]
-    assert motion(found) == pytest.approx(motion(oracle), rel=0.0, abs=error)
+def both_ways(scene, until, monkeypatch, **options):
+    """Runs by compiled steps, and by steps one by one."""
+    run = {"save_at": np.linspace(0.0, until, 13), **options, **ASKED}
+    found = ephs.simulate(scene, until, **run)
+    with monkeypatch.context() as patched:
+        stepwise(patched)
+        return found, ephs.simulate(scene, until, **run)
+
+
+def test_compiled_constant_steps_are_those_taken_one_by_one(scene, monkeypatch):
+    found, oracle = both_ways(scene, 0.25, monkeypatch, step=1e-3)
+    assert found.stats["steps"] == oracle.stats["steps"]
+    assert motion(found) == pytest.approx(motion(oracle), rel=0.0, abs=1e-10)
+
+
+def test_compiled_chosen_steps_are_on_average_no_more_than_those_taken_one_by_one(scene, monkeypatch):
+    """Where in a step surfaces meet, numbers of steps scatter by a quarter either way: these are of six tolerances."""
+    runs = {rtol: both_ways(scene, 0.6, monkeypatch, rtol=rtol) for rtol in (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6)}
+    ratios = [found.stats["steps"] / oracle.stats["steps"] for found, oracle in runs.values()]
+    assert np.exp(np.log(ratios).mean()) <= 1.1
+    found, oracle = runs[1e-5]
+    assert motion(found) == pytest.approx(motion(oracle), rel=0.0, abs=1e-4)
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-5, 1e-9])  # three, five and seven stages
