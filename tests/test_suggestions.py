@@ -39,7 +39,7 @@ SLIPS = {
     "body": (lambda: (model := ephs.dynamics(four_bar())).jacobian(model.state(), "crnk"), "'crank'"),
     "sweep": (lambda: ephs.sweep(four_bar(), {"joints.main.drive": [1.0]}, 0.1, metod="rk54"), "'method'"),
     "port": (lambda: ephs.simulate(four_bar(), 0.01).port("drives.maim"), "'drives.main'"),
-    "scene": (lambda: shipped("slider-crnk"), '"scenes/slider-crank.toml"'),
+    "scene": (lambda: ephs.load("scenes/slider-crnk.toml"), '"scenes/slider-crank.toml"'),
     "folder": (lambda: ephs.load("slider-crank.toml"), '"scenes/slider-crank.toml"'),
     "ending": (lambda: ephs.load("scenes/slider-crank.tml"), '"scenes/slider-crank.toml"'),
     "no ending": (lambda: ephs.load("slider-crank"), '"scenes/slider-crank.toml"'),
