@@ -100,8 +100,8 @@ class BodyEntry(EntryTable):
 @final
 @dataclass(frozen=True, slots=True)
 class BodyStart:
-    """What a file says of a body's start: whether its pose is given; its velocity (3,) in the world basis and its
-    angular velocity (3,) in body axes, or None of both. What is not given comes from a joint."""
+    """Initial state of a body in a file: whether the pose is given; velocity (3,) in the world basis and angular
+    velocity (3,) in body axes, or None where neither is given. A joint determines the rest."""
 
     placed: bool
     velocities: tuple[Array, Array] | None

@@ -1,6 +1,6 @@
 """Scenes as JSON text: every number resolved, exact in a round trip. Solution files carry them.
 
-What an attribute may be is said by its annotation: it is read by that.
+Attributes are read by the types in their annotations.
 """
 
 import json

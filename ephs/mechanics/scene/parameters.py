@@ -229,7 +229,7 @@ def _system(system: System, values: Mapping[str, float]) -> System:
 
 
 def _refilled(filling: Any, at: tuple[str, ...], changes: Mapping[str, Mapping[str, float]]) -> Any:
-    """What fills the box at a path with other parameters, by the paths of components; itself where there are none."""
+    """The filling of the box at a path with changed parameters of its components; the same object without changes."""
     if isinstance(filling, System):
         inner = {box: _refilled(of, (*at, *box), changes) for box, of in filling.fillings.items()}
         same = all(of is filling.fillings[box] for box, of in inner.items())

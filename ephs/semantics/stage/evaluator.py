@@ -338,7 +338,7 @@ class Layered(Based):
 
     @abstractmethod
     def _handed(self, cells: Any, start: Integer) -> tuple[Part, Part]:
-        """What a called function gets of cells from a place on: the values, and what is beside them."""
+        """Arguments for cells from an index on: their values, and their slopes or rows of the tape."""
 
     @abstractmethod
     def _tape(self) -> list[Part]:

@@ -113,7 +113,7 @@ class _Window(Generic[Value]):
     start: Integer
     size: Integer
     what: ClassVar[str]
-    """What an error says that it is."""
+    """Its kind in the texts of errors."""
 
     __iter__ = None  # Python would ask for entries without end.
 
