@@ -40,7 +40,7 @@ TEXTS = {
     "audit": "{file}: {found}",
     "interrupted": "{file}: interrupted{at}",
 }
-EXTRAS = {"matplotlib": "viz", "pygraphviz": "viz", "viser": "viz", "mujoco": "models", "distributed": "cluster"}
+EXTRAS = {"matplotlib": "viz", "viser": "viz", "mujoco": "models", "distributed": "cluster"}
 
 
 class BadInput(Exception):

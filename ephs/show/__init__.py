@@ -1,6 +1,6 @@
 """Pictures of patterns, motions and ledgers, which notebooks show by themselves.
 
-matplotlib, drawsvg, Graphviz and viser are imported where they are used, not here.
+matplotlib, drawsvg and viser are imported where they are used, not here.
 """
 
 from ephs.show.beside import plot_mechanism as plot_mechanism

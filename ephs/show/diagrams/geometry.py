@@ -15,6 +15,8 @@ POINT = 1e-9
 """Distance in points below which two positions are equal."""
 UPRIGHT = 1e-12
 """Length along an axis below which a segment is perpendicular to it."""
+MARGIN = 10.0
+"""Room about the outer rectangle."""
 BETTER = 1e-6
 """Least decrease of a drawing's cost above rounding."""
 
@@ -125,28 +127,22 @@ class Placement:
     legend: tuple[tuple[PlacedBox, Lettering], ...] = ()
 
     @property
+    def origin(self) -> Point:
+        """Left and top of the whole picture, margins included."""
+        return self.rectangle[0] - MARGIN, self.rectangle[1] - MARGIN
+
+    @property
     def size(self) -> tuple[float, float]:
         """Width and height of the whole picture, margins and legend included."""
         left, top, width, height = self.rectangle
         right = max([left + width, *(word.bounds[2] for _, word in self.legend)])
         bottom = max([top + height, *(box.at[1] + box.radius for box, _ in self.legend)])
-        return (right + left, bottom + top)
+        return right - left + 2 * MARGIN, bottom - top + 2 * MARGIN
 
     def nodes(self) -> dict[str, tuple[Point, float]]:
         """Centre and radius of every box and junction, by path."""
         boxes = {box.path: (box.at, box.radius) for box in self.boxes}
         return boxes | {junction.path: (junction.at, junction.radius) for junction in self.junctions}
-
-
-def all_boxes(placement: Placement) -> tuple[PlacedBox, ...]:
-    """The boxes of a picture, those of its legend last."""
-    return (*placement.boxes, *(box for box, _ in placement.legend))
-
-
-def notes_of(placement: Placement) -> tuple[Lettering, ...]:
-    """Names of ports on wires, and words of the legend."""
-    names = (wire.label for wire in placement.wires if wire.label is not None)
-    return (*names, *(word for _, word in placement.legend))
 
 
 def distances(point: Points, starts: Points, ends: Points) -> Points:

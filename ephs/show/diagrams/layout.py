@@ -18,6 +18,7 @@ from ephs.show.diagrams import opening
 from ephs.show.diagrams import positions as places
 from ephs.show.diagrams.geometry import (
     BETTER,
+    MARGIN,
     Lettering,
     PlacedBox,
     PlacedJunction,
@@ -38,7 +39,6 @@ from ephs.show.diagrams.routing import bulged, route, straight, trimmed
 if TYPE_CHECKING:
     from ephs.semantics import System
 
-MARGIN = 10.0
 PORT_TYPE = 8.0
 ROOMY = 60
 """Nodes up to which a picture is drawn larger if names lack room."""
@@ -127,24 +127,17 @@ def _picture(page: _DrawnGraph, points: Points, room: float = 1.0) -> Placement:
     named = [(path, _label(path, name, at, sheet)) for path, name in graph.dots]
     ports = {edge.title: edge.port for edge in graph.edges}
     wires = [_with_label(wire, ports[wire.title], sheet) for wire in wires]
-    shift = (MARGIN - rectangle[0], MARGIN - rectangle[1])
+    left, top, right, bottom = rectangle
+    kinds = {disc.kind for disc in graph.discs} | {"composite" for _ in regions}
     return Placement(
-        tuple(_box(disc, _moved(at[disc.path], shift)) for disc in graph.discs),
-        tuple(PlacedJunction(path, _moved(at[path], shift), DOT, _shifted(text, shift)) for path, text in named),
-        tuple(_moved_wire(wire, shift) for wire in wires),
-        (MARGIN, MARGIN, rectangle[2] - rectangle[0], rectangle[3] - rectangle[1]),
+        tuple(_box(disc, at[disc.path]) for disc in graph.discs),
+        tuple(PlacedJunction(path, at[path], DOT, text) for path, text in named),
+        tuple(wires),
+        (left, top, right - left, bottom - top),
         14.0,
-        tuple(replace(r, at=_moved(r.at, shift), label=_shifted(r.label, shift)) for r in regions),
-        legend(
-            _kinds(graph, regions),
-            (MARGIN, 2 * MARGIN - 4.0 + rectangle[3] - rectangle[1]),
-            rectangle[2] - rectangle[0],
-        ),
+        regions,
+        legend(kinds, (left, bottom + MARGIN - 4.0), right - left),
     )
-
-
-def _kinds(graph: Graph, regions: tuple[PlacedRegion, ...]) -> set[str]:
-    return {disc.kind for disc in graph.discs} | {"composite" for _ in regions}
 
 
 @final
@@ -258,19 +251,6 @@ def _with_label(wire: Wire, port: str, sheet: Sheet) -> Wire:
         return wire
     text = sheet.write((port, ""), PORT_TYPE, beside(wire.points, (port, ""), PORT_TYPE))
     return replace(wire, label=text)
-
-
-def _moved(point: Point, shift: Point) -> Point:
-    return (point[0] + shift[0], point[1] + shift[1])
-
-
-def _shifted(text: Lettering, shift: Point) -> Lettering:
-    return replace(text, at=_moved(text.at, shift))
-
-
-def _moved_wire(wire: Wire, shift: Point) -> Wire:
-    label = _shifted(wire.label, shift) if wire.label is not None else None
-    return replace(wire, points=tuple(_moved(point, shift) for point in wire.points), label=label)
 
 
 def _box(disc: Disc, centre: Point) -> PlacedBox:

@@ -1,14 +1,12 @@
-"""Positions of boxes and junctions: given points, else Graphviz' neato, else networkx; then small repairs."""
+"""Positions of boxes and junctions: given points, else a balance of their distances; then small repairs."""
 
-import ctypes
 import math
-from collections.abc import Generator, Iterator, Mapping
-from contextlib import contextmanager
-from importlib.util import find_spec
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.sparse.csgraph import shortest_path
 
 from ephs.show.diagrams.geometry import BETTER, POINT, Points, distances
 from ephs.show.diagrams.graph import Graph
@@ -17,8 +15,12 @@ from ephs.show.shared.errors import ShowError
 GAP = 26.0
 CLEARANCE = 9.0
 GRID = 80.0
-ITERATIONS = 20000
-"""Time limit of Graphviz, which reports when the layout of a large pattern exceeds it."""
+ROUNDS = 500
+"""Largest number of rounds of the balance."""
+_AXES = ((0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3), (0, 4), (1, 4))
+"""Principal coordinates from which layouts begin."""
+SETTLED = 1e-5
+"""Least relative decrease of its cost in a round."""
 _OUTER = "\0"
 FARTHEST = 1e6
 """Largest coordinate of a point: far beyond it, nodes beside each other are at one point by rounding."""
@@ -68,90 +70,58 @@ def proposals(graph: Graph) -> Iterator[Points]:
     if count == 0:
         yield np.zeros((0, 2))
         return
-    starts = range(1, 9) if count <= 40 else range(1, 4) if count <= 120 else range(1, 2)
+    starts = range(1, 9) if count <= 40 else range(1, 6) if count <= 120 else range(1, 2)
     for start in starts:
-        points = _neato(graph, start) if find_spec("pygraphviz") else _networkx(graph, start)
-        yield _spread(graph, _upright(points), wires=count <= 120)
+        yield _spread(graph, _upright(_balanced(graph, start)), wires=count <= 120)
 
 
-def _edges(graph: Graph) -> list[tuple[str, str]]:
-    return [(e.ends[0], e.ends[1] if e.role != "outer" else _OUTER + e.ends[0]) for e in graph.edges]
+def _balanced(graph: Graph, start: int) -> Points:
+    """Points whose distances are nearest to the lengths of the shortest ways between them, weighed by their squares.
 
-
-def _neato(graph: Graph, start: int) -> Points:
-    import pygraphviz
-
+    Gansner, Koren and North, *Graph Drawing by Stress Majorization*, LNCS 3383 (2005) 239-250. ``start`` counts places
+    to begin from. Ports of the pattern itself are nodes of their own, which keeps room for wires to the outside.
+    """
     radii = graph.radii()
-    names = {path: f"n{index}" for index, path in enumerate(radii)}
-    names |= {end: f"o{index}" for index, (_, end) in enumerate(_edges(graph)) if end.startswith(_OUTER)}
-    net = pygraphviz.AGraph(
-        strict=True,
-        directed=False,
-        mode="KK",
-        overlap="false",
-        start=str(start),
-        sep="+8",
-        epsilon="0.02",
-        maxiter=str(ITERATIONS),
-    )
-    for path, name in names.items():
-        side = 2 * radii.get(path, 2.0) / 72
-        net.add_node(name, shape="circle", fixedsize="true", label="", width=side, height=side)
-    for first, second in _edges(graph):
-        length = (radii.get(first, 2.0) + radii.get(second, 2.0) + GAP) / 72
-        net.add_edge(names[first], names[second], len=length)
-    with _errors_only():
-        net.layout(prog="neato")
-    found: Any = net
-    places = [str(found.get_node(names[path]).attr["pos"]).split(",") for path in radii]
-    return np.array([(float(x), -float(y)) for x, y in places]).reshape(-1, 2)
+    ends = [(e.ends[0], e.ends[1] if e.role != "outer" else _OUTER + e.ends[0]) for e in graph.edges]
+    index = {path: i for i, path in enumerate(dict.fromkeys([*radii, *(second for _, second in ends)]))}
+    size = len(index)
+    lengths = np.zeros((size, size))
+    for first, second in ends:
+        lengths[index[first], index[second]] = radii[first] + radii.get(second, 2.0) + GAP
+    wanted = shortest_path(lengths, directed=False)
+    reached = np.isfinite(wanted)
+    wanted = np.where(reached, wanted, wanted[reached].max() + 2.0 * GAP)  # parts that no wire joins
+    np.fill_diagonal(wanted, np.inf)
+    weights = wanted**-2.0
+    np.fill_diagonal(wanted, 0.0)
+    turns, reach = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(size), GAP * np.sqrt(np.arange(size) + 0.5)
+    points = np.column_stack([reach * np.cos(turns), reach * np.sin(turns)])
+    if size < 2:
+        return points
+    points = 0.1 * points + _scaled(wanted, *_AXES[start - 1])
+    metric = cho_factor(_laplacian(weights)[1:, 1:])
+    least = np.inf
+    for _ in range(ROUNDS):
+        distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+        stress = float((weights * (distance - wanted) ** 2).sum())
+        if not stress < (1.0 - SETTLED) * least:
+            break
+        least = stress
+        pull = _laplacian(weights * wanted / np.maximum(distance, POINT))
+        points = np.vstack([np.zeros((1, 2)), cho_solve(metric, (pull @ points)[1:])])
+    return points[: len(radii)]
 
 
-@contextmanager
-def _errors_only() -> Generator[None, None, None]:
-    """Graphviz without its warnings on stderr, such as for layouts that reach the limit of iterations."""
-    from pygraphviz import graphviz
-
-    try:
-        least_told = ctypes.CDLL(graphviz._graphviz.__file__).agseterr  # pygraphviz has no option for it
-    except (AttributeError, OSError):
-        yield
-        return
-    before = least_told(1)
-    try:
-        yield
-    finally:
-        least_told(before)
+def _scaled(wanted: Points, *axes: int) -> Points:
+    """Classical scaling: two of the principal coordinates that distances (n, n) have."""
+    centred = np.eye(len(wanted)) - 1.0 / len(wanted)
+    sizes, ways = eigh(-0.5 * centred @ wanted**2 @ centred, subset_by_index=[max(0, len(wanted) - 5), len(wanted) - 1])
+    chosen = [max(-1 - axis, -len(sizes)) for axis in axes]
+    return ways[:, chosen] * np.sqrt(np.maximum(sizes[chosen], 0.0))
 
 
-def _networkx(graph: Graph, start: int) -> Points:
-    import networkx
-
-    radii = graph.radii()
-    net = networkx.Graph()
-    net.add_nodes_from(radii)
-    for first, second in _edges(graph):
-        net.add_edge(first, second, length=radii.get(first, 2.0) + radii.get(second, 2.0) + GAP)
-    # Separate parts are laid out one by one, side by side: there is no distance between them.
-    places: dict[str, Points] = {}
-    offset = 0.0
-    for part in sorted(networkx.connected_components(net), key=lambda nodes: sorted(nodes)[0]):
-        piece = net.subgraph(sorted(part))
-        turn = {
-            node: (
-                math.cos(start + 2 * math.pi * i / len(piece)),
-                math.sin(start + 2 * math.pi * i / len(piece)),
-            )
-            for i, node in enumerate(sorted(piece))
-        }
-        scale = max((data["length"] for *_, data in piece.edges(data=True)), default=1.0)
-        span = scale * 0.55 * max(1.0, networkx.diameter(piece))
-        found = networkx.kamada_kawai_layout(piece, weight="length", pos=turn, scale=span)
-        lowest = min(point[0] for point in found.values())
-        shift = np.array([offset - lowest + 40.0, 0.0])
-        places |= {node: np.asarray(point, dtype=float) + shift for node, point in found.items()}
-        offset = max(float(places[node][0]) for node in piece) + 40.0
-    return np.array([places[path] for path in radii], dtype=float).reshape(-1, 2)
+def _laplacian(weights: Points) -> Points:
+    return np.diag(weights.sum(axis=1)) - weights
 
 
 def _upright(points: Points) -> Points:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from ephs.show.diagrams.geometry import POINT, Point, Points, distances
 
 CLEAR = 3.5
+NEAR = 150.0
+"""Distance from the straight line of the obstacles that are looked at first."""
 
 
 def straight(start: Point, end: Point, obstacles: Points) -> bool:
@@ -33,6 +35,11 @@ def route(start: Point, end: Point, obstacles: Points) -> tuple[Point, ...]:
     """
     if straight(start, end, obstacles):
         return (start, end)
+    away = distances(obstacles[:, :2], np.array([start], dtype=float), np.array([end], dtype=float))
+    if len(near := obstacles[away < obstacles[:, 2] + NEAR]) < len(obstacles):
+        line = route(start, end, near)
+        if all(straight(a, b, obstacles) for a, b in itertools.pairwise(line)):
+            return line
     turns = np.arange(8) * math.pi / 4
     reach = (obstacles[:, 2] + CLEAR + 1.5) / math.cos(math.pi / 8)
     rings = obstacles[:, None, :2] + reach[:, None, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)

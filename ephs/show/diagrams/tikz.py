@@ -1,7 +1,17 @@
 """A placed picture as TikZ, to be compiled by plain LaTeX with the article class."""
 
-from ephs.show.diagrams.geometry import KINDS, Lettering, Placement, Point, all_boxes, notes_of
-from ephs.show.shared.palette import FILLS, RIMS
+from typing import Final
+
+from ephs.show.diagrams.geometry import Placement, Point
+from ephs.show.diagrams.marks import DiagramMark, DiagramWord, parts_of
+from ephs.show.shared.palette import FILLS, GREY, HATCHED, INK, OPENED, PAPER, RIMS
+
+_COLOURS: Final = {
+    PAPER: "ephspaper", INK: "ephsink", GREY: "ephsgrey", HATCHED: "ephshatched", OPENED: "ephsopened",
+    **{rim: f"ephs{kind}rim" for kind, rim in reversed(RIMS.items())},
+    **{fill: f"ephs{kind}" for kind, fill in reversed(FILLS.items())},
+}  # fmt: skip
+"""Names of all colours."""
 
 _ESCAPES = {
     "\\": r"\textbackslash{}",
@@ -27,9 +37,8 @@ def to_tikz(placement: Placement) -> str:
 
     Its colours, ``ephsstorage`` and so on, are defined before it.
     """
-    width, height = placement.size
+    (start, above), (width, height) = placement.origin, placement.size
     left, top, across, down = placement.rectangle
-    right, bottom = left + across, top + down
     head = [
         r"\documentclass{article}",
         r"\usepackage[T1]{fontenc}",
@@ -38,54 +47,42 @@ def to_tikz(placement: Placement) -> str:
         r"\newcommand\ephschar[1]{\ifPDFTeX[U+#1]\else\char\"#1\relax\fi}% letters that pdfLaTeX's fonts lack",
         rf"\usepackage[paperwidth={width:.2f}bp,paperheight={height:.2f}bp,margin=0pt]{{geometry}}",
         r"\pagestyle{empty}\parindent=0pt\topskip=0pt",
+        *(rf"\definecolor{{{name}}}{{HTML}}{{{colour[1:].upper()}}}" for colour, name in _COLOURS.items()),
     ]
-    for kind in KINDS:
-        head.append(rf"\definecolor{{ephs{kind}}}{{HTML}}{{{FILLS[kind][1:].upper()}}}")
-        head.append(rf"\definecolor{{ephs{kind}rim}}{{HTML}}{{{RIMS[kind][1:].upper()}}}")
     body = [
-        r"\begin{tikzpicture}[x=1bp,y=-1bp,line width=1.2bp,every node/.style={inner sep=0pt,font=\sffamily}]",
-        rf"\useasboundingbox (0,0) rectangle ({width:.2f},{height:.2f});",
+        r"\begin{tikzpicture}[x=1bp,y=-1bp,every node/.style={inner sep=0pt,font=\sffamily}]",
+        rf"\useasboundingbox {_point((start, above))} rectangle {_point((start + width, above + height))};",
         rf"\draw[line width=1.4bp,rounded corners={placement.corner:.0f}bp] "
-        rf"({left:.2f},{top:.2f}) rectangle ({right:.2f},{bottom:.2f});",
+        rf"{_point((left, top))} rectangle {_point((left + across, top + down))};",
     ]
-    for region in placement.regions:
-        circle = f"{_coordinates(region.at)} circle[radius={region.radius:.2f}bp]; % {_comment(region.path)}"
-        body.append(rf"\filldraw[fill=ephscomposite!35,draw=ephscompositerim] {circle}")
-        body.append(_node(region.label, "text=ephscompositerim,"))
-    for wire in placement.wires:
-        dash = "" if wire.power else "[dotted]" if wire.role == "link" else "[dashed]"
-        body.append(
-            rf"\draw{dash} {' -- '.join(_coordinates(point) for point in wire.points)}; % {_comment(wire.title)}"
-        )
-    for box in all_boxes(placement):
-        style = f"fill=ephs{box.kind},draw=ephs{box.kind}rim"
-        what = box.path or f"legend: {box.kind}"
-        body.append(rf"\filldraw[{style}] {_coordinates(box.at)} circle[radius={box.radius:.2f}bp]; % {_comment(what)}")
-        body += [
-            rf"\draw[ephs{box.kind}rim,line width=.4bp] {_coordinates(a)} -- {_coordinates(b)};"
-            for a, b in box.hatching
-        ]
-        back = f"fill=ephs{box.kind},inner sep=.5bp," if box.hatching else ""
-        body += [_node(text, back) for text in box.lines]
-    for junction in placement.junctions:
-        body.append(
-            rf"\fill {_coordinates(junction.at)} circle[radius={junction.radius:.2f}bp]; % {_comment(junction.path)}"
-        )
-        body.append(_node(junction.label, ""))
-    body += [_node(text, "text=gray,") for text in notes_of(placement)]
+    for part in parts_of(placement):
+        if part.title:
+            body.append(f"% {_comment(part.title)}")
+        body += [*map(_mark, part.marks), *map(_word, part.words)]
     body.append(r"\end{tikzpicture}")
-    lines = [*head, r"\begin{document}", r"\hbox{%", *body, "}", r"\end{document}"]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*head, r"\begin{document}", r"\hbox{%", *body, "}", r"\end{document}"]) + "\n"
 
 
-def _coordinates(point: Point) -> str:
+def _mark(mark: DiagramMark) -> str:
+    options = [f"draw={_COLOURS[mark.stroke]}", f"line width={mark.width:g}bp"] if mark.stroke else []
+    options += [f"fill={_COLOURS[mark.fill]}"] if mark.fill else []
+    options += ["dash pattern=on {:g}bp off {:g}bp".format(*mark.dashes)] if mark.dashes else []
+    line = " -- ".join(map(_point, mark.points))
+    return rf"\path[{','.join(options)}] {line}{f' circle[radius={mark.radius:.2f}bp]' if mark.radius else ''};"
+
+
+def _point(point: Point) -> str:
     return f"({point[0]:.2f},{point[1]:.2f})"
 
 
-def _node(text: Lettering, style: str) -> str:
+def _word(word: DiagramWord) -> str:
+    text = word.text
     words = _escape(text.base) + (rf"\textsubscript{{{_escape(text.sub)}}}" if text.sub else "")
     size = rf"\fontsize{{{text.size:.1f}}}{{{1.2 * text.size:.1f}}}\selectfont"
-    return rf"\node[{style}font=\sffamily{size}] at {_coordinates(text.at)} {{{words}}};"
+    # names beside lines need no ground of their own
+    ground = f"fill={_COLOURS[word.halo]},inner sep=.5bp," if word.halo not in ("", PAPER) else ""
+    style = rf"{ground}text={_COLOURS[word.colour]},font=\sffamily{size}"
+    return rf"\node[{style}] at {_point(text.at)} {{{words}}};"
 
 
 def _escape(words: str) -> str:

@@ -22,6 +22,8 @@ RIMS = {
     "composite": "#a07700",
     "unknown": "#444444",
 }
+OPENED, HATCHED = "#fef7dc", "#5d91c0"
+"""Ground of opened composites, and chords across environments."""
 
 BLUE, ORANGE, GREEN, RED = "#0072b2", "#e69f00", "#009e73", "#d55e00"
 PURPLE, SKY, BLACK = "#cc79a7", "#56b4e9", "#000000"
