@@ -36,6 +36,9 @@ def test_it_reads_like_the_scene_alone(both):
         assert part.joint(name).rate == pytest.approx(alone.joint(name).rate, abs=1e-9)
         known = alone.joint(name).wrench
         assert part.joint(name).wrench == pytest.approx(known, abs=1e-9 * (1.0 + np.nanmax(np.abs(known))), nan_ok=True)
+    for path in alone:
+        assert path in part and str(path) in part and part[path].shape == alone[path].shape
+    assert "left.engine" not in part
     for name, _ in scene.all_thermal():
         assert part.thermal(name).temperature == pytest.approx(alone.thermal(name).temperature, rel=1e-12)
     assert part.constraint_error.max() < 1e-12

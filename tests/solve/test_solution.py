@@ -38,6 +38,14 @@ def test_what_is_not_there_is_named(solution):
         solution.body("crank")
 
 
+def test_whether_a_state_is_there_is_told_by_its_name_as_by_its_path(damped, solution):
+    for path in solution:
+        assert path in solution and str(path) in solution and solution[str(path)] is solution[path]
+    assert "osc.q" not in solution and "no.such" not in solution and "a..b" not in solution
+    derivatives = ephs.sensitivity(damped, ["mf.d"], 0.01, initial=START)
+    assert "osc.pe.q" in derivatives and "heat" in derivatives and "osc.q" not in derivatives
+
+
 def test_a_file_that_is_no_solution_is_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"nothing\.nc"):
         ephs.load_solution(tmp_path / "nothing.nc")

@@ -38,7 +38,7 @@ def settled(problem: Problem) -> At:
     pencil, d = Pencil(problem), problem.descriptor
     start, steps = _balance(problem)
     if start is None:
-        return _at_rest(problem, pencil, d.pack(problem.initial))
+        return _at_rest(problem, pencil, problem.point)
     x = d.pack(start)
     try:
         rates = pencil.unknowns(x)[: pencil.n_w]

@@ -56,6 +56,9 @@ class Inside:
         """The state at a path of the scene's system."""
         return self._solution[self._path / path]
 
+    def __contains__(self, path: str | Path) -> bool:
+        return self._path / path in self._solution
+
     @property
     def outline(self) -> "Scene":
         """The drawn scene."""

@@ -199,7 +199,7 @@ def check_closed(problem: Problem, momentum: Array) -> None:
         A joint is open, or a momentum contradicts the joints by more than methods leave it off them.
     """
     d = problem.descriptor
-    x = d.pack(problem.initial)
+    x = problem.point
     once = RunRecord(np.zeros(1), x[None, :], np.zeros((1, len(d.components))), np.zeros((1, 5)))
     assert problem.motion is not None
     motion = problem.motion(solution_of(problem, once, {}))

@@ -69,7 +69,7 @@ def _digest(problem: Problem) -> str:
     for path, signal in sorted(problem.signals.items()):
         parts.append((str(path), _plain(signal.value), signal.effort))
     made = hashlib.blake2b(repr(parts).encode(), digest_size=16)
-    made.update(d.pack(problem.initial).tobytes())
+    made.update(problem.point.tobytes())
     return made.hexdigest()
 
 

@@ -256,7 +256,7 @@ def _reversible(problem: Problem, until: float) -> None:
         It names the component.
     """
     rng, d = np.random.default_rng(1), problem.descriptor
-    x = d.pack(problem.initial)
+    x = problem.point
     for slot in d.components:
         if isinstance(slot.primitive, Irreversible):
             e = random_efforts(slot.primitive.bundle, rng)

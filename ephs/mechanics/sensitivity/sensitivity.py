@@ -76,6 +76,14 @@ class Sensitivity:
         """
         return self.of(reading_of(self.model, name))
 
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a reading of this name."""
+        try:
+            reading_of(self.model, name)
+        except OptionError:
+            return False
+        return True
+
     def of(self, function: "Callable[[Solution], ArrayLike]") -> Array:
         """(…, p) the derivative of anything that is read from a `Solution`: its final state, an integral over its
         times, heat or work; numbers, or an array.

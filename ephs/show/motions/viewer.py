@@ -169,7 +169,7 @@ def _stage(scene: Scene) -> Stage:
     """The scene at one instant."""
     problem = problem_of_scene(scene)
     d = problem.descriptor
-    x = d.pack(problem.initial)[None, :]
+    x = problem.point[None, :]
     record = RunRecord(np.zeros(1), x, np.zeros((1, len(d.components))), np.zeros((1, 5)))
     return stage_of(solution_of(problem, record, {}), fps=1.0, duration=None)
 

@@ -29,6 +29,9 @@ class Exchanged:
     def __getitem__(self, name: str) -> Array:
         return self.values[name]
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.values
+
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)

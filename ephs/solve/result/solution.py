@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, final, overload
 
 import numpy as np
 
-from ephs.operad import ROOT, Path
+from ephs.operad import ROOT, Path, PatternError
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import Audit
@@ -108,6 +108,13 @@ class Solution:
 
     def __len__(self) -> int:
         return int(self.t.size)
+
+    def __contains__(self, path: str | Path) -> bool:
+        """Whether there is a state at this path."""
+        try:
+            return Path.of(path) in self.states
+        except PatternError:
+            return False
 
     def __iter__(self) -> Iterator[Path]:
         return iter(self.states)
