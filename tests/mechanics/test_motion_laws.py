@@ -272,25 +272,6 @@ def test_numbers_of_a_law_are_varied():
 
 
 @pytest.mark.parametrize(
-    ("motion", "key", "parts"),
-    [
-        ("{}", "motion", ("an empty table", "give the keys of one form")),
-        ("{ rate = 1.0, amplitude = 2.0 }", "motion", ("amplitude, rate", "one form")),
-        ("{ amplitude = 2.0 }", "motion", ("amplitude", "amplitude and frequency")),
-        ("{ times = [0.0, 1.0], displacements = [0.0] }", "motion.displacements", ("2 numbers",)),
-        ("{ times = [1.0, 0.0], displacements = [0.0, 1.0] }", "motion.times", ("ascending times",)),
-        ("{ times = [1.0], displacements = [0.0] }", "motion.times", ("2 or more",)),
-        ("{ polynomial = [] }", "motion.polynomial", ()),
-    ],
-)
-def test_bad_motions_name_the_key(motion, key, parts):
-    with pytest.raises(ephs.SceneError) as caught:
-        loaded(CART.replace("{motion}", motion))
-    assert f"joints.rail.{key}" in str(caught.value)
-    assert all(part in str(caught.value) for part in parts)
-
-
-@pytest.mark.parametrize(
     "use",
     [
         ephs.dynamics,

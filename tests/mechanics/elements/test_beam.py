@@ -248,30 +248,6 @@ def test_scenes_with_beams_come_back_from_text():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "key"),
-    [
-        ("elements = 4", "elements = 0", "beams.rod.elements"),
-        ("EA = 1e4, ", "", "beams.rod.section"),
-        ("EA = 1e4, ", "EA = 1e4, circle = 0.1, ", "beams.rod.section"),
-        ("EA = 1e4", "EA = -1.0", "beams.rod.section.EA"),
-        ("to = [6.0, 8.0, 0.0]", "", "beams.rod"),
-        ("to = [6.0, 8.0, 0.0]", "to = [0.0, 0.0, 0.0]", "beams.rod.to"),
-        ("elements = 4", "up = [3.0, 4.0, 0.0]", "beams.rod.up"),
-        ("elements = 4", 'ends = ["grond"]', "beams.rod.ends[0]"),
-        ("elements = 4", 'heat = "nowhere"', "beams.rod.heat"),
-        ("elements = 4", "order = 3", "beams.rod.order"),
-        ("10.0] }", '10.0] }\n[loads.tip]\nbody = "rod.5"', "loads.tip.body"),
-        ("10.0] }", '10.0] }\n[loads.tip]\nbody = "ground"', "loads.tip.body"),
-        ("10.0] }", "10.0] }\n[bodies.rod]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]", "bodies.rod"),
-    ],
-)
-def test_faults_name_the_key(old, new, key):
-    with pytest.raises(ephs.SceneError) as caught:
-        scene_of_text(ROD.format(section=SECTION, more="").replace(old, new, 1))
-    assert [fault.key for fault in caught.value.faults] == [key]
-
-
-@pytest.mark.parametrize(
     ("shape", "expected"),
     [
         # of Timoshenko and Goodier's table: J = 0.1406 a⁴ of a square, 0.229 a b³ where a = 2 b

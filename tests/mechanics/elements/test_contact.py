@@ -367,13 +367,6 @@ def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol):
     assert np.all(np.diff(sol.heat) >= 0.0)
 
 
-@pytest.mark.parametrize("limits", ["[0.5, 0.1]", "[0.1]", '["a", 1.0]', "[inf, 1.0]"])
-def test_limits_ascend(limits):
-    text = (HEAD + STOPPED).format(**USUAL, rate=1.0, lower=0.0, upper=1.0).replace("[0.0, 1.0]", limits)
-    with pytest.raises(ephs.SceneError, match="lower < upper"):
-        scene_of_text(text)
-
-
 PLATE = """
 [bodies.bullet]
 mass = 0.1

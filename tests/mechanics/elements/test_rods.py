@@ -180,19 +180,3 @@ def test_scenes_with_rods_come_back_from_text(seed):
     scene = scene_of_text(text)
     again = scene_from_text(scene_to_text(scene))
     assert again.beams == scene.beams and scene_to_text(again) == scene_to_text(scene)
-
-
-@pytest.mark.parametrize(
-    ("kind", "more", "key"),
-    [
-        ("kirchhoff", "order = 4", "beams.rod.order"),
-        ("kirchhoff", "strain = [0.0, 0.0, 0.0, 0.1, 0.0, 0.0]", "beams.rod.strain"),
-        ("string", "strain = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]", "beams.rod.strain"),
-        ("string", "damping = 0.1", "beams.rod.damping"),
-        ("thread", "", "beams.rod.rod"),
-        ("reissner", "", "beams.rod.section"),
-    ],
-)
-def test_faults_name_the_key(kind, more, key):
-    with pytest.raises(ephs.SceneError, match=key):
-        scene_of_text(rod(along(1.0), 4, kind, more=more))

@@ -232,26 +232,6 @@ def test_actuators_of_one_joint_and_forces_on_it_add_up(tmp_path):
     assert np.isclose(run.joint("rail").rate[-1, 0], (19.0 / MASS - GRAVITY) * UNTIL, rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("text", "old", "new", "words"),
-    [
-        (CYLINDER, '"rail"', '"rial"', 'cylinders.lift.joint.*did you mean "rail"'),
-        (CYLINDER, f"area = {list(AREA)}", "area = 1.0", "cylinders.lift.area"),
-        (CYLINDER, f"bulk = {BULK}", "bulk = 0.0", "cylinders.lift.bulk"),
-        (CYLINDER, 'heat = "oil"', 'heat = "oli"', "cylinders.lift.heat"),
-        (STRUT, "temperature = 300.0", "gamma = 1.0", "gas_springs.strut.gamma"),
-        (STRUT, f"volume = {VOLUME}", "volume = -1.0", "gas_springs.strut.volume"),
-        (ACTUATOR, "limits = [-1.0, 1.5]", "limits = [1.0, -1.5]", "actuators.push.limits"),
-        (ACTUATOR, "ratio = 20.0", "ratio = [1.0, 2.0]", "actuators.push.ratio.*1 numbers"),
-        (ACTUATOR, '["rail"]', '["rial"]', r"actuators.push.joints\[0\].*did you mean"),
-    ],
-)
-def test_what_does_not_fit_is_told_by_its_key(tmp_path, text, old, new, words):
-    assert old in text
-    with pytest.raises(ephs.SceneError, match=words):
-        loaded(tmp_path, text.replace(old, new, 1))
-
-
 def test_an_equilibrium_of_attachments_with_states_is_refused(tmp_path):
     with pytest.raises(ephs.OptionError, match=r"cylinders\.lift"):
         ephs.equilibrium(loaded(tmp_path, CYLINDER))

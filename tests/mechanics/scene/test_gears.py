@@ -122,20 +122,3 @@ axis = [0.0, 0.0, 1.0]
     one, two, drum = (sol.joint(name).rate[:, 0] for name in ("rail", "other", "shaft"))
     assert np.allclose(drum, 5.0 * (one + two), rtol=0.0, atol=1e-12)
     assert np.allclose(one, two, rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('["shaft", "rail"]', '["shaft", "rial"]', r'gears.rope.joints\[1\].*did you mean "rail"'),
-        ('["shaft", "rail"]', '["shaft", "shaft"]', "different joints"),
-        ("ratio = 10.0", "ratio = [1.0, 2.0]", "gears.rope.ratio.*1 numbers"),
-        ('type = "prismatic"', 'type = "cylindrical"', "gears.rope.joints.*one degree of freedom"),
-        ('heat = "bearing"', 'heat = "baring"', "gears.rope.heat"),
-        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*a rate of shaft of 0"),
-    ],
-)
-def test_what_does_not_fit_is_told_by_its_key(old, new, words):
-    assert old in HOIST
-    with pytest.raises(ephs.SceneError, match=words):
-        scene_of_text(HOIST.replace(old, new))

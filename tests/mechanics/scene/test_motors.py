@@ -10,7 +10,6 @@ from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.rescaled import rescaled
 from tests.mechanics.tree import machines
 from tests.scenes import ROOT
-from tests.written import scene_of_text
 
 SCENE = ROOT / "scenes" / "motor-four-bar.toml"
 END = ("motors.drive.coil.b", "motors.drive.rotor.p", "thermal.housing.s")
@@ -67,22 +66,6 @@ def test_a_voltage_is_an_input_and_a_scene_survives_its_text():
     same, other = ended(scene, method="rk87"), ended(scene, method="rk87", inputs={"motors.drive": 6.0})
     assert np.array_equal(same[0], ended(ephs.load(SCENE), method="rk87")[0])
     assert other[1].work[-1] < 0.5 * same[1].work[-1]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('joint = "main"', 'joint = "mian"', 'motors.drive.joint.*did you mean "main"'),
-        ("resistance = 0.8 ", "resistance = 0.0 ", "motors.drive.resistance"),
-        ('heat = "housing"\n\n[thermal', 'heat = "house"\n\n[thermal', "motors.drive.heat"),
-        ("armature = 0.002 ", "motion = { rate = 1.0 }\narmature = 0.002 ", "joints.main.armature"),
-    ],
-)
-def test_what_does_not_fit_is_told_by_its_key(old, new, words):
-    text = SCENE.read_text()
-    assert old in text
-    with pytest.raises(ephs.SceneError, match=words.replace('"', ".")):
-        scene_of_text(text.replace(old, new))
 
 
 def test_currents_are_states_of_the_linearisation():

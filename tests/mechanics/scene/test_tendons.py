@@ -130,25 +130,6 @@ def test_between_two_points_it_is_a_spring():
     assert sol.heat[-1] == pytest.approx(spring.heat[-1], rel=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("change", "key", "expected"),
-    [
-        (('"hand"]\npoints', '"hnad"]\npoints'), r"tendons.cable.bodies\[3\]", "hand"),
-        ((", [0.4, 0.2, 0.05]]", "]"), "tendons.cable.points", "4 points, one for each body"),
-        (('["ground", "arm", "arm", "hand"]', '["arm", "arm", "arm", "arm"]'), "tendons.cable.bodies", "different"),
-        (("[0.2, 0.1, 0.1]", "[-0.5, 0.0, 0.4]"), r"tendons.cable.points\[1\]", "two different points"),
-        (("damping", "slack = true\ndamping"), "tendons.cable.damping", "0 for a tendon with slack"),
-        (("[tendons.cable]", '[actuators.cable]\njoints = ["pin"]\n[tendons.cable]'), "actuators.cable", "tendon"),
-        (("[tendons.cable]", '[actuators.winch]\ntendon = "cabel"\n[tendons.cable]'), "winch.tendon", '"cable"'),
-        (("[tendons.cable]", "[actuators.winch]\n[tendons.cable]"), "actuators.winch", "either joints or a tendon"),
-    ],
-)
-def test_what_is_no_tendon_is_said(change, key, expected):
-    with pytest.raises(ephs.SceneError, match=key) as caught:
-        loaded(CABLE.replace(*change), (0.0, 0.0, 0.0, 0.0))
-    assert expected in str(caught.value)
-
-
 @pytest.mark.parametrize("method", ["rk87", "radau", "natural"])
 def test_antagonists_lie_beside_each_other(method):
     pair = STAY + STAY.partition("[thermal")[0].replace("stay", "other").replace("0.1, 0.4]", "-0.1, -0.4]")

@@ -106,18 +106,3 @@ def test_a_sheet_at_the_end_of_a_stiff_beam_vibrates_as_one_that_is_clamped():
     clamped = beyond("ground")
     off = [abs(beyond("rib.1", short.replace("E = 1e9", f"E = {young}")) / clamped - 1.0) for young in ("1e9", "1e11")]
     assert off[1] < 0.02 * off[0] and off[0] > 1e-4
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (ribbed(4, 5), "shells.left.edges[0]: found 0.1 m from a point to the next node of rib"),
-        (ribbed(4, edges='["free", "rib", "free", "free"]'), "shells.left.edges[1]: found 0.05 m from a point"),
-        (ribbed(4, edges='["rip", "free", "free", "free"]'), 'shells.left.edges[0]: found "rip"'),
-        (ribbed(4, edges='["rib.7", "free", "free", "free"]'), 'shells.left.edges[0]: found "rib.7"'),
-    ],
-)
-def test_beams_without_nodes_at_the_points_are_refused_by_key(text, words):
-    with pytest.raises(ephs.SceneError) as error:
-        scene_of_text(text)
-    assert words in str(error.value)

@@ -182,40 +182,6 @@ def test_new_points_are_of_a_side_on_the_border_or_on_a_line_through_the_mesh():
     assert len(places) == 5 and np.array_equal(places[:, 0], places[:, 1])
 
 
-@pytest.mark.parametrize(
-    ("keys", "at", "words"),
-    [
-        (table("corners"), "", "points and elements"),
-        (table(points="[[0.0, 0.0, 0.0]]"), "", "corners, points, elements"),
-        (table("elements", "rho", layers="[]"), "layers", "1"),
-        (table("rho"), "", "thickness, E and rho"),
-        (table(layers=f"[{LAYER.replace('ANGLE', '0.0')}]"), "", "layers"),
-        (table(*MATERIAL, layers="[{thickness = 1e-3, E1 = 1e7, E2 = 1e7, G12 = 4e6, nu12 = 0.3}]"), "", "mass"),
-        (table(*MATERIAL, layers="[{thickness = 0.0, E1 = 1e7, E2 = 1e7, G12 = 4e6}]"), "layers[0].thickness",
-         "above 0"),
-        (table(*MATERIAL, layers="[{thickness = 1e-3, E1 = 1e7, E2 = 1e7, G12 = 4e6, nu = 0.3}]"), "layers[0].nu",
-         "nu12"),
-        (table(*MATERIAL, layers="[{thickness = 1e-3, E1 = 1e7, E2 = 1e7, G12 = 4e6, nu12 = 2.0, rho = 1.0}]"),
-         "layers", "layers[0].nu12"),
-        (table(elements="[[0, 1, 2, 3]]"), "elements", "two numbers"),
-        (table("corners", points="[[0.0, 0.0, 0.0]]"), "elements", "points of each"),
-        (table("corners", "edges", points="[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]",
-               elements="[[0, 1, 3]]"), "elements[0]", "0 … 2"),
-        (table("corners", "edges", points="[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]",
-               elements="[[0, 1, 2]]", sides="[[0, 3]]"), "sides[0]", "0 … 2"),
-        (table("corners", "edges", points="[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]",
-               elements="[[0, 1, 2]]", sides='["rim"]'), "sides[0]", "0 … 2"),
-        (table(pinned="[true]"), "pinned", "4 entries"),
-        (table(along="[0.0, 0.0, 0.0]"), "corners", "direction"),
-    ],
-)  # fmt: skip
-def test_what_is_no_sheet_is_refused_by_its_key(keys, at, words):
-    with pytest.raises(ephs.SceneError) as error:
-        scene(keys)
-    assert words in str(error.value)
-    assert error.value.faults[0].key == ".".join(filter(None, ("shells.skin", at)))
-
-
 # ---- pinned sides ----------------------------------------------------------------------------------------------------
 
 

@@ -118,26 +118,6 @@ def test_it_is_read_again_from_a_result(tmp_path):
     assert np.array_equal(ephs.load_solution(tmp_path / "run.nc").shell("skin").position, run.shell("skin").position)
 
 
-@pytest.mark.parametrize(
-    ("keys", "at", "words"),
-    [
-        ({"edges": '["free", "free", "free", "wall"]'}, "edges[3]", "ground"),
-        ({"edges": '["free", "ground"]'}, "edges", "4 entries"),
-        ({"elements": "[0, 2]"}, "elements[0]", "not below 1"),
-        ({"thickness": "0.0"}, "thickness", "above 0"),
-        ({"nu": "0.6"}, "nu", "0.5"),
-        ({"corners": "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]"}, "corners", "an area"),
-        ({"corners": "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 0.2, 0.0], [0.0, 1.0, 0.0]]", "elements": "[1, 1]"},
-         "corners", "convex corners"),
-    ],
-)  # fmt: skip
-def test_what_is_no_shell_is_refused_by_its_key(keys, at, words):
-    with pytest.raises(ephs.SceneError) as error:
-        sheet(**keys)
-    (fault,) = error.value.faults
-    assert fault.key == f"shells.skin.{at}" and words in str(fault)
-
-
 @pytest.mark.parametrize("pinned", ["false", "true"])
 def test_a_run_goes_on_from_a_strained_sheet(pinned):
     """From halfway it is the run to the end, in a document and in other units, too."""

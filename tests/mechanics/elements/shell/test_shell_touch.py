@@ -161,13 +161,6 @@ def test_what_could_come_through_between_nodes_is_refused(radius, wide):
         touch(text)
 
 
-@pytest.mark.parametrize("shape", ["box = [1.0, 1.0, 0.2]", "cylinder = [0.1, 1.0]", "capsule = [0.1, 1.0]"])
-def test_width_is_that_of_the_largest_ball_inside(shape):
-    text = cloth(floor=ball(0.1, 0.4).replace("sphere = 0.1", shape))
-    with pytest.raises(ephs.SceneError, match=r"of half width 0\.1 m"):
-        touch(text)
-
-
 @pytest.mark.parametrize("stiffness", [10.0, 1e4])
 def test_a_ball_that_falls_on_a_held_sheet_does_not_come_through_in_silence(stiffness):
     """Between soft nodes the run ends before its middle may have passed; stiff ones hold it."""
@@ -258,25 +251,3 @@ def test_nodes_on_a_body_touch_all_but_this_body(pinned):
     assert not touch(more=joined, floor=HUB + BLOCK).contacts, "as bodies that a joint connects"
     other = touch(more=joined, floor=HUB + FLOOR)
     assert len(contact_points(other, other.contacts["skin_floor"])) == 6
-
-
-@pytest.mark.parametrize(
-    ("text", "at", "words"),
-    [
-        (cloth().replace('body = "cloth"', 'body = "clot"'), "surfaces.skin.body", 'did you mean "cloth"'),
-        (cloth(skin="shape = { box = [1.0, 1.0, 1.0] }"), "surfaces.skin.shape", "a box on a shell"),
-        (cloth(skin="position = [0.0, 0.0, 1.0]"), "surfaces.skin.position", "nothing on a shell"),
-        (cloth().replace("shape = { plane = {} }", ""), "surfaces.floor.shape", "found nothing, expected sphere"),
-        (cloth(floor=FLOOR + HUB.replace("hub", "cloth")), "surfaces.skin.body", "a body and a shell"),
-        (cloth(floor=FLOOR + HUB.replace("hub", "cloth-node1")), "shells.cloth", "a body cloth-node1"),
-        (cloth(more=HELD, floor=FLOOR + '[contacts.a]\nsurfaces = ["skin", "floor"]\n'), "contacts.a", "joined"),
-        (
-            cloth() + CLOTH.format(**GIVEN).replace("cloth", "other").replace("skin", "back"),
-            "surfaces.skin and surfaces.back", "surfaces of two shells",
-        ),
-    ],
-)  # fmt: skip
-def test_faults_name_the_key(text, at, words):
-    with pytest.raises(ephs.SceneError) as error:
-        touch(text)
-    assert at in str(error.value) and words in str(error.value)
