@@ -12,7 +12,6 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 
 MASS, GRAVITY, UNTIL = 2.0, 9.81, 0.02
 ROD = f"""
@@ -157,20 +156,6 @@ def test_an_adiabatic_gas_keeps_its_entropy(tmp_path):
     gas = FILLED * VOLUME / (GAMMA - 1.0) * ((VOLUME / volume) ** (GAMMA - 1.0) - 1.0)
     rod = 0.5 * MASS * run.joint("rail").rate[:, 0] ** 2 + MASS * GRAVITY * run.joint("rail").coordinate[:, 0]
     assert np.abs(rod + gas + AIR * (volume - VOLUME)).max() < 1e-11
-
-
-@pytest.mark.parametrize("kind", CASES)
-def test_units_and_text_of_cylinders(tmp_path, kind):
-    scene = loaded(tmp_path, CASES[kind][0])
-    if kind == "oil":
-        lift = scene.cylinders["lift"].changed(pressure=list(PRESSURE))
-        scene = replace(scene, cylinders={"lift": lift})
-    exact = ephs.simulate(scene, UNTIL, method="rk87", rtol=1e-10)
-    same = ephs.simulate(scene_from_text(scene_to_text(scene)), UNTIL, method="rk87", rtol=1e-10)
-    assert np.array_equal(same.joint("rail").rate, exact.joint("rail").rate)
-    units = 2.0**12, 2.0**-11, 2.0**10  # far enough from metres, kilograms and seconds to run in units of its own
-    far = ephs.simulate(rescaled(scene, *units), UNTIL * units[2], method="rk87", rtol=1e-10)
-    assert np.isclose(far.joint("rail").rate[-1, 0] / units[0] * units[2], exact.joint("rail").rate[-1, 0], rtol=1e-8)
 
 
 def test_files_with_rows_of_numbers_as_arrays_are_read(tmp_path):

@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 from tests.written import scene_of_text
 
 MASS, TURNING, RATIO, LOSS, GRAVITY = 5.0, 0.02, 10.0, 0.05, 9.81
@@ -80,27 +77,6 @@ def test_a_stiff_belt_moves_as_a_gear_does(hoist):
         assert sol.energy_error.max() < 1e-11
         ends.append(sol.joint("rail").rate[-1, 0])
     assert np.isclose((ends[1] - ends[0]) / (ends[2] - ends[0]), 1e5 / 1e3, rtol=1e-2)
-
-
-def test_units_text_and_parameters_of_gears(hoist):
-    other = scene_from_text(scene_to_text(hoist))
-    sol, same = (ephs.simulate(one, 0.2, method="rk87") for one in (hoist, other))
-    assert np.array_equal(sol.joint("rail").rate, same.joint("rail").rate)
-    units = 2.0**4, 2.0**-3, 2.0**5
-    found = ephs.simulate(rescaled(hoist, *units), 0.2 * units[2], method="rk87", rtol=1e-11, atol=1e-13)
-    exact = ephs.simulate(hoist, 0.2, method="rk87", rtol=1e-11, atol=1e-13)
-    assert np.isclose(found.joint("rail").rate[-1, 0] / units[0] * units[2], exact.joint("rail").rate[-1, 0], rtol=1e-9)
-    paths = ["gears.rope.ratio", "gears.rope.friction"]
-    near = []
-    for path, value in zip(paths, (RATIO, LOSS), strict=True):
-        step = 1e-4 * value
-        ends = [
-            ephs.simulate(varied(hoist, {path: value + by}), 0.2, method="rk87", rtol=1e-12, atol=1e-13)
-            for by in (-step, step)
-        ]
-        near.append((ends[1].joint("rail").rate[-1, 0] - ends[0].joint("rail").rate[-1, 0]) / (2.0 * step))
-    run = ephs.sensitivity(hoist, paths, 0.2, method="rk87", rtol=1e-11, atol=1e-13)
-    assert np.allclose(run["joints.rail.rate"][-1, 0], near, rtol=1e-6)
 
 
 def test_a_differential_divides_its_rate():

@@ -13,10 +13,9 @@ from ephs.mechanics import Shell, ShellSection
 from ephs.mechanics.elements.shell.mesh import grid, quadrilaterals
 from ephs.mechanics.elements.shell.section import Ply
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.rescaled import rescaled
 from tests.mechanics.elements.shell.test_shell import patch_is_exact
 from tests.mechanics.elements.shell.test_shell_scenes import SHEET, WORLD, lines_of, sheet
-from tests.numerics import generators, largest
+from tests.numerics import generators
 from tests.written import scene_of_text
 
 MATERIAL = ("thickness", "E", "nu", "rho")
@@ -63,29 +62,6 @@ def test_fibres_turn_with_the_direction_from_which_their_angles_count(angles, tu
     assert one.section.plane == pytest.approx(
         ShellSection.laminate([Ply(1e-3, 3e7, 1e7, 4e6, 0.3, a, 900.0) for a in angles]).plane, rel=1e-15
     )
-
-
-def test_layers_are_kept_and_change_with_units():
-    given_scene = layered(0.3, -0.3, along="[1.0, 0.2, 0.0]")
-    assert scene_to_text(scene_from_text(scene_to_text(given_scene))) == scene_to_text(given_scene)
-    other = rescaled(given_scene, 2.0, 4.0, 1.0)
-    assert other.shells["skin"].layers[1] == {
-        "thickness": 2e-3, "E1": 6e7, "E2": 2e7, "G12": 8e6, "nu12": 0.3, "angle": -0.3, "rho": 450.0
-    }  # fmt: skip
-    one, two = (of.shells["skin"].stack() for of in (given_scene, other))
-    assert np.array_equal(two.plane, one.plane * np.kron([[4.0, 8.0], [8.0, 16.0]], np.ones((3, 3))))  # N/m, N, N m
-    assert np.array_equal(two.shear, 4.0 * one.shear) and two.mass == one.mass
-
-
-def test_a_part_that_is_turned_turns_the_fibres(tmp_path):
-    keys = table(*MATERIAL, layers=f"[{LAYER.replace('ANGLE', '0.4')}]", along="[1.0, 0.2, 0.0]")
-    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{lines_of(keys)}")
-    (tmp_path / "whole.toml").write_text(
-        f'{WORLD}[parts.left]\nuse = "wing.toml"\nposition = [1.0, 2.0, 0.5]\nrotation = [0.8, 0.0, 0.0, 0.6]\n'
-    )
-    turned = dict(ephs.load(tmp_path / "whole.toml").all_shells())["left.skin"].shell()
-    still = ephs.load(tmp_path / "wing.toml").shells["skin"].shell()
-    assert turned.matrix == pytest.approx(still.matrix, abs=1e-12 * largest(still.matrix))
 
 
 # ---- meshes ----------------------------------------------------------------------------------------------------------

@@ -5,9 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.contacts import contact_points
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.shapes.gap import ramp
 from tests.written import scene_of_text
@@ -65,16 +63,6 @@ def test_a_sheet_that_falls_comes_to_rest_on_its_weight(method):
     assert run.energy_error.max() < 1e-12 and run.stats["least_production"] >= 0.0
     assert np.all(np.diff(run.heat) >= -1e-12 * run.heat[-1]) and run.heat[-1] > 0.0
     assert run.audit.passed
-
-
-def test_heat_of_touching_warms_a_node_and_is_read_from_a_file(tmp_path):
-    warm = 'heat = "store"\n[thermal.store]\ncapacity = 1.0\ntemperature = 300.0\n'
-    run = ephs.simulate(touch(more="heat = 'store'", floor=FLOOR + warm), 0.1)
-    assert run.thermal("store").temperature[-1] - 300.0 == pytest.approx(run.heat[-1], rel=1e-6)
-    assert run.heat[-1] > 0.01 and run.contact("skin_floor").heat.max() > 0.0
-    run.save(tmp_path / "run.nc")
-    again = ephs.load_solution(tmp_path / "run.nc").contact("skin_floor")
-    assert np.array_equal(again.force, run.contact("skin_floor").force)
 
 
 def test_a_pressed_sheet_rests_on_its_weight_and_the_pressure():
@@ -194,41 +182,6 @@ def test_nodes_that_leap_through_a_plate_are_found_and_chosen_steps_meet_it():
     assert finding.path == "contacts.skin_plate"
     met = thrown(None)
     assert met.shell("cloth").position[-1, :, 2].min() > 0.0 and met.audit.passed
-
-
-def test_other_units_are_the_same_motion():
-    scene = touch()
-    one = ephs.simulate(scene, 0.1, method="radau", rtol=1e-8, atol=1e-10)
-    other = ephs.simulate(rescaled(scene, 8.0, 0.25, 2.0), 0.2, method="radau", rtol=1e-8, atol=8e-10)
-    assert other.shell("cloth").position[-1] / 8.0 == pytest.approx(one.shell("cloth").position[-1], abs=1e-7)
-    force = 0.25 * 8.0 / 4.0
-    assert other.contact("skin_floor").force[-1, 2] / force == pytest.approx(
-        one.contact("skin_floor").force[-1, 2], rel=1e-4
-    )
-
-
-def test_a_sheet_of_a_part_touches_the_floor_of_the_whole(tmp_path):
-    (tmp_path / "cloth.toml").write_text(cloth(floor=""))
-    (tmp_path / "whole.toml").write_text(
-        WORLD + '[parts.left]\nuse = "cloth.toml"\nposition = [1.0, 0.0, 0.0]\n' + FLOOR
-    )
-    whole = ephs.load(tmp_path / "whole.toml")
-    (name,) = whole.contacts
-    parted, alone = (ephs.simulate(each, 0.1, method="radau", rtol=1e-8, atol=1e-10) for each in (whole, touch()))
-    moved = parted.shell("left.cloth").position[-1] - [1.0, 0.0, 0.0]
-    assert moved == pytest.approx(alone.shell("cloth").position[-1], abs=1e-8)
-    assert parted.contact(name).force[-1] == pytest.approx(alone.contact("skin_floor").force[-1], abs=1e-4)
-    assert alone.contact("skin_floor").force[-1, 2] > 0.0
-
-
-def test_it_is_read_again_and_a_run_goes_on():
-    scene = touch()
-    assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
-    pace = {"method": "radau", "rtol": 1e-9, "atol": 1e-11}
-    whole = ephs.simulate(scene, 0.12, save_at=[0.0, 0.08, 0.12], **pace)
-    rest = ephs.simulate(scene.at(whole, 0.08), 0.04, **pace)
-    assert rest.contact("skin_floor").force[0] == pytest.approx(whole.contact("skin_floor").force[1], rel=1e-9)
-    assert rest.shell("cloth").position[-1] == pytest.approx(whole.shell("cloth").position[-1], abs=1e-7)
 
 
 def test_balls_have_half_the_thickness_of_a_sheet_that_is_varied():
