@@ -14,6 +14,7 @@ from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.soundness import check_scene
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from tests.mechanics.drawn_scenes import FREEDOMS, SECTIONS, drawn, toml
+from tests.mechanics.own_elements import registered
 from tests.mechanics.touching_scenes import SHAPES, drawn_hard, drawn_sheet, drawn_touching
 from tests.mechanics.written_scenes import WRITTEN
 from tests.written import scene_of_text
@@ -41,6 +42,13 @@ SEEDS = {
     "written": tuple(WRITTEN),
 }  # hard 3, of boxes on boxes, is slow
 SHORT = {"jointed": 4, "touching": 3, "sheet": 1, "hard": 1, "written": 2}
+
+
+@pytest.fixture(autouse=True)
+def elements():
+    """Of users, in one of the written scenes."""
+    with registered():
+        yield
 
 
 def drawings(*kinds):

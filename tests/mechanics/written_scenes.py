@@ -1,4 +1,6 @@
-"""Scene files of what is not drawn in `drawn_scenes` and `touching_scenes`: sheets on bodies and beams, rods, winches."""
+"""Scene files of what `drawn_scenes` and `touching_scenes` do not draw: sheets on bodies and beams, rods, machines."""
+
+from tests.mechanics.own_elements import OWN
 
 __all__ = ["WRITTEN"]
 
@@ -182,6 +184,7 @@ WRITTEN = {
     name: WORLD + text
     for name, text in {
         "winch": WINCH,
+        "own elements": OWN,
         "hoist": HOIST,
         "rod": ROD,
         "string": STRING,

@@ -247,23 +247,6 @@ def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.7)
 
 
-@pytest.mark.parametrize("name", ["four-bar", "hot-brake", "biped"])
-@pytest.mark.parametrize("how", [{"step": 2e-3}, {"rtol": 1e-4, "atol": 1e-5}])
-def test_single_steps_are_those_of_compiled_runs(name, how):
-    scene, times = shipped(name), np.linspace(0.0, 0.1, 8)
-    looked_at = {"events": [ephs.Event(lambda t, state: 1.0 + t, "never", stop=False)]}
-    whole, single = (
-        ephs.simulate(scene, 0.1, method="semi", save_at=times, audit="off", **how, **more)
-        for more in ({}, looked_at)
-    )  # fmt: skip
-    assert whole.stats["steps"] == single.stats["steps"]
-    for path in whole.states:
-        size = largest(whole[path]) + 1.0
-        assert largest(whole[path] - single[path]) <= 1e-10 * size
-    assert largest(whole.heat - single.heat) <= 1e-10 * (1.0 + largest(whole.heat))
-    assert max(largest(sol.energy_error) for sol in (whole, single)) <= 1e-11
-
-
 def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes():
     """Losses a thousand times as fast as steps, whose stages are one by one."""
     text = (SCENES / "four-bar.toml").read_text(encoding="utf-8")
