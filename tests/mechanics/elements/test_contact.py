@@ -30,9 +30,10 @@ from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import check_primitive
+from tests.methods import OF_SCENES
+from tests.numerics import EPS
 from tests.written import scene_of_text
 
-SCENES = [name for name, method in METHODS.items() if method.scenes]
 GAPS = (
     plane_sphere(0.3),
     plane_sphere(0.0),
@@ -198,7 +199,7 @@ def rebound(speed, loss):
     return brentq(lambda v: potential(-v) - potential(speed), 0.0, min(speed, (1.0 - 1e-9) / c))
 
 
-@pytest.mark.parametrize(("name", "exponent"), [*((name, 1.5) for name in SCENES), ("rk87", 1.0), ("natural", 1.0)])
+@pytest.mark.parametrize(("name", "exponent"), [*((name, 1.5) for name in OF_SCENES), ("rk87", 1.0), ("natural", 1.0)])
 def test_an_impact_loses_what_hunt_and_crossley_say(name, exponent):
     scene = scene_of(BALL, speed=-1.0, loss=0.4, exponent=exponent)
     fixed = METHODS[name].fixed
@@ -228,7 +229,7 @@ limit_loss = 0.4
 
 @pytest.mark.parametrize(
     ("name", "rate", "lower"),
-    [*((name, -1.0, -0.05) for name in SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)],
+    [*((name, -1.0, -0.05) for name in OF_SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)],
 )
 def test_a_stop_is_an_impact(name, rate, lower):
     scene = scene_of(STOPPED, rate=rate, lower=lower, upper=0.05)
@@ -283,7 +284,7 @@ def test_the_energy_has_an_exact_slope(gap):
             continue
         touched += (before > 0.0) != (after > 0.0)
         along = energy.discrete_gradient({q_r: x}, v)
-        scale = before + after + np.abs(along) @ np.abs(v) + law.energy(1.0) * np.finfo(float).eps
+        scale = before + after + np.abs(along) @ np.abs(v) + law.energy(1.0) * EPS
         assert abs(after - before - along @ v) <= 1e-13 * scale
     assert touched >= 5
 
@@ -379,7 +380,7 @@ shape = { box = [2.0, 2.0, 0.001] }
 """
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if METHODS[name].adaptive])
+@pytest.mark.parametrize("name", [name for name in OF_SCENES if METHODS[name].adaptive])
 @pytest.mark.filterwarnings("ignore::ephs.CostWarning")
 def test_no_step_leaps_over_a_thin_plate(name, monkeypatch):
     scene = scene_of_text(HEAD.format(gravity=0.0) + PLATE)

@@ -1,7 +1,6 @@
 """Semi-implicit steps: their coefficients, their stages, and what contact loses by them."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +16,11 @@ from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
 from tests.numerics import largest, seeds
-from tests.scenes import equations_of, shipped
+from tests.scenes import ROOT, equations_of, shipped
 from tests.written import scene_of_text
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
 IMPLICIT = SCHEME[1:, 1:]
-SCENES = Path(ephs.__file__).parents[1] / "scenes"
 
 
 def test_coefficients_are_of_order_three():
@@ -186,7 +184,7 @@ def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
 def closed(request):
     """A mechanism with loops and friction, of which one has a crank whose motion is prescribed."""
     name, _, led = request.param.partition(", ")
-    text = (SCENES / f"{name}.toml").read_text(encoding="utf-8")
+    text = (ROOT / f"scenes/{name}.toml").read_text(encoding="utf-8")
     return scene_of_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text)
 
 
@@ -249,7 +247,7 @@ def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
 
 def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes():
     """Losses a thousand times as fast as steps, whose stages are one by one."""
-    text = (SCENES / "four-bar.toml").read_text(encoding="utf-8")
+    text = (ROOT / "scenes/four-bar.toml").read_text(encoding="utf-8")
     scene = scene_of_text(re.sub(r"friction = [0-9.]+", "friction = 1e4", text))
     inputs = {"joints.main": lambda t, state: 4.0 + t}
     found = ephs.simulate(scene, 0.5, method="semi", step=0.02, inputs=inputs, audit="off")
