@@ -5,12 +5,16 @@ from struct import pack
 
 from ephs.operad import Pattern
 from tests.mechanics.imports.models import MODELS
-from tests.mechanics.imports.test_bad_models import FAULTS as BAD_MODELS
-from tests.mechanics.scene.test_scene_faults import BODY, FAULTS, OTHER, SPRING, THERMAL, UNIT, joint
+from tests.mechanics.scene.test_scene_faults import BODY, joint
 from tests.operad.models import JOINT
+from tests.refused import corpus
 
 ROOT = Path(__file__).resolve().parents[2]
 
+OTHER = BODY.replace("bodies.a", "bodies.b")
+SPRING = '[springs.s]\nbodies = ["ground", "a"]\nat1 = [1.0, 0.0, 0.0]\nat2 = [0.0, 0.0, 0.0]\n'
+THERMAL = "[thermal.t]\ncapacity = 1.0\ntemperature = 300.0\n"
+UNIT = "{ position = [0.0, 0.0, 0.0] }"
 PENDULUM = BODY + joint('heat = "t"', "friction = 0.1", "drive = 0.2") + THERMAL
 FOUR_BAR = """
 [bodies.a]
@@ -94,19 +98,24 @@ TEXTS = (
 )
 
 
+def refused(room: str) -> list[tuple[str, str]]:
+    """Names of what was sound, and faulty texts."""
+    _, cases = corpus(ROOT / f"tests/mechanics/{room}/refused")
+    return [case.values[:2] for case in cases]
+
+
 def seeds() -> dict[str, list[str]]:
     """The texts by kind, small ones first."""
     own = [PENDULUM, FOUR_BAR, CHAIN, SPRUNG, WARM, *KINDS, SHAPES, PARTS, MARKED]
     own += [WORLD + text for text in (PENDULUM, FOUR_BAR, CHAIN, PARTS)]
     scenes = [f'format = 1\nname = "s"\n{text}' for text in own]
     # Everything of one's own counts as much as all that is known to be faulty, or to be large.
-    scenes = scenes * 12 + [f"format = 1\n{text}" for text, _, _ in FAULTS.values()]
+    scenes = scenes * 12 + [text for _, text in refused("scene")]
     scenes += [file.read_text(encoding="utf-8") for file in sorted((ROOT / "scenes").glob("*.toml"))]
     patterns = [Pattern.from_text(text) for text in TEXTS] + [JOINT]
     models: dict[str, list[str]] = {"urdf": [], "sdf": [], "xml": []}
-    for ending, text, _, _ in BAD_MODELS.values():
-        if len(text) < 4000:
-            models[ending].append(text)
+    for ending, text in refused("imports"):
+        models[ending].append(text)
     for ending, small in (("urdf", URDF), ("sdf", SDF), ("xml", MJCF)):
         models[ending] += [small] * 40 + [MODELS[ending]]
     return {

@@ -81,19 +81,6 @@ def test_markers_of_parts_move_with_their_ground(tmp_path):
     assert [(n, m.at) for n, m in again.all_markers()] == [(n, m.at) for n, m in hall.all_markers()]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('[markers.m]\nbody = "rodd"\n', 'markers.m.body.*"rodd".*rod'),
-        ("[markers.m]\nat = [1.0, 2.0]\n", "markers.m"),
-        ('[markers.m]\nbody = "rod"\nwhere = 3\n', "markers.m.where"),
-    ],
-)
-def test_faulty_markers_are_named(text, message):
-    with pytest.raises(ephs.SceneError, match=message):
-        scene_of_text(PENDULUM + text)
-
-
 def test_unknown_inputs_list_the_markers(pendulum):
     with pytest.raises(ephs.SemanticsError, match=r"markers\.tip"):
         ephs.simulate(pendulum, 0.1, inputs={"markers.top": [0.0, 0.0, 1.0]})

@@ -1,10 +1,8 @@
 """Motions that are prescribed as functions of time: laws, closed forms by every method, loops, what is refused."""
 
 import json
-import tempfile
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +16,8 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.tree.finding.parts import determined_by
+from tests.scenes import ROOT
+from tests.written import scene_of_text
 
 GRAVITY, DAMPING = 9.81, 0.05
 CART = """
@@ -53,14 +53,6 @@ FORMS = {
         (0.0, 0.4, 1.0), (0.0, 0.3, 0.1)
     ),
 }
-
-
-def loaded(text):
-    """The scene of a text."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "led.toml"
-        file.write_text(text)
-        return ephs.load(file)
 
 
 number = st.floats(-3.0, 3.0)
@@ -143,7 +135,7 @@ def cart(law, end):
     [(name, form) for name in METHODS for form in FORMS if name in ("rk87", "natural") or "times" in form],
 )
 def test_pendulum_on_a_led_cart_by_every_method(method, form):
-    scene, law, end = loaded(CART.replace("{motion}", form)), FORMS[form], 1.2
+    scene, law, end = scene_of_text(CART.replace("{motion}", form)), FORMS[form], 1.2
     own = METHODS[method]
     fixed = {"natural": 2e-3, "natural4": 1e-2, "variational": 2e-3}
     tolerance = 1e-6 if own.order < 4 else 1e-8
@@ -160,7 +152,7 @@ def test_pendulum_on_a_led_cart_by_every_method(method, form):
 
 
 def test_force_of_a_led_body_is_its_mass_times_acceleration():
-    scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))
+    scene = scene_of_text(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))
     alone = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-9)
     joint, pendulum = alone.joint("rail"), alone.joint("pivot")
     angle, spin = pendulum.coordinate[:, 0], pendulum.rate[:, 0]
@@ -174,7 +166,7 @@ def test_force_of_a_led_body_is_its_mass_times_acceleration():
 @pytest.fixture(scope="module")
 def crank():
     """A slider-crank that is turned from rest to rest."""
-    text = (Path(__file__).parents[2] / "scenes" / "slider-crank.toml").read_text()
+    text = (ROOT / "scenes/slider-crank.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("drive")]
     text = "\n".join("velocity = [0.0, 0.0, 0.0]" if line.startswith("velocity") else line for line in lines)
     text = "\n".join(
@@ -182,7 +174,7 @@ def crank():
         for line in text.splitlines()
     )
     motion = "motion = { times = [0.0, 0.2, 0.5], displacements = [0.0, 1.0, 4.0] }"
-    return loaded(text.replace("[joints.bearing]", "[joints.bearing]\n" + motion))
+    return scene_of_text(text.replace("[joints.bearing]", "[joints.bearing]\n" + motion))
 
 
 def test_loop_from_rest_to_rest(crank):
@@ -198,7 +190,7 @@ def test_loop_from_rest_to_rest(crank):
 
 def test_system_by_hand_takes_a_law():
     """An effort at a joint's port; a function without derivative is left to the natural methods."""
-    scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))
+    scene = scene_of_text(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8, phase = 0.3 }"))
     whole = ephs.simulate(scene, 0.5, method="rk87", rtol=1e-9)
     problem = whole.problem
     (port,) = (path for path, signal in problem.signals.items() if signal.effort)
@@ -214,7 +206,7 @@ def test_system_by_hand_takes_a_law():
 
 
 def test_a_system_is_read_anew_for_each_motion_and_once_for_all_forces():
-    problem = problem_of_scene(loaded(CART.replace("{motion}", "{ rate = 0.3 }")))
+    problem = problem_of_scene(scene_of_text(CART.replace("{motion}", "{ rate = 0.3 }")))
     ((path, signal),) = problem.signals.items()
 
     def key(value, effort):
@@ -227,13 +219,13 @@ def test_a_system_is_read_anew_for_each_motion_and_once_for_all_forces():
 
 @pytest.mark.parametrize("form", FORMS)
 def test_text_keeps_the_law(form):
-    scene = loaded(CART.replace("{motion}", form))
+    scene = scene_of_text(CART.replace("{motion}", form))
     again = scene_from_text(scene_to_text(scene))
     assert again.joint("rail").motion == scene.joint("rail").motion == FORMS[form]
 
 
 def test_a_number_in_an_older_text_is_a_constant_rate():
-    data = json.loads(scene_to_text(loaded(CART.replace("{motion}", "{ rate = 0.3 }"))))
+    data = json.loads(scene_to_text(scene_of_text(CART.replace("{motion}", "{ rate = 0.3 }"))))
     for rate in (0.3, -2, 0.0):
         data["joints"]["rail"]["motion"] = rate
         assert scene_from_text(json.dumps(data)).joint("rail").motion == ephs.PolynomialMotion((float(rate),))
@@ -241,7 +233,7 @@ def test_a_number_in_an_older_text_is_a_constant_rate():
 
 @pytest.mark.parametrize("law", [{"coefficients": [0.3], "phase": 0.0}, {"slope": 1.0}, {"times": [0.0]}])
 def test_a_law_that_no_class_has_is_refused(law):
-    data = json.loads(scene_to_text(loaded(CART.replace("{motion}", "{ rate = 0.3 }"))))
+    data = json.loads(scene_to_text(scene_of_text(CART.replace("{motion}", "{ rate = 0.3 }"))))
     assert scene_from_text(json.dumps(data)).joint("rail").motion == ephs.PolynomialMotion((0.3,))
     data["joints"]["rail"]["motion"] = law
     with pytest.raises((KeyError, TypeError)):
@@ -250,7 +242,7 @@ def test_a_law_that_no_class_has_is_refused(law):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_path_changes_one_number_of_a_law(form):
-    scene = loaded(CART.replace("{motion}", form))
+    scene = scene_of_text(CART.replace("{motion}", form))
     numbers = dict(FORMS[form].numbers)
     for key in ("rate", "amplitude", "frequency", "phase"):
         values = {f"joints.rail.motion.{key}": 0.7}
@@ -265,29 +257,10 @@ def test_a_path_changes_one_number_of_a_law(form):
 
 def test_numbers_of_a_law_are_varied():
     form = "{ amplitude = 0.1, frequency = 0.8, phase = 1.5707963267948966 }"  # it begins at rest
-    scene, other = (loaded(CART.replace("{motion}", form.replace("0.1", of))) for of in ("0.1", "0.2"))
+    scene, other = (scene_of_text(CART.replace("{motion}", form.replace("0.1", of))) for of in ("0.1", "0.2"))
     table = ephs.sweep(scene, {"joints.rail.motion.amplitude": [0.1, 0.2]}, 0.3, outputs=["joints.pivot.coordinate"])
     wanted = ephs.simulate(other, 0.3).joint("pivot").coordinate[-1, 0]
     assert table["joints.pivot.coordinate"].values.ravel()[-1] == pytest.approx(wanted, abs=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("motion", "key", "parts"),
-    [
-        ("{}", "motion", ("an empty table", "give the keys of one form")),
-        ("{ rate = 1.0, amplitude = 2.0 }", "motion", ("amplitude, rate", "one form")),
-        ("{ amplitude = 2.0 }", "motion", ("amplitude", "amplitude and frequency")),
-        ("{ times = [0.0, 1.0], displacements = [0.0] }", "motion.displacements", ("2 numbers",)),
-        ("{ times = [1.0, 0.0], displacements = [0.0, 1.0] }", "motion.times", ("ascending times",)),
-        ("{ times = [1.0], displacements = [0.0] }", "motion.times", ("2 or more",)),
-        ("{ polynomial = [] }", "motion.polynomial", ()),
-    ],
-)
-def test_bad_motions_name_the_key(motion, key, parts):
-    with pytest.raises(ephs.SceneError) as caught:
-        loaded(CART.replace("{motion}", motion))
-    assert f"joints.rail.{key}" in str(caught.value)
-    assert all(part in str(caught.value) for part in parts)
 
 
 @pytest.mark.parametrize(
@@ -300,7 +273,7 @@ def test_bad_motions_name_the_key(motion, key, parts):
     ],
 )
 def test_functions_of_a_state_refuse_it(use):
-    scene = loaded(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8 }"))
+    scene = scene_of_text(CART.replace("{motion}", "{ amplitude = 0.1, frequency = 0.8 }"))
     with pytest.raises((ephs.OptionError, ephs.SimulationError), match=r"motion|prescribed"):
         use(scene)
 

@@ -19,6 +19,7 @@ from ephs.mechanics.methods.semi import ARRAYS, SCHEME
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.methods.collocation import radau as coefficients
 from ephs.solve.running.control import Control, Tolerance
+from tests.mechanics.embedded import embedded_radau
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.numerics import largest
@@ -206,23 +207,13 @@ def test_the_estimate_of_radau_falls_with_the_power_that_it_says():
 @pytest.mark.parametrize(("rtol", "count"), [(1e-2, 3), (1e-6, 5), (1e-9, 7)])
 @pytest.mark.parametrize("h", [0.2, 0.5])
 def test_the_estimate_of_radau_is_the_filtered_defect_of_the_embedded_method(h, rtol, count):
-    """(I − h γ A)⁻¹ h (γ f(y⁰) + Σ dᵢ f(Yᵢ)), where γ and d integrate polynomials up to the number of stages."""
     control = Control(Tolerance(rtol, {}), Tolerance(rtol, {}), None, 0.0, np.inf, None)
     problem = problem_of_system(LINKED, START | {"ke2.p": -1.1})
     method, _ = METHODS["radau"].make(Setting(problem, 0.0, control, {}))
     assert not any(method.counts.values())
     attempt = method.step(method.start(0.0, h), h)
     matrix, y = np.array([[0.0, 1.0 / MASS], [-0.5 * SPRING, 0.0]]), np.array(list(START.values()))
-    scheme = coefficients(count)
-    a, nodes = scheme.coefficients, scheme.nodes
-    whole = np.eye(2 * count) - h * np.kron(a, matrix)
-    stages = np.linalg.solve(whole, np.tile(matrix @ y, count)).reshape(count, 2)
-    values = np.linalg.eigvals(a)
-    gamma = float(np.real(values[np.abs(values.imag) < 1e-9]).item())
-    right = 1.0 / np.arange(1.0, count + 1.0) - gamma * np.eye(count)[0]
-    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, right) - a[-1]
-    found = np.linalg.solve(np.eye(2) - h * gamma * matrix, h * (gamma * matrix @ y + weights @ stages))
-    end = y + h * a[-1] @ stages
+    found, end = embedded_radau(count, matrix, y, h)
     expected = np.abs(found) / (rtol + rtol * np.maximum(np.abs(y), np.abs(end)))
     assert attempt.error == pytest.approx(expected.max(), rel=1e-4, abs=1e-7)
 

@@ -12,6 +12,7 @@ from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamily, difference
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.stage.errors import StageError
 from ephs.semantics.systems.system import System
 from ephs.solve.methods.own import Method
 from ephs.solve.posing.errors import OptionError, failing_at, nearest_of
@@ -142,7 +143,7 @@ def sensitivity(
     Raises
     ------
     OptionError
-        The method has no tangent, or a path does not exist.
+        The method has no tangent, a path does not exist, or derivatives are too long to be compiled.
     SimulationError
         The run failed.
     """
@@ -156,8 +157,14 @@ def sensitivity(
     grid = simulate(model, until, **run, **control).t
     if times is not None and not (np.all(np.diff(times) > 0.0) and grid[0] <= times.min() and times.max() <= grid[-1]):
         raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
-    with failing_at(float(grid[0])):
-        return _along(family, name, grid, times, chosen=step is None)
+    try:
+        with failing_at(float(grid[0])):
+            return _along(family, name, grid, times, chosen=step is None)
+    except StageError as error:
+        if error.fault != "endless":
+            raise
+        raise OptionError("parameters", parameters, "those of a model whose derivatives are shorter; "
+                          "rods that expand have them at order 2, and ephs.sweep takes all") from error  # fmt: skip
 
 
 def _method(method: str | Method, step: float | None) -> str | Method:

@@ -61,22 +61,3 @@ def test_temperature_is_a_colour_of_elements_and_of_nodes_between_them():
     assert warm.ends[0].endswith(" K")
     beside = [warm.values[name] for name in ("rod-1", "rod-2")]
     np.testing.assert_allclose(warm.values["rod.1"], np.mean(beside, axis=0), rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("heat", "more", "key", "words"),
-    [
-        (
-            WARM + '\nheat = "steel"',
-            "[thermal.steel]\ncapacity = 1.0\ntemperature = 300.0\n",
-            "beams.rod.heat",
-            "thermal",
-        ),
-        (WARM, "[thermal.rod-1]\ncapacity = 1.0\ntemperature = 300.0\n", "thermal.rod-1", "the beam rod"),
-        ("thermal = { capacity = 0.0, temperature = 300.0 }", "", "beams.rod.thermal.capacity", "above 0"),
-    ],
-)
-def test_faults_name_the_key(heat, more, key, words):
-    with pytest.raises(ephs.SceneError) as caught:
-        rod(heat, more=more)
-    assert key in str(caught.value) and words in str(caught.value)

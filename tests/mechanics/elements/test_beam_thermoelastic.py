@@ -170,10 +170,3 @@ def test_explicit_and_implicit_steps_meet():
         ephs.simulate(scene, 0.15, method=method, rtol=1e-9).body("rod.4").position[-1] for method in ("rk87", "radau")
     ]
     np.testing.assert_allclose(*ends, atol=1e-7)
-
-
-@pytest.mark.parametrize("kind", ["kirchhoff", "string"])
-def test_rods_that_do_not_stretch_do_not_expand(kind):
-    with pytest.raises(ephs.SceneError) as caught:
-        rod(rod=kind)
-    assert "beams.rod.thermal.expansion" in str(caught.value) and "inextensible" in str(caught.value)

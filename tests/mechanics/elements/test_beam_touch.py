@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from tests.written import scene_of_text
 
 LOOP = """format = 1
@@ -62,23 +61,3 @@ def test_rods_meet_other_surfaces():
     floor = '[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\nposition = [0.0, 0.0, -0.1]\nstiffness = 1e4\n'
     scene = loop(SOFT, more=floor)
     assert sum("floor" in contact.surfaces for _, contact in scene.all_contacts()) == 9
-    assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
-
-
-@pytest.mark.parametrize(
-    ("surface", "key"),
-    [
-        ("surface = { stiffness = 1.0, radius = 0.0 }", "beams.rod.surface.radius"),
-        ('surface = { stiffness = 1.0, heat = "nowhere" }', "beams.rod.surface.heat"),
-        ("surface = { friction = 0.3 }", "surfaces.rod.0 and surfaces.rod.2"),
-    ],
-)
-def test_faults_name_the_key(surface, key):
-    with pytest.raises(ephs.SceneError, match=key):
-        loop(surface)
-
-
-def test_a_section_that_is_not_round_needs_a_radius():
-    text = LOOP.format(surface=SOFT, elements=8).replace("circle = 0.005", "rectangle = [0.01, 0.01]")
-    with pytest.raises(ephs.SceneError, match=r"beams\.rod\.surface\.radius"):
-        scene_of_text(text)

@@ -30,9 +30,10 @@ from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.testing import check_primitive
+from tests.methods import OF_SCENES
+from tests.numerics import EPS
 from tests.written import scene_of_text
 
-SCENES = [name for name, method in METHODS.items() if method.scenes]
 GAPS = (
     plane_sphere(0.3),
     plane_sphere(0.0),
@@ -198,7 +199,7 @@ def rebound(speed, loss):
     return brentq(lambda v: potential(-v) - potential(speed), 0.0, min(speed, (1.0 - 1e-9) / c))
 
 
-@pytest.mark.parametrize(("name", "exponent"), [*((name, 1.5) for name in SCENES), ("rk87", 1.0), ("natural", 1.0)])
+@pytest.mark.parametrize(("name", "exponent"), [*((name, 1.5) for name in OF_SCENES), ("rk87", 1.0), ("natural", 1.0)])
 def test_an_impact_loses_what_hunt_and_crossley_say(name, exponent):
     scene = scene_of(BALL, speed=-1.0, loss=0.4, exponent=exponent)
     fixed = METHODS[name].fixed
@@ -228,7 +229,7 @@ limit_loss = 0.4
 
 @pytest.mark.parametrize(
     ("name", "rate", "lower"),
-    [*((name, -1.0, -0.05) for name in SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)],
+    [*((name, -1.0, -0.05) for name in OF_SCENES), ("rk87", 1.0, "nan"), ("natural", 1.0, -0.05)],
 )
 def test_a_stop_is_an_impact(name, rate, lower):
     scene = scene_of(STOPPED, rate=rate, lower=lower, upper=0.05)
@@ -283,7 +284,7 @@ def test_the_energy_has_an_exact_slope(gap):
             continue
         touched += (before > 0.0) != (after > 0.0)
         along = energy.discrete_gradient({q_r: x}, v)
-        scale = before + after + np.abs(along) @ np.abs(v) + law.energy(1.0) * np.finfo(float).eps
+        scale = before + after + np.abs(along) @ np.abs(v) + law.energy(1.0) * EPS
         assert abs(after - before - along @ v) <= 1e-13 * scale
     assert touched >= 5
 
@@ -296,14 +297,6 @@ def test_forces_are_those_that_move_the_ball():
     assert contact.force[1:-1, 2] == pytest.approx(2.0 * (pushed + 9.81)[1:-1], abs=0.02 * contact.force.max())
     heat = np.concatenate([[0.0], np.cumsum(0.5 * (contact.heat[1:] + contact.heat[:-1]) * np.diff(times))])
     assert heat[-1] == pytest.approx(sol.heat[-1] - sol.heat[0], rel=1e-3)
-
-
-def test_contacts_survive_files():
-    for text, numbers in ((BALL, {"loss": 0.25}), (STOPPED, {"rate": 1.0, "lower": "nan", "upper": 0.5})):
-        scene = scene_of(text, **numbers)
-        again = scene_from_text(scene_to_text(scene))
-        assert scene_to_text(again) == scene_to_text(scene)
-        assert [c.law for _, c in again.all_contacts()] == [c.law for _, c in scene.all_contacts()]
 
 
 def test_contacts_of_older_result_files_have_the_same_laws_and_places():
@@ -347,10 +340,14 @@ shape = {{ plane = {{}} }}
 SHAPES = ("sphere = 0.1", "capsule = [0.05, 0.2]", "cylinder = [0.1, 0.1]", "box = [0.2, 0.1, 0.15]")
 
 
-@pytest.mark.parametrize("method", ["rk54", "radau", "auto"])
-@given(seed=st.integers(0, 2**20), shape=st.sampled_from(SHAPES), rtol=st.sampled_from([1e-2, 1e-3]))
-@settings(max_examples=8)
+@pytest.mark.parametrize("method", ["rk54", "rk87", "radau", "auto"])
+@given(seed=st.integers(0, 2**20), shape=st.sampled_from(SHAPES), rtol=st.sampled_from([1e-1, 3e-2, 1e-2, 1e-3]))
+@settings(max_examples=12)
 def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol):
+    """A coarse step over a whole bounce may miss more energy than the motion holds: it is refused, and tried shorter.
+
+    What is left is the energy of a motion by one tolerance, 2 rtol of it, in the mean of six directions.
+    """
     rng = np.random.default_rng(seed)
     rotation = rng.normal(size=4)
     rotation /= np.linalg.norm(rotation)
@@ -362,16 +359,9 @@ def test_what_is_thrown_keeps_both_laws(method, seed, shape, rtol):
     }  # fmt: skip
     scene = scene_of(THROWN, **numbers)
     sol = ephs.simulate(scene, 0.5, method=method, rtol=rtol, audit="off")
-    assert np.abs(sol.energy_error).max() <= 1e-11
+    assert np.abs(sol.energy_error).max() <= (1e-11 if rtol <= 1e-2 else 2.0 * np.sqrt(6.0) * rtol)
     assert sol.stats["least_production"] >= 0.0
     assert np.all(np.diff(sol.heat) >= 0.0)
-
-
-@pytest.mark.parametrize("limits", ["[0.5, 0.1]", "[0.1]", '["a", 1.0]', "[inf, 1.0]"])
-def test_limits_ascend(limits):
-    text = (HEAD + STOPPED).format(**USUAL, rate=1.0, lower=0.0, upper=1.0).replace("[0.0, 1.0]", limits)
-    with pytest.raises(ephs.SceneError, match="lower < upper"):
-        scene_of_text(text)
 
 
 PLATE = """
@@ -390,7 +380,7 @@ shape = { box = [2.0, 2.0, 0.001] }
 """
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if METHODS[name].adaptive])
+@pytest.mark.parametrize("name", [name for name in OF_SCENES if METHODS[name].adaptive])
 @pytest.mark.filterwarnings("ignore::ephs.CostWarning")
 def test_no_step_leaps_over_a_thin_plate(name, monkeypatch):
     scene = scene_of_text(HEAD.format(gravity=0.0) + PLATE)
@@ -402,38 +392,6 @@ def test_no_step_leaps_over_a_thin_plate(name, monkeypatch):
 def test_the_limit_is_half_the_way_through():
     longest = pace.longest_step(problem_of_scene(scene_of_text(HEAD.format(gravity=0.0) + PLATE)), 5, 1e-3, (0.0, 1.0))
     assert longest == pytest.approx(0.5 * 0.021 / 40.0, rel=0.1)
-
-
-PART = """
-format = 1
-name = "ball"
-
-[bodies.ball]
-mass = 1.0
-inertia = [0.004, 0.004, 0.004]
-position = [0.0, 0.0, 0.15]
-
-[thermal.skin]
-capacity = 50.0
-temperature = 293.15
-
-[surfaces.ball]
-body = "ball"
-shape = { sphere = 0.1 }
-stiffness = 1e4
-loss = 0.3
-heat = "skin"
-"""
-
-
-def test_the_heat_of_a_parts_surface_warms_the_node_of_the_part(tmp_path):
-    (tmp_path / "ball.toml").write_text(PART, encoding="utf-8")
-    whole = 'format = 1\n[surfaces.floor]\nbody = "ground"\nshape = { plane = {} }\n[parts.left]\nuse = "ball.toml"\n'
-    (tmp_path / "whole.toml").write_text(whole, encoding="utf-8")
-    sol = ephs.simulate(ephs.load(tmp_path / "whole.toml"), 0.2)
-    warmed = 50.0 * (sol.thermal("left.skin").temperature[-1] - 293.15)
-    assert sol.heat[-1] > 0.05
-    assert warmed == pytest.approx(sol.heat[-1], rel=1e-9)
 
 
 TURNING = """

@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
 import ephs
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.semantics.spaces import SE3
 from tests.mechanics.elements.test_beam import flight_is_lawful
 from tests.mechanics.linear.test_beam_statics import PRINCETON, along, elastica, princeton_force
 from tests.methods import OF_SCENES
-from tests.numerics import largest, seeds
+from tests.numerics import largest
 from tests.written import scene_of_text
 
 HEAD = 'format = 1\nname = "rods"\n[world]\ngravity = [0.0, 0.0, {gravity}]\n'
@@ -168,31 +166,3 @@ def test_a_rod_tells_its_strain_and_what_holds_its_pieces():
         assert np.linalg.norm(moment) == pytest.approx(np.linalg.norm(np.cross(arm, [0.3, 0.0, 2.0])), abs=1e-6)
     assert found.strain[..., :3] * np.array([0.8, 1.0, 2.0]) == pytest.approx(found.moment, abs=1e-9)
     assert not found.strain[..., 3:].any() and found.energy[-1].sum() > 0.1
-
-
-@settings(max_examples=10)
-@given(seeds)
-def test_scenes_with_rods_come_back_from_text(seed):
-    rng = np.random.default_rng(seed)
-    kind = ("kirchhoff", "string")[seed % 2]
-    more = STRUCK if kind == "kirchhoff" else ""
-    text = rod([(0.0, 0.0, 0.0), (1.0, *(0.3 * rng.standard_normal(2)))], 1 + seed % 5, kind, more=more)
-    scene = scene_of_text(text)
-    again = scene_from_text(scene_to_text(scene))
-    assert again.beams == scene.beams and scene_to_text(again) == scene_to_text(scene)
-
-
-@pytest.mark.parametrize(
-    ("kind", "more", "key"),
-    [
-        ("kirchhoff", "order = 4", "beams.rod.order"),
-        ("kirchhoff", "strain = [0.0, 0.0, 0.0, 0.1, 0.0, 0.0]", "beams.rod.strain"),
-        ("string", "strain = [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]", "beams.rod.strain"),
-        ("string", "damping = 0.1", "beams.rod.damping"),
-        ("thread", "", "beams.rod.rod"),
-        ("reissner", "", "beams.rod.section"),
-    ],
-)
-def test_faults_name_the_key(kind, more, key):
-    with pytest.raises(ephs.SceneError, match=key):
-        scene_of_text(rod(along(1.0), 4, kind, more=more))

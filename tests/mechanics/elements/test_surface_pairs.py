@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.impacts import stepping
 from ephs.mechanics.impacts.stepping import CLOSED
-from ephs.mechanics.shapes.pairs import PAIRS, touches
+from ephs.mechanics.shapes.pairs import PAIRS
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.mechanics.touching_scenes import CORNERS, least_gap
 from tests.written import scene_of_text
 
-CORNERS = np.array([[-0.08, -0.06, -0.05], [0.09, -0.05, -0.05], [0.0, 0.1, -0.05], [0.0, 0.0, 0.11]])
 DRAWN = {
     "sphere": lambda rng: float(rng.uniform(0.05, 0.15)),
     "capsule": lambda rng: rng.uniform([0.03, 0.05], [0.1, 0.3]).tolist(),
@@ -75,17 +75,10 @@ def body_of(rng, name, pose, twist):
     )  # fmt: skip
 
 
-def distance_of(kinds, sizes):
-    """The smallest gap between two shapes, a function of both poses (7,)."""
-    (one, other), here = ({kind: size} for kind, size in zip(kinds, sizes, strict=True)), SE3.identity()
-    points, swapped = touches(one, here, other, here)
-    ends = [(SE3.inverse(near), far, gap.distance) for near, far, gap in points]
-
-    def distance(first, second):
-        relative = SE3.compose(SE3.inverse(second), first) if swapped else SE3.compose(SE3.inverse(first), second)
-        return min(float(gap(SE3.compose(near, SE3.compose(relative, far)))) for near, far, gap in ends)
-
-    return distance
+def distance(kinds, sizes, poses):
+    """The smallest gap between two shapes at poses (7,)."""
+    (one, other), (first, second) = ({kind: size} for kind, size in zip(kinds, sizes, strict=True)), poses
+    return least_gap(one, first, other, second)
 
 
 def flying(rng, pair, before):
@@ -97,11 +90,11 @@ def flying(rng, pair, before):
     way, aside, resting = unit(rng.normal(size=3)), 0.02 * rng.normal(size=3), "plane" in pair
     if resting:
         turns[0], way = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    near, far, distance = 0.0, FAR, distance_of(pair, sizes)
+    near, far = 0.0, FAR
     for _ in range(30):  # to 1e-9 m
         middle = 0.5 * (near + far)
         ends = [np.concatenate([turns[0], np.zeros(3)]), np.concatenate([turns[1], aside + middle * way])]
-        near, far = (near, middle) if distance(*ends) > 0.0 else (middle, far)
+        near, far = (near, middle) if distance(pair, sizes, ends) > 0.0 else (middle, far)
     along = rng.normal(size=3) * (1.0 - way if resting else 1.0)
     speeds = [along + way, along - rng.uniform(0.5, 1.0) * way]
     twists = [np.concatenate([rng.normal(size=3), speed]) for speed in speeds]
@@ -184,13 +177,13 @@ def test_those_drawn_meet(pair):
     deep = []
     for seed in range(8):
         sizes, poses, twists = flying(np.random.default_rng(seed), pair, 1.5 * STEP)
-        distance, ends = distance_of(pair, sizes), []
+        ends = []
         for time in (0.0, 4.0 * STEP):
             at = [
                 SE3.compose(moved(pose, twist, time), SE3.exp(np.concatenate([time * twist[:3], np.zeros(3)])))
                 for pose, twist in zip(poses, twists, strict=True)
             ]
-            ends.append(distance(*at))
+            ends.append(distance(pair, sizes, at))
         deep.append(ends[0] > 0.0 > ends[1])
     assert all(deep)
 

@@ -134,20 +134,6 @@ def test_a_stop_and_a_contact_are_one_island():
         assert sol.heat[-1] == pytest.approx(1.0 - e, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("limits", "keys", "fault"),
-    [
-        ([-0.1, 0.1], "limit_restitution = 1.5", "not above 1"),
-        ([-0.1, 0.1], "limit_restitution = 0.5\nlimit_loss = 0.2", "limit_restitution and limit_loss"),
-        ([-0.1, 0.1], "limit_restitution = 0.5\nlimit_stiffness = 1e4", "limit_restitution and limit_stiffness"),
-        ([0.25, 0.5], "limit_restitution = 0.5", r"joints\.slide\.limits: found a start 0\.25 beyond them"),
-    ],
-)
-def test_what_is_wrong_of_hard_stops_is_named(limits, keys, fault):
-    with pytest.raises(ephs.SceneError, match=fault):
-        sliding(f"limits = {limits}\n{keys}")
-
-
 def test_a_scene_with_hard_stops_is_read_as_it_was_written(tmp_path):
     scene = sliding("limits = [-0.1, 0.1]\nlimit_restitution = 0.5", rate=1.0)
     sol = run(scene, 0.1)

@@ -12,10 +12,10 @@ from ephs.mechanics.elements import components
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.spaces import SE3
-from ephs.solve.equations.instant import instant
 from ephs.testing import mechanisms
 from tests.mechanics.mechanisms import on_ground
 from tests.mechanics.methods.systems import renamed
+from tests.mechanics.tree.general import held_to_the_general_form
 from tests.numerics import EPS, largest, seeds
 from tests.scenes import shipped
 
@@ -92,52 +92,12 @@ def test_what_joint_coordinates_have_no_place_for_is_refused_by_name():
 KINDS = ("revolute", "prismatic", "screw", "cylindrical", "spherical", "planar", "fixed", "free")
 
 
-def accelerations(equations, twist_of):
-    """ṙ of the tree's joints from twists and their rates: the derivative of B r = Ad u₂ − Ad I⁻¹ Ad u₁, by hand."""
-    out = []
-    for edge in equations.reduced.edges[: equations.reduced.links]:
-        ends = [twist_of(body) for body in (edge.body1, edge.body2)]
-        carried = [SE3.adjoint(SE3.inverse(offset)) for offset in (edge.offset1, edge.offset2)]
-        back = SE3.adjoint(SE3.inverse(edge.pair.include(edge.coordinate)))
-        first = [back @ carried[0] @ x for x in ends[0]]
-        second = [carried[1] @ x for x in ends[1]]
-        r = np.linalg.pinv(edge.pair.basis) @ (second[0] - first[0])
-        turned = SE3.ad(edge.pair.basis @ r) @ first[0]
-        out.append(np.linalg.pinv(edge.pair.basis) @ (second[1] - first[1] + turned))
-    return np.concatenate(out)
-
-
 @settings(max_examples=30)
 @given(mechanisms(max_bodies=3, kinds=KINDS), st.sampled_from(["x", "pe"]), seeds)
 def test_rates_in_joint_coordinates_are_those_of_the_general_form(scene, word, seed):
     problem, _ = renamed(scene, word, seed)
     equations = ReducedEquations(problem, 0.0)
-    state = equations.start(0.0)
-    found = equations.rates(0.0, state.q, equations.vector(state))
-    d, whole = problem.descriptor, dict(problem.initial) | dict(equations.states(state))
-    general = instant(d, problem.reference, d.pack(whole), problem.inputs(0.0, whole)).rates
-    reduced = equations.reduced
-    inverse = [np.linalg.inv(inertia) for inertia in reduced.tables.inertia]
-    links = {id(link): i for i, link in enumerate(reduced.places)}
-    order = [links[id(link)] for link in sorted(reduced.places, key=lambda link: link.momentum.at)]
-
-    def twist_of(body):
-        if body < 0:
-            return np.zeros(6), np.zeros(6)
-        number = order[body]
-        path = reduced.places[number].momentum.path
-        return inverse[number] @ whole[path], inverse[number] @ general[path]
-
-    expected = accelerations(equations, twist_of)
-    mass = equations.mass(state.q, state.r)
-    size = (np.linalg.cond(mass) if mass.size else 1.0) * (1.0 + largest(expected, initial=0.0))
-    at = slice(equations.nv, equations.nv + equations.n)
-    assert largest(found[at] - expected, initial=0.0) <= 1e-10 * size
-    heats = found[at.stop : at.stop + equations.ns]
-    warmth = equations.heats.temperatures(state.heats)
-    entropies = np.array([general[path][0] for path in reduced.entropies])
-    made = 1.0 + largest(entropies, initial=0.0)
-    assert largest(heats / warmth - entropies, initial=0.0) <= 1e-10 * made
+    held_to_the_general_form(equations, problem, equations.start(0.0))
 
 
 @pytest.mark.parametrize("method", ["natural", "natural4"])

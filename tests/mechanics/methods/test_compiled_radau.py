@@ -1,7 +1,5 @@
 """Steps of radau in compiled calls: those taken one by one, lawful, and no more of them than its errors ask for."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,10 +12,9 @@ from ephs.mechanics.tree.equations.tangent import Linearised
 from ephs.solve.running.control import Control, Tolerance
 from tests.mechanics.ball import BALL
 from tests.numerics import largest
-from tests.scenes import equations_of
+from tests.scenes import equations_of, shipped
 from tests.written import scene_of_text
 
-CHAIN = Path(__file__).resolve().parents[3] / "scenes/chain.toml"
 SCENE = """
 format = 1
 name = "stick"
@@ -106,7 +103,7 @@ def test_compiled_chosen_steps_are_on_average_no_more_than_those_taken_one_by_on
 @pytest.mark.parametrize("rtol", [1e-2, 1e-5, 1e-9])  # three, five and seven stages
 def test_compiled_steps_of_what_is_smooth_are_those_taken_one_by_one(rtol, monkeypatch):
     options = {"rtol": rtol, "atol": rtol, "save_at": [0.0, 1.0], **ASKED}
-    model = ephs.load(CHAIN)
+    model = shipped("chain")
     found = ephs.simulate(model, 1.0, **options)
     stepwise(monkeypatch)
     oracle = ephs.simulate(model, 1.0, **options)

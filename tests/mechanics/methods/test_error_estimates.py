@@ -11,6 +11,7 @@ from ephs.mechanics.methods import tableaux
 from ephs.mechanics.methods.registry import METHODS, Setting
 from ephs.solve.methods.collocation import radau
 from ephs.solve.running.control import Control, Tolerance
+from tests.mechanics.embedded import embedded_radau
 from tests.mechanics.plain import uncorrected
 from tests.mechanics.torsion import torsion
 from tests.numerics import largest
@@ -87,23 +88,11 @@ def test_of_order_eight_two_estimates_are_blended(equations, h):
 @pytest.mark.parametrize("stages", [3, 5, 7])
 @pytest.mark.parametrize("h", [0.02, 0.1, 0.3, 1.0])  # with three far below what is allowed, half above it, far above
 def test_of_radau_it_is_the_filtered_difference_to_the_embedded_method(equations, h, stages, monkeypatch):
-    """Hairer and Wanner, IV.8: (γ₀/h − A)⁻¹ (f(y⁰) + Σ eᵢ zᵢ), again from there where it is too large.
-
-    The embedded method has the weight 1/γ₀ of f(y⁰), and integrates polynomials up to the number of stages.
-    """
+    """Again from there where it is too large."""
     monkeypatch.setattr(implicit, "scheme_of", lambda *_: radau(stages))
-    c, nodes = radau(stages).coefficients, radau(stages).nodes
-    z = np.linalg.solve(np.eye(2 * stages) - h * np.kron(c, A), h * np.kron(c @ np.ones(stages), A @ Y))
-    values = np.linalg.eigvals(c)
-    gamma = 1.0 / float(np.real(values[np.argmin(np.abs(values.imag))]))
-    right = 1.0 / np.arange(1.0, stages + 1.0) - np.eye(stages)[0] / gamma
-    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, right) - c[-1]
-    embedded = gamma * weights @ np.linalg.solve(c, z.reshape(stages, 2)) / h
-    matrix = gamma / h * np.eye(2) - A
-    found = np.linalg.solve(matrix, A @ Y + embedded)
-    end = (Y + z[-2:])[1]
+    found, (_, end) = embedded_radau(stages, A, Y, h)
     if largest(relative(found, end)) > 1.0:
-        found = np.linalg.solve(matrix, A @ (Y + found) + embedded)
+        found, _ = embedded_radau(stages, A, Y, h, Y + found)
     attempt = stepper(equations, "radau").step(equations.start(0.0), h)
     assert attempt.error == pytest.approx(largest(relative(found, end)), rel=1e-3, abs=1e-4)
     assert attempt.end.r[0] == pytest.approx(end, abs=1e-7)

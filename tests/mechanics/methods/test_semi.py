@@ -1,7 +1,6 @@
 """Semi-implicit steps: their coefficients, their stages, and what contact loses by them."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +16,11 @@ from ephs.testing.mechanisms import mechanisms
 from tests.mechanics.ball import BALL
 from tests.mechanics.plain import uncorrected
 from tests.numerics import largest, seeds
-from tests.scenes import equations_of, shipped
+from tests.scenes import ROOT, equations_of, shipped
 from tests.written import scene_of_text
 
 EXPLICIT, LAST = ARRAYS["a"][1:5, 1:], ARRAYS["a"][5, 1:]
 IMPLICIT = SCHEME[1:, 1:]
-SCENES = Path(ephs.__file__).parents[1] / "scenes"
 
 
 def test_coefficients_are_of_order_three():
@@ -186,7 +184,7 @@ def test_losses_act_on_the_rates_that_a_stage_reaches(scene, seed):
 def closed(request):
     """A mechanism with loops and friction, of which one has a crank whose motion is prescribed."""
     name, _, led = request.param.partition(", ")
-    text = (SCENES / f"{name}.toml").read_text(encoding="utf-8")
+    text = (ROOT / f"scenes/{name}.toml").read_text(encoding="utf-8")
     return scene_of_text(text.replace("drive = 0.06", "motion = { rate = 10.0 }") if led else text)
 
 
@@ -247,26 +245,9 @@ def test_so_they_do_under_inputs_that_are_functions_of_time_and_state():
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 2.7)
 
 
-@pytest.mark.parametrize("name", ["four-bar", "hot-brake", "biped"])
-@pytest.mark.parametrize("how", [{"step": 2e-3}, {"rtol": 1e-4, "atol": 1e-5}])
-def test_single_steps_are_those_of_compiled_runs(name, how):
-    scene, times = shipped(name), np.linspace(0.0, 0.1, 8)
-    looked_at = {"events": [ephs.Event(lambda t, state: 1.0 + t, "never", stop=False)]}
-    whole, single = (
-        ephs.simulate(scene, 0.1, method="semi", save_at=times, audit="off", **how, **more)
-        for more in ({}, looked_at)
-    )  # fmt: skip
-    assert whole.stats["steps"] == single.stats["steps"]
-    for path in whole.states:
-        size = largest(whole[path]) + 1.0
-        assert largest(whole[path] - single[path]) <= 1e-10 * size
-    assert largest(whole.heat - single.heat) <= 1e-10 * (1.0 + largest(whole.heat))
-    assert max(largest(sol.energy_error) for sol in (whole, single)) <= 1e-11
-
-
 def test_a_stiff_brake_does_not_shorten_steps_with_a_loop_or_an_input_that_changes():
     """Losses a thousand times as fast as steps, whose stages are one by one."""
-    text = (SCENES / "four-bar.toml").read_text(encoding="utf-8")
+    text = (ROOT / "scenes/four-bar.toml").read_text(encoding="utf-8")
     scene = scene_of_text(re.sub(r"friction = [0-9.]+", "friction = 1e4", text))
     inputs = {"joints.main": lambda t, state: 4.0 + t}
     found = ephs.simulate(scene, 0.5, method="semi", step=0.02, inputs=inputs, audit="off")

@@ -12,7 +12,6 @@ import ephs
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 
 MASS, GRAVITY, UNTIL = 2.0, 9.81, 0.02
 ROD = f"""
@@ -159,20 +158,6 @@ def test_an_adiabatic_gas_keeps_its_entropy(tmp_path):
     assert np.abs(rod + gas + AIR * (volume - VOLUME)).max() < 1e-11
 
 
-@pytest.mark.parametrize("kind", CASES)
-def test_units_and_text_of_cylinders(tmp_path, kind):
-    scene = loaded(tmp_path, CASES[kind][0])
-    if kind == "oil":
-        lift = scene.cylinders["lift"].changed(pressure=list(PRESSURE))
-        scene = replace(scene, cylinders={"lift": lift})
-    exact = ephs.simulate(scene, UNTIL, method="rk87", rtol=1e-10)
-    same = ephs.simulate(scene_from_text(scene_to_text(scene)), UNTIL, method="rk87", rtol=1e-10)
-    assert np.array_equal(same.joint("rail").rate, exact.joint("rail").rate)
-    units = 2.0**12, 2.0**-11, 2.0**10  # far enough from metres, kilograms and seconds to run in units of its own
-    far = ephs.simulate(rescaled(scene, *units), UNTIL * units[2], method="rk87", rtol=1e-10)
-    assert np.isclose(far.joint("rail").rate[-1, 0] / units[0] * units[2], exact.joint("rail").rate[-1, 0], rtol=1e-8)
-
-
 def test_files_with_rows_of_numbers_as_arrays_are_read(tmp_path):
     scene = loaded(tmp_path, CYLINDER + ACTUATOR)
     data = json.loads(scene_to_text(scene))
@@ -230,26 +215,6 @@ def test_actuators_of_one_joint_and_forces_on_it_add_up(tmp_path):
     inputs = {("actuators.push", "actuators.pull"): lambda t, state: [1.0, 1.0], "joints.rail": 4.0}
     run = ephs.simulate(scene, UNTIL, inputs=inputs, method="rk87")
     assert np.isclose(run.joint("rail").rate[-1, 0], (19.0 / MASS - GRAVITY) * UNTIL, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("text", "old", "new", "words"),
-    [
-        (CYLINDER, '"rail"', '"rial"', 'cylinders.lift.joint.*did you mean "rail"'),
-        (CYLINDER, f"area = {list(AREA)}", "area = 1.0", "cylinders.lift.area"),
-        (CYLINDER, f"bulk = {BULK}", "bulk = 0.0", "cylinders.lift.bulk"),
-        (CYLINDER, 'heat = "oil"', 'heat = "oli"', "cylinders.lift.heat"),
-        (STRUT, "temperature = 300.0", "gamma = 1.0", "gas_springs.strut.gamma"),
-        (STRUT, f"volume = {VOLUME}", "volume = -1.0", "gas_springs.strut.volume"),
-        (ACTUATOR, "limits = [-1.0, 1.5]", "limits = [1.0, -1.5]", "actuators.push.limits"),
-        (ACTUATOR, "ratio = 20.0", "ratio = [1.0, 2.0]", "actuators.push.ratio.*1 numbers"),
-        (ACTUATOR, '["rail"]', '["rial"]', r"actuators.push.joints\[0\].*did you mean"),
-    ],
-)
-def test_what_does_not_fit_is_told_by_its_key(tmp_path, text, old, new, words):
-    assert old in text
-    with pytest.raises(ephs.SceneError, match=words):
-        loaded(tmp_path, text.replace(old, new, 1))
 
 
 def test_an_equilibrium_of_attachments_with_states_is_refused(tmp_path):

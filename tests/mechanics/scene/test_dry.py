@@ -111,27 +111,6 @@ def test_its_numbers_are_parameters():
     assert found["joints.rail.coordinate"][-1, 0, 0] == pytest.approx((apart[0] - apart[1]) / 2e-4, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ("dry = { coulomb = -1.0 }", r"joints.rail.dry.coulomb"),
-        (
-            "dry = { coulomb = 2.0, static = 1.0 }",
-            "dry.static: found 1.0, expected a number ≥ coulomb = 2",
-        ),
-        ("dry = { coulomb = 2.0, slip = 0.0 }", r"joints.rail.dry.slip"),
-        ("dry = { coulom = 2.0 }", r"coulomb"),
-        (
-            "dry = { coulomb = 2.0 }\nmotion = { rate = 1.0 }",
-            r"one degree of freedom and no prescribed motion",
-        ),
-    ],
-)
-def test_bad_input_is_named(text, found):
-    with pytest.raises(ephs.SceneError, match=found):
-        block(text)
-
-
 def test_joints_of_several_freedoms_are_refused():
     with pytest.raises(ephs.StructureError, match="dry friction of a joint with 3 degrees of freedom"):
         joint("spherical", dry=Dry(1.0))

@@ -3,7 +3,6 @@
 import json
 from dataclasses import fields, replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +17,9 @@ from ephs.mechanics.scene.model import ELEMENTS, KINDS, Joint, World
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import SECTIONS
 from ephs.mechanics.scene.soundness import check_scene
+from tests.scenes import SCENES
 
 PLAIN = {section: kind for section, kind in ELEMENTS.items() if section not in KINDS}
-SCENES = sorted((Path(__file__).parents[3] / "scenes").glob("*.toml"))
 BESIDE = {Joint: {"coordinate", "limits"}}
 EXPONENTS = st.tuples(*[st.integers(-30, 30)] * 3)
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
+from tests.numerics import EPS
 from tests.written import scene_of_text
 
 TENDON = """<mujoco><option gravity="0 0 0"/><worldbody>
@@ -44,7 +45,7 @@ def test_a_tendon_over_joints_is_stretched_by_what_they_moved(load):
     moved, plain = ephs.dynamics(scene.with_state({"ja": 1.0})), ephs.dynamics(scene)
     for model, state in ((moved, moved.state0), (plain, plain.state({"ja": 1.0}))):
         found = model.acceleration(state)
-        assert (found["ja"][0], found["jb"][0]) == pytest.approx((-5.0, 5.0), rel=8 * 4 * np.finfo(float).eps)
+        assert (found["ja"][0], found["jb"][0]) == pytest.approx((-5.0, 5.0), rel=8 * 4 * EPS)
     (run,) = (ephs.simulate(scene.with_state({"ja": 1.0}), 0.4, method="rk87", step=0.01),)
     rest = ephs.simulate(scene.at(run, 0.2), 0.4, t0=0.2, method="rk87", step=0.01)
     for sol in (run, rest):  # the difference of the angles is cos(√10 t), their sum stays
@@ -59,7 +60,7 @@ def test_a_tendon_over_joints_is_stretched_by_what_they_moved(load):
 def test_a_tied_joint_follows_and_the_given_one_is_kept(load, text, suffix, offset):
     """jb = offset − ja."""
     scene = load(text, suffix)
-    near = 8 * np.finfo(float).eps
+    near = 8 * EPS
     there = scene.with_state({"ja": 0.5}, {"ja": 2.0})
     assert there.joint("ja").coordinate[0] == 0.5
     assert there.joint("jb").coordinate[0] == pytest.approx(offset - 0.5, abs=near)
@@ -110,8 +111,8 @@ def test_gears_keep_their_offsets_whatever_is_given(ratios, names):
     scene = scene_of_text(text)
     there = scene.with_state(dict.fromkeys(sorted(names), 0.4))
     x = {name: float(j.coordinate[0]) for name, j in there.all_joints()}
-    assert all(abs(x[name] - 0.4) <= 8 * np.finfo(float).eps for name in names)
-    size = 8 * 16 * np.finfo(float).eps * sum(map(abs, x.values()))  # of a pseudo-inverse of numbers up to 4
+    assert all(abs(x[name] - 0.4) <= 8 * EPS for name in names)
+    size = 8 * 16 * EPS * sum(map(abs, x.values()))  # of a pseudo-inverse of numbers up to 4
     assert abs(x["j0"] - a * x["j1"] - b * x["j2"]) <= 4.0 * size
     assert abs(x["j2"] - c * x["j3"]) <= 4.0 * size
     assert abs(there.gears["belt"].stretch - (0.1 + x["j3"] - a * x["j0"])) <= 4.0 * size

@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 import ephs
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 from tests.written import scene_of_text
 
 MASS, TURNING, RATIO, LOSS, GRAVITY = 5.0, 0.02, 10.0, 0.05, 9.81
@@ -82,27 +79,6 @@ def test_a_stiff_belt_moves_as_a_gear_does(hoist):
     assert np.isclose((ends[1] - ends[0]) / (ends[2] - ends[0]), 1e5 / 1e3, rtol=1e-2)
 
 
-def test_units_text_and_parameters_of_gears(hoist):
-    other = scene_from_text(scene_to_text(hoist))
-    sol, same = (ephs.simulate(one, 0.2, method="rk87") for one in (hoist, other))
-    assert np.array_equal(sol.joint("rail").rate, same.joint("rail").rate)
-    units = 2.0**4, 2.0**-3, 2.0**5
-    found = ephs.simulate(rescaled(hoist, *units), 0.2 * units[2], method="rk87", rtol=1e-11, atol=1e-13)
-    exact = ephs.simulate(hoist, 0.2, method="rk87", rtol=1e-11, atol=1e-13)
-    assert np.isclose(found.joint("rail").rate[-1, 0] / units[0] * units[2], exact.joint("rail").rate[-1, 0], rtol=1e-9)
-    paths = ["gears.rope.ratio", "gears.rope.friction"]
-    near = []
-    for path, value in zip(paths, (RATIO, LOSS), strict=True):
-        step = 1e-4 * value
-        ends = [
-            ephs.simulate(varied(hoist, {path: value + by}), 0.2, method="rk87", rtol=1e-12, atol=1e-13)
-            for by in (-step, step)
-        ]
-        near.append((ends[1].joint("rail").rate[-1, 0] - ends[0].joint("rail").rate[-1, 0]) / (2.0 * step))
-    run = ephs.sensitivity(hoist, paths, 0.2, method="rk87", rtol=1e-11, atol=1e-13)
-    assert np.allclose(run["joints.rail.rate"][-1, 0], near, rtol=1e-6)
-
-
 def test_a_differential_divides_its_rate():
     text = HOIST.replace(
         'joints = ["shaft", "rail"]\nratio = 10.0', 'joints = ["shaft", "rail", "other"]\nratio = [5.0, 5.0]'
@@ -122,20 +98,3 @@ axis = [0.0, 0.0, 1.0]
     one, two, drum = (sol.joint(name).rate[:, 0] for name in ("rail", "other", "shaft"))
     assert np.allclose(drum, 5.0 * (one + two), rtol=0.0, atol=1e-12)
     assert np.allclose(one, two, rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('["shaft", "rail"]', '["shaft", "rial"]', r'gears.rope.joints\[1\].*did you mean "rail"'),
-        ('["shaft", "rail"]', '["shaft", "shaft"]', "different joints"),
-        ("ratio = 10.0", "ratio = [1.0, 2.0]", "gears.rope.ratio.*1 numbers"),
-        ('type = "prismatic"', 'type = "cylindrical"', "gears.rope.joints.*one degree of freedom"),
-        ('heat = "bearing"', 'heat = "baring"', "gears.rope.heat"),
-        ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 1.0, 0.0]\nrate = 1.0", "gears.rope.*a rate of shaft of 0"),
-    ],
-)
-def test_what_does_not_fit_is_told_by_its_key(old, new, words):
-    assert old in HOIST
-    with pytest.raises(ephs.SceneError, match=words):
-        scene_of_text(HOIST.replace(old, new))

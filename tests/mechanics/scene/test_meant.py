@@ -1,7 +1,6 @@
 """A mechanism that is movable but for rounding is movable, by every method and for checks; in between it is refused."""
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,10 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.meant import as_meant
 from ephs.mechanics.scene.own_units import mobility_of
+from tests.methods import OF_SCENES
+from tests.scenes import SCENES
 
-EACH = pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.scenes])
+EACH = pytest.mark.parametrize("name", OF_SCENES)
 
 
 def read(delta, tmp_path, size=1.0, pins=PINS):
@@ -97,6 +98,6 @@ def test_a_four_bar_near_alignment_is_left_as_it_is(off, tmp_path):
 
 
 def test_scenes_that_move_exactly_are_left_as_they_are():
-    for file in sorted((Path(__file__).parents[3] / "scenes").glob("*.toml")):
+    for file in SCENES:
         scene = ephs.load(file)
         assert as_meant(scene) == (scene, "", [])

@@ -1,8 +1,5 @@
 """Placement, joint states and adjustment, as laws over generated mechanisms."""
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -13,11 +10,11 @@ from ephs.mechanics.scene import SceneError
 from ephs.mechanics.scene.geometry import coupling, coupling_of, joint_types
 from ephs.mechanics.scene.load import load
 from ephs.semantics.spaces import SE3
+from tests.numerics import seeds
+from tests.scenes import ROOT
+from tests.written import scene_of_text
 
-ROOT = Path(__file__).parents[3]
 FOUR_BAR = ROOT / "scenes" / "four-bar.toml"
-
-seeds = st.integers(0, 2**32 - 1)
 
 
 def table(name, values):
@@ -55,13 +52,6 @@ def random_chain(rng, kinds, given_bodies=()):
     return text
 
 
-def read(text, **options):
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scene.toml"
-        path.write_text(text)
-        return load(path, **options)
-
-
 def residuals(scene):
     """The defects of every joint: of poses, and of twists by differentiating the poses along the motion."""
     bodies = dict(scene.all_bodies())
@@ -88,7 +78,7 @@ def residuals(scene):
 @given(seeds, st.lists(st.sampled_from(joint_types()), min_size=1, max_size=6))
 def test_joints_place_and_move_bodies(seed, kinds):
     text = random_chain(np.random.default_rng(seed), kinds)
-    scene = read(text)
+    scene = scene_of_text(text)
     gap, slip = residuals(scene)
     assert gap < 1e-12
     assert slip < 1e-7  # limited by the finite difference
@@ -98,7 +88,7 @@ def test_joints_place_and_move_bodies(seed, kinds):
 def test_states_by_joints(seed, kinds):
     """with_state reaches what it is asked for, leaves the rest alone, and its inverse is itself."""
     rng = np.random.default_rng(seed)
-    scene = read(random_chain(rng, kinds))
+    scene = scene_of_text(random_chain(rng, kinds))
     names = [name for name, _ in scene.all_joints()]
     chosen = [name for name in names if rng.random() < 0.6]
     wanted = {n: rng.uniform(-1.0, 1.0, scene.joint(n).dim) for n in chosen}
@@ -134,7 +124,7 @@ def test_elements_are_found_again(seed, kind, scale):
 
 
 def test_whole_turns_are_kept():
-    scene = read(random_chain(np.random.default_rng(1), ["revolute", "universal", "screw"]))
+    scene = scene_of_text(random_chain(np.random.default_rng(1), ["revolute", "universal", "screw"]))
     turned = scene.with_state({"j0": 20.0, "j1": [10.0, -8.0], "j2": 30.0})
     again = turned.with_state(rates={"j0": 1.0})
     assert [float(turned.joint(n).coordinate[0]) for n in ("j0", "j1", "j2")] == pytest.approx([20, 10, 30])
@@ -142,7 +132,7 @@ def test_whole_turns_are_kept():
 
 
 def test_a_free_body_by_its_implicit_joint():
-    scene = read("format = 1\n[bodies.a]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n")
+    scene = scene_of_text("format = 1\n[bodies.a]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n")
     moved = scene.with_state({"a": [0.1, 0.2, 0.3, 1.0, 2.0, 3.0]}, {"a": [1, 0, 0, 0, 2, 0]})
     np.testing.assert_allclose(moved.body("a").pose[4:], [1, 2, 3])
     np.testing.assert_allclose(moved.body("a").twist, [1, 0, 0, 0, 2, 0])
@@ -206,12 +196,12 @@ frame2 = {{ position = [-0.5, 0.0, 0.0] }}
 
 def test_adjusting_takes_the_nearest_state():
     with pytest.raises(SceneError) as caught:
-        read(OPEN_LOOP.format(adjust="false"))
+        scene_of_text(OPEN_LOOP.format(adjust="false"))
     (fault,) = caught.value.faults
     assert fault.key == "joints.b"
     assert "0.01 m" in fault.found
     assert "crank and coupler" in fault.advice
-    scene = read(OPEN_LOOP.format(adjust="true"))
+    scene = scene_of_text(OPEN_LOOP.format(adjust="true"))
     gap, slip = residuals(scene)
     assert gap < 1e-8
     assert slip < 1e-6
@@ -223,7 +213,7 @@ def test_adjusting_takes_the_nearest_state():
     assert scene.joint("a").rate[0] == pytest.approx(-1.0, rel=1e-2)
     assert {d.body for d in report.moved} == {"crank", "coupler"}
     assert "coupler: moved 0.0028" in str(scene)
-    flag = read(OPEN_LOOP.format(adjust="false"), adjust=True)
+    flag = scene_of_text(OPEN_LOOP.format(adjust="false"), adjust=True)
     np.testing.assert_array_equal(flag.body("coupler").pose, scene.body("coupler").pose)
 
 
@@ -234,7 +224,7 @@ def test_adjusting_repairs_small_errors(seed, kinds):
     """Bodies a little beside their places come back into a consistent state; consistent ones stay."""
     rng = np.random.default_rng(seed)
     chain = random_chain(rng, kinds)
-    scene = read(chain)
+    scene = scene_of_text(chain)
     beside = {}
     for i, (_, body) in enumerate(scene.all_bodies()):
         pose = SE3.retract(body.pose, rng.normal(size=6) * 1e-3)
@@ -244,18 +234,18 @@ def test_adjusting_repairs_small_errors(seed, kinds):
             "velocity": rng.normal(size=3).tolist(),
         }
     text = random_chain(np.random.default_rng(seed), kinds, tuple(beside.items()))
-    adjusted = read(text, adjust=True)
+    adjusted = scene_of_text(text, adjust=True)
     gap, slip = residuals(adjusted)
     assert gap < 1e-8
     assert slip < 1e-6
-    assert read(chain, adjust=True).adjusted is None
+    assert scene_of_text(chain, adjust=True).adjusted is None
 
 
 def test_adjusting_keeps_what_is_prescribed():
     text = FOUR_BAR.read_text().replace("drive = 4.0 ", "motion = { rate = 2.0 } #")
     with pytest.raises(SceneError, match="joints"):
-        read(text)
-    scene = read(text, adjust=True)
+        scene_of_text(text)
+    scene = scene_of_text(text, adjust=True)
     assert scene.joint("main").rate[0] == pytest.approx(2.0, abs=1e-8)
     assert residuals(scene)[1] < 1e-6
 
@@ -266,20 +256,20 @@ def test_what_cannot_close_is_refused():
         "frame1 = { position = [9.0, 0.0, 0.0] }\nframe2 = {}\n"
     )
     with pytest.raises(SceneError, match="no consistent state was found nearby"):
-        read(text)
+        scene_of_text(text)
 
 
 def test_placement_does_not_depend_on_the_order_of_joints():
     text = random_chain(np.random.default_rng(3), ["revolute", "spherical", "universal", "free"])
     head, *tables = text.split("[joints.")
     turned = head + "".join("[joints." + entry for entry in reversed(tables))
-    for name, body in read(text).all_bodies():
-        np.testing.assert_allclose(read(turned).body(name).pose, body.pose, atol=1e-14)
+    for name, body in scene_of_text(text).all_bodies():
+        np.testing.assert_allclose(scene_of_text(turned).body(name).pose, body.pose, atol=1e-14)
 
 
 def test_a_state_from_a_solution():
     """A body on a pin, thrown without weight, comes half a turn far in half a second."""
-    scene = read(
+    scene = scene_of_text(
         "format = 1\n[world]\ngravity = [0.0, 0.0, 0.0]\n"
         "[bodies.a]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\nposition = [0.0, 1.0, 0.0]\n"
         "[joints.j]\ntype = 'revolute'\nbodies = ['ground', 'a']\n"

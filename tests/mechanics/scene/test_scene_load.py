@@ -15,9 +15,8 @@ from ephs.mechanics.scene.load import load
 from ephs.mechanics.scene.schema import json_schema
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
+from tests.scenes import SCENES
 
-ROOT = Path(__file__).parents[3]
-SHIPPED = sorted((ROOT / "scenes").glob("*.toml"))
 SAMPLES = sorted((Path(__file__).parent / "data").glob("*.toml"))
 
 BODY = "[bodies.a]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n"
@@ -52,7 +51,7 @@ def closes(scene):
     return True
 
 
-@pytest.mark.parametrize("path", SHIPPED + SAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", SCENES + SAMPLES, ids=lambda path: path.stem)
 def test_scene_files_load_and_close(path):
     scene = load(path)
     assert closes(scene)
@@ -62,9 +61,9 @@ def test_scene_files_load_and_close(path):
 
 
 def test_shipped_scenes_are_the_six():
-    names = {path.stem for path in SHIPPED}
+    names = {path.stem for path in SCENES}
     assert {"mbs", "slider-crank", "heavy-top", "four-bar", "chain", "universal"} <= names
-    for path in SHIPPED:
+    for path in SCENES:
         assert load(path).name == path.stem
         assert all(body.shape is not None for _, body in load(path).all_bodies())
 

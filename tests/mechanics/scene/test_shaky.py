@@ -1,7 +1,6 @@
 """Mechanisms that move to first order only, against rows of bars whose closing is known by hand."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from hypothesis import strategies as st
 import ephs
 from ephs.mechanics.scene.meant import is_shaky
 from examples.failing import scene
-
-ROOT = Path(__file__).parents[3]
+from tests.scenes import shipped
 
 
 def row(points, gravity=9.81):
@@ -59,7 +57,7 @@ def test_linkages_in_line_that_can_leave_it_are_not(points):
 
 @pytest.mark.parametrize("name", ["bricard", "four-bar", "slider-crank", "chain"])
 def test_shipped_mechanisms_are_not(name):
-    assert not is_shaky(ephs.load(ROOT / f"scenes/{name}.toml"))
+    assert not is_shaky(shipped(name))
 
 
 def test_without_a_load_it_stands_still():

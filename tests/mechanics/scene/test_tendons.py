@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.parameters import varied
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
@@ -130,25 +128,6 @@ def test_between_two_points_it_is_a_spring():
     assert sol.heat[-1] == pytest.approx(spring.heat[-1], rel=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("change", "key", "expected"),
-    [
-        (('"hand"]\npoints', '"hnad"]\npoints'), r"tendons.cable.bodies\[3\]", "hand"),
-        ((", [0.4, 0.2, 0.05]]", "]"), "tendons.cable.points", "4 points, one for each body"),
-        (('["ground", "arm", "arm", "hand"]', '["arm", "arm", "arm", "arm"]'), "tendons.cable.bodies", "different"),
-        (("[0.2, 0.1, 0.1]", "[-0.5, 0.0, 0.4]"), r"tendons.cable.points\[1\]", "two different points"),
-        (("damping", "slack = true\ndamping"), "tendons.cable.damping", "0 for a tendon with slack"),
-        (("[tendons.cable]", '[actuators.cable]\njoints = ["pin"]\n[tendons.cable]'), "actuators.cable", "tendon"),
-        (("[tendons.cable]", '[actuators.winch]\ntendon = "cabel"\n[tendons.cable]'), "winch.tendon", '"cable"'),
-        (("[tendons.cable]", "[actuators.winch]\n[tendons.cable]"), "actuators.winch", "either joints or a tendon"),
-    ],
-)
-def test_what_is_no_tendon_is_said(change, key, expected):
-    with pytest.raises(ephs.SceneError, match=key) as caught:
-        loaded(CABLE.replace(*change), (0.0, 0.0, 0.0, 0.0))
-    assert expected in str(caught.value)
-
-
 @pytest.mark.parametrize("method", ["rk87", "radau", "natural"])
 def test_antagonists_lie_beside_each_other(method):
     pair = STAY + STAY.partition("[thermal")[0].replace("stay", "other").replace("0.1, 0.4]", "-0.1, -0.4]")
@@ -159,35 +138,12 @@ def test_antagonists_lie_beside_each_other(method):
     assert sol[0][0] > still[0][0] + 1e-3
 
 
-def test_an_actuator_pulls_at_a_tendon_by_its_ratio_within_its_limits():
+def test_an_actuator_pulls_at_a_tendon_by_its_ratio_within_its_limits(tmp_path):
     winch = '[actuators.winch]\ntendon = "cable"\nratio = -2.0\nlimits = [0.0, 3.0]\n'
     scene = loaded(CABLE + winch)
     one, other = (ended(scene, "rk87", given)[0] for given in ({"actuators.winch": 5.0}, {"actuators.cable": 6.0}))
     assert np.allclose(one, other, rtol=0.0, atol=1e-12)
     assert not np.allclose(one, ended(scene, "rk87")[0], atol=1e-3)
-
-
-def test_documents_parts_and_units_keep_tendons(tmp_path):
-    scene = loaded(CABLE)
-    text = scene_to_text(scene)
-    assert scene_to_text(scene_from_text(text)) == text
-    (tmp_path / "reach.toml").write_text(ARM.format(0.2, -0.4, 0.5, -0.7) + CABLE)
-    (tmp_path / "two.toml").write_text('format = 1\n[parts.left]\nuse = "reach.toml"\nposition = [0.3, 0.2, 0.0]\n')
-    part = ephs.load(tmp_path / "two.toml")
-    (angles, _), sol = ended(scene, "rk87"), ephs.simulate(part, 0.3, method="rk87", audit="off")
-    assert sol.joint("left.pin").coordinate[-1, 0] == pytest.approx(angles[0], abs=1e-6)
-    pulled = ephs.simulate(part, 0.3, method="rk87", inputs={"actuators.left.cable": 9.0}, audit="off")
-    assert ended(scene, "rk87", {"actuators.cable": 9.0})[0][0] == pytest.approx(
-        pulled.joint("left.pin").coordinate[-1, 0], abs=1e-6
-    )
-
-
-def test_a_result_file_holds_tensions_beside_momenta_of_bodies(tmp_path):
-    sol = ephs.simulate(scene_of_text(ARM.format(0.3, 0.4, 0.0, 0.0) + CABLE), 0.1, step=0.05, method="rk54")
-    sol.save(tmp_path / "solution.nc")
-    again = ephs.load_solution(tmp_path / "solution.nc")
-    for path in ("bodies.arm.ke.p", "tendons.cable.spring.q"):
-        np.testing.assert_array_equal(again[path], sol[path])
 
 
 def test_a_tiny_mechanism_does_as_a_large_one():
@@ -230,16 +186,6 @@ def test_at_rest_tension_balances_weight():
 def test_loads_beside_sprung_tendons_have_no_static_path():
     with pytest.raises(ValueError, match=r"tendons\.cable and loads"):
         ephs.equilibrium(loaded(CABLE + '[loads.push]\nbody = "hand"\nforce = [0.0, 0.0, 1.0]\n'))
-
-
-@pytest.mark.parametrize(("key", "value"), [("stiffness", STIFFNESS), ("damping", DAMPING), ("length", LENGTH)])
-def test_sensitivities_to_its_numbers_are_exact(key, value):
-    scene, path = loaded(CABLE), f"tendons.cable.{key}"
-    found = ephs.sensitivity(scene, [path], 0.3, method="rk87", rtol=1e-11, atol=1e-12, save_at=[0.0, 0.3])
-    slope = found.of(lambda sol: sol.joint("pin").coordinate[:, 0])[-1, 0]
-    step = 1e-3 * value
-    ends = [ended(varied(scene, {path: value + by}), "rk87", rtol=1e-11, atol=1e-12)[0][0] for by in (step, -step)]
-    assert slope == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5)
 
 
 THROUGH = """

@@ -8,7 +8,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
-from ephs.mechanics.scene import SceneError
 from ephs.mechanics.scene.bodies import BodyEntry
 from ephs.mechanics.scene.entries import validate
 from ephs.mechanics.scene.inertia import mass_and_moments
@@ -94,9 +93,6 @@ def test_inertia_of_shapes_is_the_integral_over_them(shape, angles, place, densi
     assert moments_of({"mass": mass, "shapes": mirrored})[1] == pytest.approx(moments, rel=1e-13, abs=1e-15 * mass)
 
 
-GIVEN = "mass = 1.0\ninertia = [1, 1, 1]\n"
-
-
 def scene(body):
     return scene_of_text(f"format = 1\n[bodies.a]\n{body}\n")
 
@@ -106,26 +102,3 @@ def test_a_scene_takes_both():
     assert found.mass == 2.0
     np.testing.assert_allclose(found.inertia, np.eye(3) / 3, rtol=1e-15)
     np.testing.assert_allclose(found.pose[:4], [0.5**0.5, 0, 0, 0.5**0.5], atol=1e-16)
-
-
-@pytest.mark.parametrize(
-    ("body", "key", "words"),
-    [
-        ("density = 1.0\nmass = 1.0\nshape = { sphere = 1.0 }", "bodies.a.density", "density without mass"),
-        ("density = 1.0", "bodies.a", "box, sphere or cylinder"),
-        ("density = 1.0\nshape = { mesh = 'a.stl' }", "bodies.a", "box, sphere or cylinder"),
-        ("mass = 1.0", "bodies.a.inertia", "nothing"),
-        ("density = 1.0\nshape = { sphere = 1.0, position = [0.5, 0, 0] }", "bodies.a", "shift the positions"),
-        ("GIVENrotation = { rpy = [0, 0] }", "bodies.a.rotation.rpy", "3 entries"),
-        ("GIVENrotation = { rpi = [0, 0, 0] }", "bodies.a.rotation.rpi", '"rpy"'),
-        ("GIVENrotation = { angle = 1.0 }", "bodies.a.rotation", "axis with angle"),
-        ("GIVENrotation = { axis = [0, 0, 0], angle = 1 }", "bodies.a.rotation", "axis with"),
-        ("GIVENrotation = 3", "bodies.a.rotation", "quaternion"),
-    ],
-)  # fmt: skip
-def test_faults_name_the_key(body, key, words):
-    with pytest.raises(SceneError) as caught:
-        scene(body.replace("GIVEN", GIVEN))
-    (fault,) = caught.value.faults
-    assert fault.key == key
-    assert words in str(fault)

@@ -29,7 +29,7 @@ def held_to_the_general_form(eq, problem, state):
     found, states = rising(eq, state, eq.vector(state)), eq.states(state)
     rates = oracle_of(problem).rates(states)
     condition = np.linalg.cond(eq.mass(state.q, state.r)) if eq.n else 1.0
-    attached = {one.path for one in eq.reduced.attaching.network.states}
+    attached = {one.path for one in eq.reduced.attaching.network.states} | set(eq.reduced.entropies)
     for slot in problem.descriptor.states:
         if (slot.quantity.parity > 0 and slot.path not in attached) or not slot.quantity.space.dim:
             continue  # elements follow from rates

@@ -192,7 +192,6 @@ def turning(ratio, quantity):
             None,
             "stores what other states",
         ),
-        (lambda q: {"rope": (_rope(), {"p": "p", "x": "x"})}, None, "twist of a body"),
     ],
 )
 def test_what_has_no_place_is_refused_by_path(parts, effort, words):
@@ -206,10 +205,6 @@ def test_what_has_no_place_is_refused_by_path(parts, effort, words):
         signals = {"x": (1.0, effort)}
     with pytest.raises(Unplaced, match=words):
         equations_of(system, {}, signals)
-
-
-def _rope():
-    return ephs.transformer({"p": Q.body_momentum, "x": Q.momentum}, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
 
 
 # ---- efforts that only balances determine ---------------------------------------------------------------------------

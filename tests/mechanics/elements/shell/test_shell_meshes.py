@@ -13,10 +13,9 @@ from ephs.mechanics import Shell, ShellSection
 from ephs.mechanics.elements.shell.mesh import grid, quadrilaterals
 from ephs.mechanics.elements.shell.section import Ply
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.rescaled import rescaled
 from tests.mechanics.elements.shell.test_shell import patch_is_exact
 from tests.mechanics.elements.shell.test_shell_scenes import SHEET, WORLD, lines_of, sheet
-from tests.numerics import generators, largest
+from tests.numerics import generators
 from tests.written import scene_of_text
 
 MATERIAL = ("thickness", "E", "nu", "rho")
@@ -63,29 +62,6 @@ def test_fibres_turn_with_the_direction_from_which_their_angles_count(angles, tu
     assert one.section.plane == pytest.approx(
         ShellSection.laminate([Ply(1e-3, 3e7, 1e7, 4e6, 0.3, a, 900.0) for a in angles]).plane, rel=1e-15
     )
-
-
-def test_layers_are_kept_and_change_with_units():
-    given_scene = layered(0.3, -0.3, along="[1.0, 0.2, 0.0]")
-    assert scene_to_text(scene_from_text(scene_to_text(given_scene))) == scene_to_text(given_scene)
-    other = rescaled(given_scene, 2.0, 4.0, 1.0)
-    assert other.shells["skin"].layers[1] == {
-        "thickness": 2e-3, "E1": 6e7, "E2": 2e7, "G12": 8e6, "nu12": 0.3, "angle": -0.3, "rho": 450.0
-    }  # fmt: skip
-    one, two = (of.shells["skin"].stack() for of in (given_scene, other))
-    assert np.array_equal(two.plane, one.plane * np.kron([[4.0, 8.0], [8.0, 16.0]], np.ones((3, 3))))  # N/m, N, N m
-    assert np.array_equal(two.shear, 4.0 * one.shear) and two.mass == one.mass
-
-
-def test_a_part_that_is_turned_turns_the_fibres(tmp_path):
-    keys = table(*MATERIAL, layers=f"[{LAYER.replace('ANGLE', '0.4')}]", along="[1.0, 0.2, 0.0]")
-    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{lines_of(keys)}")
-    (tmp_path / "whole.toml").write_text(
-        f'{WORLD}[parts.left]\nuse = "wing.toml"\nposition = [1.0, 2.0, 0.5]\nrotation = [0.8, 0.0, 0.0, 0.6]\n'
-    )
-    turned = dict(ephs.load(tmp_path / "whole.toml").all_shells())["left.skin"].shell()
-    still = ephs.load(tmp_path / "wing.toml").shells["skin"].shell()
-    assert turned.matrix == pytest.approx(still.matrix, abs=1e-12 * largest(still.matrix))
 
 
 # ---- meshes ----------------------------------------------------------------------------------------------------------
@@ -180,40 +156,6 @@ def test_new_points_are_of_a_side_on_the_border_or_on_a_line_through_the_mesh():
     across = meshed(points, four, sides=[[0, 4, 2]], edges='["ground"]').shells["skin"]
     places = across.mesh().points[across.welds()["ground"]]
     assert len(places) == 5 and np.array_equal(places[:, 0], places[:, 1])
-
-
-@pytest.mark.parametrize(
-    ("keys", "at", "words"),
-    [
-        (table("corners"), "", "points and elements"),
-        (table(points="[[0.0, 0.0, 0.0]]"), "", "corners, points, elements"),
-        (table("elements", "rho", layers="[]"), "layers", "1"),
-        (table("rho"), "", "thickness, E and rho"),
-        (table(layers=f"[{LAYER.replace('ANGLE', '0.0')}]"), "", "layers"),
-        (table(*MATERIAL, layers="[{thickness = 1e-3, E1 = 1e7, E2 = 1e7, G12 = 4e6, nu12 = 0.3}]"), "", "mass"),
-        (table(*MATERIAL, layers="[{thickness = 0.0, E1 = 1e7, E2 = 1e7, G12 = 4e6}]"), "layers[0].thickness",
-         "above 0"),
-        (table(*MATERIAL, layers="[{thickness = 1e-3, E1 = 1e7, E2 = 1e7, G12 = 4e6, nu = 0.3}]"), "layers[0].nu",
-         "nu12"),
-        (table(*MATERIAL, layers="[{thickness = 1e-3, E1 = 1e7, E2 = 1e7, G12 = 4e6, nu12 = 2.0, rho = 1.0}]"),
-         "layers", "layers[0].nu12"),
-        (table(elements="[[0, 1, 2, 3]]"), "elements", "two numbers"),
-        (table("corners", points="[[0.0, 0.0, 0.0]]"), "elements", "points of each"),
-        (table("corners", "edges", points="[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]",
-               elements="[[0, 1, 3]]"), "elements[0]", "0 … 2"),
-        (table("corners", "edges", points="[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]",
-               elements="[[0, 1, 2]]", sides="[[0, 3]]"), "sides[0]", "0 … 2"),
-        (table("corners", "edges", points="[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]",
-               elements="[[0, 1, 2]]", sides='["rim"]'), "sides[0]", "0 … 2"),
-        (table(pinned="[true]"), "pinned", "4 entries"),
-        (table(along="[0.0, 0.0, 0.0]"), "corners", "direction"),
-    ],
-)  # fmt: skip
-def test_what_is_no_sheet_is_refused_by_its_key(keys, at, words):
-    with pytest.raises(ephs.SceneError) as error:
-        scene(keys)
-    assert words in str(error.value)
-    assert error.value.faults[0].key == ".".join(filter(None, ("shells.skin", at)))
 
 
 # ---- pinned sides ----------------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ from ephs.mechanics.elements.shell.pressure import node_areas, volume
 from ephs.mechanics.methods import jacobian
 from ephs.mechanics.methods.jacobian import Jacobian
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 from tests import numerics
 from tests.numerics import EPS, largest, seeds
 from tests.written import scene_of_text
@@ -126,14 +125,6 @@ def test_an_input_is_in_place_of_the_pressure_and_is_read_again(tmp_path):
     assert one.work[-1] == other.work[-1] != 0.0
     one.save(tmp_path / "run.nc")
     assert ephs.load_solution(tmp_path / "run.nc").work[-1] == one.work[-1]
-
-
-def test_other_units_are_the_same_motion():
-    scene = box()
-    other = rescaled(scene, 2.0, 4.0, 1.0)
-    assert other.shells["box"].pressure == 2.0 * PRESSURE
-    works = [ephs.simulate(each, UNTIL, method="rk54", step=1e-3).work[-1] for each in (scene, other)]
-    assert works[1] == 16.0 * works[0] > 0.0
 
 
 # ---- rest ------------------------------------------------------------------------------------------------------------

@@ -7,8 +7,6 @@ import ephs
 from ephs.mechanics import Shell, ShellSection
 from ephs.mechanics.elements.shell.mesh import grid
 from ephs.mechanics.elements.shell.system import shell_system
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.rescaled import rescaled
 from ephs.semantics.spaces import SE3
 from tests.numerics import largest
 from tests.written import scene_of_text
@@ -82,78 +80,6 @@ def test_energy_is_that_of_its_elements_and_its_heat_warms_a_node():
     assert warmed == pytest.approx(run.heat[-1], rel=1e-6) and run.heat[-1] > 0.0
     assert run.energy_error.max() < 1e-13
     assert not shell.membrane[0].any() and largest(shell.moment[-1]) > 0.0
-
-
-def test_other_units_are_the_same_motion():
-    """By powers of two nothing is rounded but what adaptive steps make of tolerances in metres."""
-    scene = sheet()
-    other = rescaled(scene, 2.0, 4.0, 1.0)
-    assert other.shells["skin"].E == 4.0 / 2.0 * scene.shells["skin"].E
-    assert tip(ran(other)) / 2.0 == pytest.approx(tip(ran(scene)), abs=1e-8)
-
-
-def test_a_part_that_is_moved_has_its_sheet_moved(tmp_path):
-    (tmp_path / "wing.toml").write_text(f"format = 1\n[shells.skin]\n{lines_of(SHEET)}")
-    turn = [0.8, 0.0, 0.0, 0.6]
-    (tmp_path / "whole.toml").write_text(
-        f'{WORLD}[parts.left]\nuse = "wing.toml"\nposition = [1.0, 2.0, 0.5]\nrotation = {turn}\n'
-    )
-    run = ran(ephs.load(tmp_path / "whole.toml"))
-    start = run.shell("left.skin").position[0]
-    assert start[-1] == pytest.approx(np.array([1.0, 2.0, 0.5]) + turned(turn, [0.6, 0.4, 0.1]), abs=1e-12)
-    assert run.energy_error.max() < 1e-13
-
-
-def turned(quaternion, vector):
-    w, x, y, z = quaternion
-    u, v = np.array([x, y, z]), np.array(vector)
-    return v + 2.0 * w * np.cross(u, v) + 2.0 * np.cross(u, np.cross(u, v))
-
-
-def test_it_is_read_again_from_a_result(tmp_path):
-    scene = hub()
-    assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
-    run = ran(scene)
-    run.save(tmp_path / "run.nc")
-    assert np.array_equal(ephs.load_solution(tmp_path / "run.nc").shell("skin").position, run.shell("skin").position)
-
-
-@pytest.mark.parametrize(
-    ("keys", "at", "words"),
-    [
-        ({"edges": '["free", "free", "free", "wall"]'}, "edges[3]", "ground"),
-        ({"edges": '["free", "ground"]'}, "edges", "4 entries"),
-        ({"elements": "[0, 2]"}, "elements[0]", "not below 1"),
-        ({"thickness": "0.0"}, "thickness", "above 0"),
-        ({"nu": "0.6"}, "nu", "0.5"),
-        ({"corners": "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]"}, "corners", "an area"),
-        ({"corners": "[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 0.2, 0.0], [0.0, 1.0, 0.0]]", "elements": "[1, 1]"},
-         "corners", "convex corners"),
-    ],
-)  # fmt: skip
-def test_what_is_no_shell_is_refused_by_its_key(keys, at, words):
-    with pytest.raises(ephs.SceneError) as error:
-        sheet(**keys)
-    (fault,) = error.value.faults
-    assert fault.key == f"shells.skin.{at}" and words in str(fault)
-
-
-@pytest.mark.parametrize("pinned", ["false", "true"])
-def test_a_run_goes_on_from_a_strained_sheet(pinned):
-    """From halfway it is the run to the end, in a document and in other units, too."""
-    scene, end, most = hub(pinned=f"[false, false, false, {pinned}]", elements="[1, 1]"), 0.02, {"rtol": 1e-7}
-    whole = ephs.simulate(scene, end, method="radau", **most, save_at=[0.0, 0.5 * end, end])
-    half = scene.at(whole, 0.5 * end)
-    assert half.shells["skin"].nodes != scene.shells["skin"].nodes
-    assert scene_to_text(scene_from_text(scene_to_text(half))) == scene_to_text(half)
-    for start, unit in ((half, 1.0), (rescaled(half, 2.0, 4.0, 1.0), 2.0)):
-        rest = ephs.simulate(start, 0.5 * end, method="radau", **most)
-        assert tip(rest) / unit == pytest.approx(tip(whole), abs=1e-6)
-        assert rest.energy_error.max() < 1e-13
-        assert rest.shell("skin").energy[0].sum() == pytest.approx(
-            unit * unit * 4.0 ** (unit - 1.0) * whole.shell("skin").energy[1].sum(), rel=1e-9
-        )
-    assert np.linalg.norm(tip(rest) - tip(ephs.simulate(scene, 0.5 * end, method="radau"))) > 1e-4
 
 
 def test_a_body_that_is_moved_strains_the_sheet_that_it_carries():

@@ -5,9 +5,7 @@ import pytest
 
 import ephs
 from ephs.mechanics.scene.contacts import contact_points
-from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.parameters import varied
-from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.site import Site
 from ephs.mechanics.shapes.gap import ramp
 from tests.written import scene_of_text
@@ -65,16 +63,6 @@ def test_a_sheet_that_falls_comes_to_rest_on_its_weight(method):
     assert run.energy_error.max() < 1e-12 and run.stats["least_production"] >= 0.0
     assert np.all(np.diff(run.heat) >= -1e-12 * run.heat[-1]) and run.heat[-1] > 0.0
     assert run.audit.passed
-
-
-def test_heat_of_touching_warms_a_node_and_is_read_from_a_file(tmp_path):
-    warm = 'heat = "store"\n[thermal.store]\ncapacity = 1.0\ntemperature = 300.0\n'
-    run = ephs.simulate(touch(more="heat = 'store'", floor=FLOOR + warm), 0.1)
-    assert run.thermal("store").temperature[-1] - 300.0 == pytest.approx(run.heat[-1], rel=1e-6)
-    assert run.heat[-1] > 0.01 and run.contact("skin_floor").heat.max() > 0.0
-    run.save(tmp_path / "run.nc")
-    again = ephs.load_solution(tmp_path / "run.nc").contact("skin_floor")
-    assert np.array_equal(again.force, run.contact("skin_floor").force)
 
 
 def test_a_pressed_sheet_rests_on_its_weight_and_the_pressure():
@@ -161,13 +149,6 @@ def test_what_could_come_through_between_nodes_is_refused(radius, wide):
         touch(text)
 
 
-@pytest.mark.parametrize("shape", ["box = [1.0, 1.0, 0.2]", "cylinder = [0.1, 1.0]", "capsule = [0.1, 1.0]"])
-def test_width_is_that_of_the_largest_ball_inside(shape):
-    text = cloth(floor=ball(0.1, 0.4).replace("sphere = 0.1", shape))
-    with pytest.raises(ephs.SceneError, match=r"of half width 0\.1 m"):
-        touch(text)
-
-
 @pytest.mark.parametrize("stiffness", [10.0, 1e4])
 def test_a_ball_that_falls_on_a_held_sheet_does_not_come_through_in_silence(stiffness):
     """Between soft nodes the run ends before its middle may have passed; stiff ones hold it."""
@@ -203,41 +184,6 @@ def test_nodes_that_leap_through_a_plate_are_found_and_chosen_steps_meet_it():
     assert met.shell("cloth").position[-1, :, 2].min() > 0.0 and met.audit.passed
 
 
-def test_other_units_are_the_same_motion():
-    scene = touch()
-    one = ephs.simulate(scene, 0.1, method="radau", rtol=1e-8, atol=1e-10)
-    other = ephs.simulate(rescaled(scene, 8.0, 0.25, 2.0), 0.2, method="radau", rtol=1e-8, atol=8e-10)
-    assert other.shell("cloth").position[-1] / 8.0 == pytest.approx(one.shell("cloth").position[-1], abs=1e-7)
-    force = 0.25 * 8.0 / 4.0
-    assert other.contact("skin_floor").force[-1, 2] / force == pytest.approx(
-        one.contact("skin_floor").force[-1, 2], rel=1e-4
-    )
-
-
-def test_a_sheet_of_a_part_touches_the_floor_of_the_whole(tmp_path):
-    (tmp_path / "cloth.toml").write_text(cloth(floor=""))
-    (tmp_path / "whole.toml").write_text(
-        WORLD + '[parts.left]\nuse = "cloth.toml"\nposition = [1.0, 0.0, 0.0]\n' + FLOOR
-    )
-    whole = ephs.load(tmp_path / "whole.toml")
-    (name,) = whole.contacts
-    parted, alone = (ephs.simulate(each, 0.1, method="radau", rtol=1e-8, atol=1e-10) for each in (whole, touch()))
-    moved = parted.shell("left.cloth").position[-1] - [1.0, 0.0, 0.0]
-    assert moved == pytest.approx(alone.shell("cloth").position[-1], abs=1e-8)
-    assert parted.contact(name).force[-1] == pytest.approx(alone.contact("skin_floor").force[-1], abs=1e-4)
-    assert alone.contact("skin_floor").force[-1, 2] > 0.0
-
-
-def test_it_is_read_again_and_a_run_goes_on():
-    scene = touch()
-    assert scene_to_text(scene_from_text(scene_to_text(scene))) == scene_to_text(scene)
-    pace = {"method": "radau", "rtol": 1e-9, "atol": 1e-11}
-    whole = ephs.simulate(scene, 0.12, save_at=[0.0, 0.08, 0.12], **pace)
-    rest = ephs.simulate(scene.at(whole, 0.08), 0.04, **pace)
-    assert rest.contact("skin_floor").force[0] == pytest.approx(whole.contact("skin_floor").force[1], rel=1e-9)
-    assert rest.shell("cloth").position[-1] == pytest.approx(whole.shell("cloth").position[-1], abs=1e-7)
-
-
 def test_balls_have_half_the_thickness_of_a_sheet_that_is_varied():
     scene = varied(touch(), {"shells.cloth.thickness": 2e-2})
     point = contact_points(scene, scene.contacts["skin_floor"])[0]
@@ -258,25 +204,3 @@ def test_nodes_on_a_body_touch_all_but_this_body(pinned):
     assert not touch(more=joined, floor=HUB + BLOCK).contacts, "as bodies that a joint connects"
     other = touch(more=joined, floor=HUB + FLOOR)
     assert len(contact_points(other, other.contacts["skin_floor"])) == 6
-
-
-@pytest.mark.parametrize(
-    ("text", "at", "words"),
-    [
-        (cloth().replace('body = "cloth"', 'body = "clot"'), "surfaces.skin.body", 'did you mean "cloth"'),
-        (cloth(skin="shape = { box = [1.0, 1.0, 1.0] }"), "surfaces.skin.shape", "a box on a shell"),
-        (cloth(skin="position = [0.0, 0.0, 1.0]"), "surfaces.skin.position", "nothing on a shell"),
-        (cloth().replace("shape = { plane = {} }", ""), "surfaces.floor.shape", "found nothing, expected sphere"),
-        (cloth(floor=FLOOR + HUB.replace("hub", "cloth")), "surfaces.skin.body", "a body and a shell"),
-        (cloth(floor=FLOOR + HUB.replace("hub", "cloth-node1")), "shells.cloth", "a body cloth-node1"),
-        (cloth(more=HELD, floor=FLOOR + '[contacts.a]\nsurfaces = ["skin", "floor"]\n'), "contacts.a", "joined"),
-        (
-            cloth() + CLOTH.format(**GIVEN).replace("cloth", "other").replace("skin", "back"),
-            "surfaces.skin and surfaces.back", "surfaces of two shells",
-        ),
-    ],
-)  # fmt: skip
-def test_faults_name_the_key(text, at, words):
-    with pytest.raises(ephs.SceneError) as error:
-        touch(text)
-    assert at in str(error.value) and words in str(error.value)
