@@ -1,6 +1,7 @@
 """Runge-Kutta steps, explicit, implicit or semi-implicit, as staged functions, many in one call."""
 
 from ephs.solve.march.account import RunAccount as RunAccount
+from ephs.solve.march.evaluating import MarchStep as MarchStep
 from ephs.solve.march.march import march as march
 from ephs.solve.march.memory import Memory as Memory
 from ephs.solve.march.memory import Totals as Totals

@@ -30,7 +30,7 @@ from ephs.solve.equations.layout import LINEAR
 from ephs.solve.equations.model import Model
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
-from ephs.solve.methods.places import Part, add_to
+from ephs.solve.methods.places import Part, add_to, each_input
 from ephs.solve.methods.records import (
     COMPONENT,
     REVERSIBLE,
@@ -41,7 +41,6 @@ from ephs.solve.methods.records import (
     efforts_of,
     parts_of,
     rates_of,
-    row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, called, evaluation_program
 from ephs.solve.posing.errors import SolveError
@@ -82,26 +81,22 @@ def rates(
     fault, n_rate = on.counter(0), t.counts[0]
     efforts = z.part(n_rate, place.size)
 
-    def outer(i: Integer, k: Integer, *, before: bool) -> None:
-        port, first = row_of(OuterPort, t.outer, i), t.input_at[i]
-
-        def each_freedom(j: Integer) -> None:
-            def effort() -> None:
-                if before:
-                    efforts[port.at + j] = inputs[k, first + j]
-                else:
-                    z[port.unknown + j] = m.residual[n_rate + port.at + j]
-
-            def flow() -> None:
-                if not before:
-                    add_to(m.residual, n_rate + port.at + j, -inputs[k, first + j])
-
-            on.when(on.same(port.prescribed, 1), effort, flow)
-
-        on.loop(port.dim, each_freedom)
-
     def stage(k: Integer) -> None:
         x = xs.row(k)
+
+        def prescribed(port: OuterPort, j: Integer, place: Integer) -> None:
+            def effort() -> None:
+                efforts[port.at + j] = inputs[k, place]
+
+            on.when(on.same(port.prescribed, 1), effort)
+
+        def supplied(port: OuterPort, j: Integer, place: Integer) -> None:
+            row = n_rate + port.at + j
+
+            def effort() -> None:
+                z[port.unknown + j] = m.residual[row]
+
+            on.when(on.same(port.prescribed, 1), effort, lambda: add_to(m.residual, row, -inputs[k, place]))
 
         def known(i: Integer) -> None:
             efforts[i] = rest[i] + _product(on, start, column, value, i, x)
@@ -133,11 +128,11 @@ def rates(
             on.when(place[i] >= 0, give)
 
         on.loop(place.size, known)
-        on.loop(t.input_at.size, lambda i: outer(i, k, before=True))
+        each_input(on, t, prescribed)
         on.loop(storing.size, lambda i: component(storing[i], stores=True))
         on.loop(place.size, balance)
         on.loop(others.size, lambda i: component(others[i], stores=False))
-        on.loop(t.input_at.size, lambda i: outer(i, k, before=False))
+        each_input(on, t, supplied)
         on.loop(place.size, advance)
 
     def sound(k: Integer) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 from ephs.semantics.linear.dense import clear
 from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
-from ephs.solve.methods.places import Part, raise_to
+from ephs.solve.methods.places import Part, each_component, raise_to
 from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
 NOTHING = 1e-200
@@ -138,22 +138,17 @@ def weigh(on: Evaluator, t: Columns, m: Scratch) -> None:
 
         on.loop(entries.size, each_entry)
 
-    def component(i: Integer) -> None:
-        def stored() -> None:
-            part = Part.of(t, i)
+    def storing(part: Part) -> None:
+        def row(j: Integer) -> None:
+            effort = part.effort(j)
+            on.when(least[effort] < FAR, lambda: raise_to(on, m.scale, part.rate(j), least[effort]))
 
-            def row(j: Integer) -> None:
-                effort = part.effort(j)
-                on.when(least[effort] < FAR, lambda: raise_to(on, m.scale, part.rate(j), least[effort]))
-
-            on.loop(part.n, row)
-
-        on.when(on.same(t.kind[i], STORING), stored)
+        on.loop(part.n, row)
 
     on.loop(n_effort, begin)
     known(t.balancing)
     known(t.constraining)
-    on.loop(t.kind.size, component)
+    each_component(on, t, STORING, storing)
 
 
 def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch) -> Real:

@@ -22,6 +22,7 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.march import (
     MarchControl,
+    MarchStep,
     Memory,
     RunAccount,
     Stiff,
@@ -69,7 +70,7 @@ def motion_program(*, looped: bool) -> Program:
         q: Vector,
         h: Real,
     ) -> Integer:
-        return attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
+        return attempt(on, MarchStep(motion, tableau, control[0], base, start, h, k, y, q), None, last)
 
     def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
         return motion.rates(on, base, y, q, out)[0]
@@ -168,12 +169,12 @@ def lagged_program(*, looped: bool) -> Program:
         i: Integer,
         h: Real,
     ) -> Integer:
-        status = on.counter(0)
+        status, step = on.counter(0), MarchStep(motion, tableau, control[0], base, start, h, k, y, q)
 
         def next_stage() -> None:
-            status.value = stage(on, motion, tableau, control[0], base, start, h, k, drags, i, y, q)
+            status.value = stage(on, step, drags, i)
 
-        on.when(i < tableau.a.columns, next_stage, lambda: end(on, motion, tableau, base, start, h, k, drags, y, q))
+        on.when(i < tableau.a.columns, next_stage, lambda: end(on, step, drags))
         return status.value
 
     return Program(
