@@ -19,7 +19,7 @@ from ephs.solve.march.iteration import iterate
 from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.solvers import Solver, Solvers, dense
-from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError, worst_entry
 from ephs.solve.running.control import Control
 
 SOLVED = 1e-13
@@ -164,7 +164,7 @@ class Stages:
         found = iterate(PLAIN, correct, self.enough, self.rough, self._fast)
         if found.solved:
             return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
-        path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
+        path, what = counted(eq.reduced, worst_entry(worst))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 
 

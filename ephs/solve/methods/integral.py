@@ -39,11 +39,11 @@ from ephs.solve.methods.records import (
     OuterPort,
     Scratch,
     efforts_of,
-    parts_of,
     rates_of,
 )
 from ephs.solve.methods.residuals import FAULTS, called, evaluation_program
 from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.snapshot import parts
 
 
 def _product(on: Evaluator, start: Integers, column: Integers, value: Vector, i: Integer, x: Vector) -> Real:
@@ -194,11 +194,11 @@ class Integral:
         kinds = t.kind == STORING
         self._calls = [np.flatnonzero(kept & ~constant & chosen) for chosen in (kinds, ~kinds)]
         resting = replace(t, address=model.resting(np.concatenate(self._calls)))
-        self._tables = parts_of(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
+        self._tables = parts(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
         self._bound: dict[int, Any] = {}
         self._sums, self._given = np.zeros(4 + t.kind.size), model.input_values()
         self._account = evaluation_program().compiled()["account"].bind(
-            parts_of(t), self._z, 1.0, self._given, parts_of(self._memory), self._sums
+            parts(t), self._z, 1.0, self._given, parts(self._memory), self._sums
         )  # fmt: skip
 
     @staticmethod
@@ -263,7 +263,7 @@ class Integral:
         if stages not in self._bound:
             arrays = [np.zeros((stages, width)) for width in (self.unknowns, inputs.shape[1], self.unknowns)]
             call = integral_program().compiled()["rates"].bind(
-                *self._tables, *arrays, self._z, self.model.scal(0.0), parts_of(self._memory)
+                *self._tables, *arrays, self._z, self.model.scal(0.0), parts(self._memory)
             )  # fmt: skip
             self._bound[stages] = call, arrays
         call, (states, given, found) = self._bound[stages]

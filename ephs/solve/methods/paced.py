@@ -21,7 +21,7 @@ from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.running.control import Control, Grid
 from ephs.solve.running.snapshot import Snapshot
-from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Row, Span, Taken
+from ephs.solve.running.stepping import Attempt, Instant, Instants, Row, Span, Taken
 
 FIRST = 16
 """Steps in the first compiled call, by which the time of a step becomes known."""
@@ -247,9 +247,7 @@ class _FixedSteps:
         if chunk.steps:
             self._rows = taken if span.save_at is None else self._between(taken, span.save_at)
             self.state = replace(taken.state(chunk.steps - 1), inner=inner)
-            shortest, longest = min(self.counts.shortest, h), max(self.counts.longest, h)
-            least = min(self.counts.least, float(taken.least.min()))
-            self.counts = Counts(done + chunk.steps, 0, shortest, longest, least, grid.h)
+            self.counts = self.counts.after(h, float(taken.least.min()), chunk.steps)
         if chunk.failure is not None:
             raise chunk.failure
         self._most = steps

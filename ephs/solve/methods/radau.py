@@ -23,7 +23,7 @@ from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.settling import PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solvers
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
+from ephs.solve.posing.errors import LARGEST, Outcome, SolveError, worst_entry
 from ephs.solve.posing.problem import NO_STATE, Problem
 from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.running.control import Control
@@ -321,8 +321,8 @@ class Radau:
         if found.solved:
             self._kept.stale = not found.fast
             return stages, int(found.tries)
-        entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
-        raise SolveError(Outcome.DIVERGED, self.model.state_path(entry), "its rate at the stages")
+        path = self.model.state_path(worst_entry(parts.max(axis=0)))
+        raise SolveError(Outcome.DIVERGED, path, "its rate at the stages")
 
     def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
         """Whether rounding, of the equations' terms and of the numbers' sums, alone changes the stages' rates so much.

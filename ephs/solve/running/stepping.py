@@ -142,6 +142,11 @@ class Counts:
     least: float = float("inf")
     h: float = 0.0
 
+    def after(self, h: float, least: float, steps: int = 1) -> "Counts":
+        """The counts after further steps of h seconds."""
+        lengths = min(self.shortest, h), max(self.longest, h)
+        return Counts(self.steps + steps, self.rejected, *lengths, min(self.least, least), self.h)
+
 
 def too_fast(method: str, worst: str, asked: float) -> SolveError:
     """Refusal of the step length, in s, that a tolerance requires at a state."""
