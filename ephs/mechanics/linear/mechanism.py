@@ -22,7 +22,6 @@ from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
@@ -90,8 +89,7 @@ class _LinearisedMotion:
         self.velocities = model.velocity_derivatives(self.state)
         self.motors = model.layout.attached
         d = model.problem.descriptor
-        storages = [(slot, slot.primitive) for slot in d.components if isinstance(slot.primitive, Storage)]
-        stores = {state.path: storage for slot, storage in storages for state in slot.reads}
+        stores = {state.path: storage for slot, storage in d.storages for state in slot.reads}
         self.stores = [stores[path] for path in model.layout.entropies]
         self.nodes = [i for i, store in enumerate(self.stores) if i in self.motors or not store.environment]
         self.ad = self._ad()

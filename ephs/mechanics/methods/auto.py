@@ -21,8 +21,8 @@ from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.stage import PLAIN
-from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import PATIENCE, held_back
+from ephs.solve.march.records import MarchControl
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.running.control import Control
 from ephs.solve.running.loop import FINAL
@@ -62,7 +62,7 @@ class Auto(ReducedMethod):
         self._implicit: Implicit | None = None
         self._active: Explicit | Implicit = self._explicit
         self._contest: Contest | None = None
-        self._nearness, self._failures = Steering.table(1), 0
+        self._nearness, self._failures = MarchControl.table(1), 0
         self._nearness[0].limit = self._limit
         self.counts: dict[str, Any] = {"switches": []}
         touches = _touches(equations)

@@ -24,8 +24,7 @@ from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
-from ephs.solve.march import MarchControl as Steering
-from ephs.solve.march import Status
+from ephs.solve.march.records import MarchControl, Status
 from ephs.solve.running.control import Control
 
 NAME: Final = "semi"
@@ -78,7 +77,7 @@ class Semi:
         self.onsager = once(equations.reduced, "programs of friction", lambda: _programs(equations))
         self._made: tuple[Engine, dict[str, Any], Bound] | None = None
         coordinates, size = equations.engine.sizes
-        self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), Steering.table(1)
+        self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), MarchControl.table(1)
         self._start, self._y, self._k = np.zeros(size), np.zeros(size), np.zeros((len(ARRAYS["a"]), size))
 
     @property

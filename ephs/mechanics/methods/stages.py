@@ -14,8 +14,8 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedSta
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
-from ephs.solve.march import Newton
 from ephs.solve.march.iteration import iterate
+from ephs.solve.march.stiff import Newton
 from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.solvers import Solver, Solvers, dense

@@ -77,13 +77,10 @@ def _capacity(problem: Problem) -> float:
     """Sum of the heat capacities ds/d(log θ) of what stores entropy, at the initial states, in J/K."""
     d = problem.descriptor
     x, total = d.pack(problem.initial), 0.0
-    for slot in d.components:
-        storage = slot.primitive
-        if not isinstance(storage, Storage) or storage.environment:
-            continue
+    for slot, storage in d.storages:
         point = d.point(slot, x)
         for _, where, quantity in storage.bundle.items():
-            if quantity.kind == "entropy":
+            if quantity.kind == "entropy" and not storage.environment:
                 total += next(filter(None, (_share(storage, point, where, 10.0**k) for k in DECADES)), 0.0)
     return total
 

@@ -4,7 +4,6 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.equations.model import Model
@@ -69,7 +68,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
 def _bare(problem: Problem) -> bool:
     """Whether there is a junction without storage: it constrains as a constraint does."""
     d = problem.descriptor
-    stored = {i for slot in d.components if isinstance(slot.primitive, Storage) for i in slot.efforts}
+    stored = {i for slot, _ in d.storages for i in slot.efforts}
     return len(stored) < d.effort_size
 
 

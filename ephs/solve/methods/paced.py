@@ -297,10 +297,9 @@ def _counted(problem: Problem) -> Array:
         if slot.multipliers:
             bound[list(slot.efforts)] = True
     out = np.ones(d.rate_size, dtype=bool)
-    for slot in d.components:
-        if slot.primitive.kind == "storage":
-            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
-                out[rate] = not bound[effort]
+    for slot, _ in d.storages:
+        for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
+            out[rate] = not bound[effort]
     odd = {i for s in d.states if s.quantity.parity < 0 for i in range(s.rates.start, s.rates.stop)}
     out[[i for i in range(d.rate_size) if i not in odd]] = True
     return out

@@ -92,7 +92,7 @@ class Radau:
     """The method for one problem whose states are on vector spaces."""
 
     name = "radau"
-    hold = 1.2
+    share, hold = 0.0, 1.2
 
     def __init__(self, problem: Problem, t0: float, control: Control) -> None:
         self.problem = problem

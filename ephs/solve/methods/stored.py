@@ -31,10 +31,9 @@ class StoredEnergies:
             t = found.model.tables
             z[n_rate + efforts_of(t, slice(None))] = -found.memory.residual[rates_of(t, slice(None))]
             return z
-        for slot in d.components:  # one after the other, as one of them has no effort there
-            if slot.primitive.kind == "storage":
-                with suppress(Exception):
-                    z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
+        for slot, storage in d.storages:  # one after the other, as one of them has no effort there
+            with suppress(Exception):
+                z[[n_rate + i for i in slot.efforts]] = storage.effort(d.point(slot, x), model.reference)
         return z
 
     def energies(self, x: Array) -> Array:

@@ -20,19 +20,14 @@ from ephs.semantics.stage import (
     Vector,
     kind_of,
 )
-from ephs.solve.march import (
-    MarchControl,
-    MarchStep,
-    Memory,
-    RunAccount,
-    Stiff,
-    TableauRecord,
-    Totals,
-    march,
-)
-from ephs.solve.march.account import worth
+from ephs.solve.march.account import RunAccount, worth
+from ephs.solve.march.evaluating import MarchStep
 from ephs.solve.march.lagged import end, stage
+from ephs.solve.march.march import march
+from ephs.solve.march.memory import Memory, Totals
+from ephs.solve.march.records import MarchControl, TableauRecord
 from ephs.solve.march.steps import attempt, book
+from ephs.solve.march.stiff import Stiff
 
 _MOVING: dict[str, Any] = {"tables": kind_of(Tables), "work": kind_of(Work)}
 """Kinds of a mechanism's arguments, which all entry functions have first."""

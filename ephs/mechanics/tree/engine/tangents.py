@@ -28,7 +28,9 @@ from ephs.semantics.stage import (
     Vector,
 )
 from ephs.solve.equations.heats import PLAIN
-from ephs.solve.march import MarchControl, MarchStep, RunAccount, TableauRecord
+from ephs.solve.march.account import RunAccount
+from ephs.solve.march.evaluating import MarchStep
+from ephs.solve.march.records import MarchControl, TableauRecord
 from ephs.solve.march.steps import attempt
 
 BEYOND: Final = 1e100

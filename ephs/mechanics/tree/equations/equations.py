@@ -31,7 +31,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rank import SPARSE, TINY
 from ephs.solve.equations.model import compile_model
-from ephs.solve.march import Status
+from ephs.solve.march.records import Status
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import NO_STATE, Problem
 from ephs.solve.running.control import Tolerance
