@@ -113,10 +113,6 @@ class ReducedMethod(ABC):
         """None: the balance of energy shows it."""
         return None
 
-    def at(self, state: ReducedState, t: float) -> ReducedState:
-        """The same state at a time that differs by rounding."""
-        return replace(state, t=t)
-
     def anew(self, state: ReducedState) -> ReducedState:
         """The same state as a start: a new object without memory."""
         return replace(state, q=state.q.copy(), memory=())

@@ -13,6 +13,7 @@ from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Status
 from ephs.solve.march.stiff import Solver, Stiff, whole
+from ephs.solve.methods.places import add_to
 
 
 @staged
@@ -77,7 +78,7 @@ def filtered(on: Evaluator, step: MarchStep, errors: Errors, stiff: Stiff) -> Re
     def estimate(first: Vector) -> None:
         def each_entry(j: Integer) -> None:
             m[j] = first[j]
-            on.loop(stiff.stages.rows, lambda i: _add(m, j, step.tableau.error[i + 1] * step.k[i + 1, j]))
+            on.loop(stiff.stages.rows, lambda i: add_to(m, j, step.tableau.error[i + 1] * step.k[i + 1, j]))
 
         on.loop(m.size, each_entry)
         solver.one()
@@ -91,7 +92,7 @@ def filtered(on: Evaluator, step: MarchStep, errors: Errors, stiff: Stiff) -> Re
 
     def again() -> None:
         copy(on, step.start, stiff.y)
-        on.loop(m.size, lambda j: _add(stiff.y, j, m[j]))
+        on.loop(m.size, lambda j: add_to(stiff.y, j, m[j]))
         motion.warm(on, step.start, stiff.y)
         status = evaluate(on, step, stiff.y, stiff.q, stiff.rate)
         on.when(on.same(status, 0), lambda: estimate(stiff.rate))
@@ -99,10 +100,6 @@ def filtered(on: Evaluator, step: MarchStep, errors: Errors, stiff: Stiff) -> Re
     on.when(n.factored > -BEYOND, lambda: estimate(step.k.row(0)))
     on.when(on.negate(worst.value <= 1.0), again)
     return worst.value
-
-
-def _add(x: Vector, j: Integer, by: Real) -> None:
-    x[j] = x[j] + by
 
 
 @final
@@ -118,7 +115,7 @@ class _NewtonParts:
         """Write the state at a stage to y."""
         s, y = self.stiff, self.step.y
         copy(self.on, self.step.start, y)
-        self.on.loop(s.matrix.rows, lambda j: _add(y, j, s.stages[i, j]))
+        self.on.loop(s.matrix.rows, lambda j: add_to(y, j, s.stages[i, j]))
 
     def solve(self) -> None:
         """Write the Newton corrections of the stages."""
@@ -177,7 +174,7 @@ class _NewtonParts:
         """Add the change to the stages."""
         s = self.stiff
         stages, change = whole(s.stages), whole(s.change)
-        self.on.loop(stages.size, lambda j: _add(stages, j, change[j]))
+        self.on.loop(stages.size, lambda j: add_to(stages, j, change[j]))
 
     def rates(self) -> None:
         """Rates that lead to the stages, of all that is not summed: these are those of the stages."""

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.linear.dense import clear, copy, sum_of_squares
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import (
     Entry,
@@ -184,30 +184,17 @@ def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth
     Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.4 and II.10.
     """
     two, size = eighth[0] > 0, allowed.size
-    first, second = on.variable(0.0), on.variable(0.0)
-
-    def each_entry(j: Integer) -> None:
-        x = fine[j] / allowed[j]
-        first.value = first.value + x * x
-        y = coarse[j] / allowed[j]
-        second.value = on.select(two, second.value + y * y, 0.0)
-
-    on.loop(size, each_entry)
-    count = on.real(on.select(size > 1, size, 1))
-    both = first.value / on.sqrt((first.value + 0.01 * second.value) * count)
-    return on.select(on.both(two, on.negate(first.value <= 0.0)), both, on.sqrt(first.value / count))
+    first, other = (sum_of_squares(on, size, lambda j, x=x: x[j] / allowed[j]) for x in (fine, coarse))
+    second, count = on.select(two, other, 0.0), on.real(on.select(size > 1, size, 1))
+    both = first / on.sqrt((first + 0.01 * second) * count)
+    return on.select(on.both(two, on.negate(first <= 0.0)), both, on.sqrt(first / count))
 
 
 def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real:
     """Return the error shown by closing: DRIFT of the change of the rates, relative to their tolerance."""
-    n, total = after.size, on.variable(0.0)
-
-    def each_entry(j: Integer) -> None:
-        x = (after[j] - before[j]) / allowed[n + j]
-        total.value = total.value + x * x
-
-    on.loop(n, each_entry)
-    return DRIFT * on.sqrt(total.value / on.real(on.select(n > 1, n, 1)))
+    n = after.size
+    total = sum_of_squares(on, n, lambda j: (after[j] - before[j]) / allowed[n + j])
+    return DRIFT * on.sqrt(total / on.real(on.select(n > 1, n, 1)))
 
 
 def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real) -> Real:
@@ -215,14 +202,8 @@ def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real
 
     Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
     """
-    above, along = on.variable(0.0), on.variable(0.0)
-
-    def each_entry(j: Integer) -> None:
-        x, y = rise[j] / allowed[j], run[j] / allowed[j]
-        above.value, along.value = above.value + x * x, along.value + y * y
-
-    on.loop(allowed.size, each_entry)
-    return on.select(along.value > 0.0, on.absolute(h) * on.sqrt(above.value / along.value), 0.0)
+    above, along = (sum_of_squares(on, allowed.size, lambda j, x=x: x[j] / allowed[j]) for x in (rise, run))
+    return on.select(along > 0.0, on.absolute(h) * on.sqrt(above / along), 0.0)
 
 
 def stiffness_of(on: Evaluator, step: MarchStep, memory: Memory) -> Real:

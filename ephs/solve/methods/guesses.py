@@ -63,13 +63,11 @@ def restrain(on: Evaluator, t: Columns, z: Matrix, step: Matrix) -> Real:
                 def limit(bound: Real) -> None:
                     share.value = on.minimum(share.value, bound / fall)
 
-                def cool() -> None:
-                    limit(0.5 * warmth)
+                def warm() -> None:
+                    for falls, bound in ((fall > 0.5 * warmth, 0.5), (fall < -3.0 * warmth, -3.0)):
+                        on.when(falls, lambda bound=bound: limit(bound * warmth))
 
-                def heat() -> None:
-                    on.when(fall < -3.0 * warmth, lambda: limit(-3.0 * warmth))
-
-                on.when(warmth > 0.0, lambda: on.when(fall > 0.5 * warmth, cool, heat))
+                on.when(warmth > 0.0, warm)
 
             on.when(t.entropy[at] > 0.0, lambda: on.loop(z.rows, stage))
 

@@ -123,10 +123,6 @@ class Paced:
             end, _ = self._single(end, attempt.h / PARTS)
         return self._off(attempt.start, attempt.end, end)[0] / share_missed(self.method.order)
 
-    def at(self, state: PacedState, t: float) -> PacedState:
-        """The same state at a time that differs by rounding."""
-        return replace(state, t=t)
-
     def anew(self, state: PacedState) -> PacedState:
         """The same state as one to start from: unknowns are guessed afresh."""
         return replace(state, inner=replace(self.method.init(state.kept.x), sums=self._sums(state.kept)))

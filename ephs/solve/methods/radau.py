@@ -187,10 +187,6 @@ class Radau:
     def missed(self, attempt: Attempt[RadauState]) -> None:
         """None: the balance of energy shows it."""
 
-    def at(self, state: RadauState, t: float) -> RadauState:
-        """The same state at a time that differs by rounding."""
-        return replace(state, t=t)
-
     def anew(self, state: RadauState) -> RadauState:
         """The same state as one to start from, whose rates may be others than before."""
         return replace(state, h=0.0)

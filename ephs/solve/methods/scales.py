@@ -97,10 +97,8 @@ def still(on: Evaluator, t: Columns, z: Vector, m: Scratch) -> None:
         def made(j: Integer) -> None:
             effort = part.effort(j)
             warm = t.entropy[effort] > 0.0
-            on.when(warm, lambda: None, lambda: setattr(power, "value", power.value + able(effort)))
-
-        def able(effort: Integer) -> Real:
-            return m.dense[effort] * on.absolute(z[t.counts[0] + effort])
+            able = m.dense[effort] * on.absolute(z[part.balance(j)])
+            power.value = on.select(warm, power.value, power.value + able)
 
         def heat(j: Integer) -> None:
             effort, row = part.effort(j), part.balance(j)

@@ -25,7 +25,7 @@ from ephs.solve.running.control import SLIVER, Advance, Control, Grid, first_ste
 from ephs.solve.running.ending import audited, failures_of, repeatable
 from ephs.solve.running.journal import Written
 from ephs.solve.running.snapshot import Snapshot, like, parts
-from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, too_fast
+from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, at_time, too_fast
 from ephs.solve.running.watching import Balance, Progress
 
 S = TypeVar("S")
@@ -255,12 +255,12 @@ class _RunLoop(Generic[S]):
         t = self.t + attempt.h if end is None else end
         if end is None and self.policy is None:
             t = self.t0 + self.sign * self._next_on_grid * float(self.control.step or 0.0)
-        after = self.stepper.at(attempt.end, t)
+        after = at_time(attempt.end, t)
         stopped = None
         if self.watch.events:
             stopped = self.watch.step(self.t, t, self._at(after), lambda s: self._at(self.stepper.inside(attempt, s)))
             if stopped is not None and stopped != t:
-                t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
+                t, after = stopped, at_time(self.stepper.inside(attempt, stopped), stopped)
         self.watch.add((h for h in attempt.happened if self.sign * (t - h[0]) >= 0.0), self._at)
         if self.production.active:
             self.production.step(t, self.stepper.row(after))

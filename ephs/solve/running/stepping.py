@@ -1,7 +1,7 @@
 """Interface between the time loop and a method: one or many steps per call; steps and records."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, final
 
 import numpy as np
@@ -154,6 +154,11 @@ def too_fast(method: str, worst: str, asked: float) -> SolveError:
     return SolveError(Outcome.TINY, worst, told)
 
 
+def at_time(state: S, t: float) -> S:
+    """A method's state at a time that differs by rounding."""
+    return replace(state, t=t)  # pyright: ignore[reportArgumentType, reportCallIssue]
+
+
 class Leg(Protocol[S_co]):
     """A run in compiled code, several steps per call; ``left`` if it stopped before the end."""
 
@@ -230,10 +235,6 @@ class Stepper(Protocol[S]):
 
     def missed(self, attempt: Attempt[S]) -> float | None:
         """Error of a step, by others of another length, in tolerances; None where the balance of energy shows it."""
-        ...
-
-    def at(self, state: S, t: float) -> S:
-        """The same state at a time within rounding."""
         ...
 
     def anew(self, state: S) -> S:
