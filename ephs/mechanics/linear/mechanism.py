@@ -26,7 +26,7 @@ from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenv
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
 from ephs.solve.equations.heats import exponential_law
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.posing.errors import OptionError
 from ephs.solve.result.replay import replay
@@ -355,7 +355,7 @@ def _numbered(name: str, count: int) -> list[str]:
 def _play(linear: _LinearisedMotion, t: Array, moved: Array) -> Solution:
     """The mechanism along some displacements (frames, states) of the state."""
     problem = linear.model.problem
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem, 0.0)
     stored, rows = StoredEnergies(model), list[Row]()
     for row in moved:
         at = linear.model.moved(linear.state, linear.free.Z @ row[: linear.k])

@@ -17,7 +17,7 @@ from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.systems.system import System
 from ephs.solve.equations.instant import rates_read
-from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.equations.model import Model, model_of
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.stored import StoredEnergies
@@ -131,7 +131,7 @@ class Pencil:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.model: Model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+        self.model: Model = model_of(problem, 0.0)
         self.equations = Continuous(self.model)
         self.n_w, self.n_e, self.n_l, _ = (int(count) for count in self.model.tables.counts)
         self._given = self.model.input_values()

@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.jacobian import Jacobian
-from ephs.mechanics.methods.sparse import NOTHING, PIVOTS, SparseSystems
+from ephs.mechanics.methods.sparse import PIVOTS, SparseSystems, by_freedoms
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
@@ -208,13 +208,11 @@ class KeptJacobian:
         """
         found, f = self._stages.kept.renew(state), self._stages.equations.n
         assert isinstance(found, np.ndarray)
-        by_rates, by_places, by_heats = found[f : 2 * f, f : 2 * f], found[:f, :f], found[f:, 2 * f :]
-        self.memory["matrix"][:] = found
-        self.memory["damping"][:] = by_rates + by_places
-        self.memory["spring"][:] = by_rates @ by_places - found[f : 2 * f, :f]
+        self.memory["matrix"][:], split = found, by_freedoms(found, f, f)
+        if split is not None:
+            self.memory["damping"][:], self.memory["spring"][:] = split
         n: Any = self.newton[0]
-        n.stale, n.young, n.factored = 0, 1, 0.0
-        n.split = int(np.abs(by_heats).max(initial=0.0) <= NOTHING * np.abs(found).max(initial=0.0))
+        n.stale, n.young, n.factored, n.split = 0, 1, 0.0, int(split is not None)
 
     @property
     def cost(self) -> int:

@@ -20,7 +20,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector
-from ephs.solve.equations.model import Evaluation, Model, compile_model
+from ephs.solve.equations.model import Evaluation, Model, model_of
 from ephs.solve.methods.moves import move_states
 from ephs.solve.methods.natural import Natural, NaturalState
 from ephs.solve.methods.records import Columns, Scratch
@@ -53,7 +53,7 @@ class _Side:
 
     @staticmethod
     def of(problem: Problem, t0: float) -> "_Side":
-        return _Side(problem, compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial)))
+        return _Side(problem, model_of(problem, t0))
 
     def numbers(self, name: str) -> Array:
         """Point at which the equations are evaluated."""

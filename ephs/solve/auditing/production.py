@@ -76,7 +76,7 @@ def _watched(d: Descriptor) -> tuple[Index, Index, Index]:
 def _capacity(problem: Problem) -> float:
     """Sum of the heat capacities ds/d(log θ) of what stores entropy, at the initial states, in J/K."""
     d = problem.descriptor
-    x, total = d.pack(problem.initial), 0.0
+    x, total = problem.point, 0.0
     for slot, storage in d.storages:
         point = d.point(slot, x)
         for _, where, quantity in storage.bundle.items():

@@ -29,8 +29,8 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.solve.auditing.growth import Again, apart
-from ephs.solve.auditing.retaken import MOST, Retaken, Spread
-from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.auditing.retaken import MOST, Retaken, Spread, evenly_spread
+from ephs.solve.equations.model import Model, model_of
 from ephs.solve.methods.driven import advance_driven
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.paced import Paced
@@ -215,11 +215,11 @@ def natural_trials(
         return None
     t, d = solution.t, problem.descriptor
     count = int(np.clip(int(solution.stats["steps"]) // EACH, LEAST, MOST))
-    spread = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
+    spread = evenly_spread(len(solution) - 1, count)
     end = np.inf if int(solution.stats["steps"]) < PAIR else float(t.max()) + SLIVER * h
     instants = [i for i in spread if _clear(float(t[i]), PAIR * h, end, jumps)]
     if own is None or own.model.descriptor is not d:
-        own = make(compile_model(d, problem.reference, problem.inputs(float(t[0]), problem.initial)))
+        own = make(model_of(problem, float(t[0])))
     method, makers = own, np.array([isinstance(slot.primitive, Irreversible) for slot in d.components])
 
     @lru_cache(2 * len(instants))
@@ -316,7 +316,7 @@ def trials_of(
     if not clear:
         return natural
     count = int(np.clip(steps // EACH, LEAST, MOST))
-    chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
+    chosen = [clear[i] for i in evenly_spread(len(clear), count)]
     sign = float(np.sign(h))
 
     @lru_cache(2 * len(chosen))

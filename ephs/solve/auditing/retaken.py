@@ -26,6 +26,11 @@ EACH, MOST = 60, 6
 """One in so many steps is taken again, at most so many and the longest: three steps in place of three times 60."""
 
 
+def evenly_spread(size: int, count: int) -> list[int]:
+    """Numbers of so many things out of some, from the first on."""
+    return np.unique(np.linspace(0, size, count, endpoint=False).astype(int)).tolist()
+
+
 def share_missed(order: int) -> float:
     """Part of the error of two half steps by which thirds of a step differ from them, of a method of this order."""
     return 1.0 - (2.0 / PARTS) ** order
@@ -110,7 +115,7 @@ class Retaken(Generic[S]):
         if self._longest is None:
             return None
         steps, spread = self._spread.count, self._spread.kept
-        chosen = np.unique(np.linspace(0, len(spread), min(MOST, steps // EACH), endpoint=False).astype(int))
+        chosen = evenly_spread(len(spread), min(MOST, steps // EACH))
         found: list[tuple[float, float]] = []
         for t, attempt in [self._longest, *(spread[i] for i in chosen)]:
             breakpoints.stand(t)

@@ -11,7 +11,7 @@ from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.spaces.pairs import Pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.result.states import RecordedStates
 
@@ -84,7 +84,7 @@ def _storage_sizes(problem: "Problem", t: float, x: Array) -> tuple[float, float
     turning, moving, momenta, velocities = once(d, "places of storages", lambda: _places(d))
     if not (turning.size or moving.size or velocities.size):
         return 0.0, 0.0, 0.0
-    stored = StoredEnergies(compile_model(d, problem.reference, problem.inputs(t, problem.initial)))
+    stored = StoredEnergies(model_of(problem, t))
     sizes = np.abs(stored.efforts(x)[d.rate_size :])
     unit = x.copy()  # momenta of 1 N s along x: velocities are inverse masses
     unit[momenta] = UNIT

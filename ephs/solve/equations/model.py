@@ -18,8 +18,9 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.kept import once
 from ephs.solve.equations.layout import entry_of, laid_out
 from ephs.solve.equations.sparse import Index
-from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, TablesOf
+from ephs.solve.methods.records import Memory, MemoryOf, Tables, TablesOf
 from ephs.solve.methods.residuals import FAULTS, evaluation_program
+from ephs.solve.posing.problem import Problem
 from ephs.solve.running.snapshot import parts
 
 
@@ -58,10 +59,10 @@ class Model:
         """(h, θ₀, π₀), arguments of kernels."""
         return np.array([h, self.reference.temperature, self.reference.pressure])
 
-    def input_values(self) -> Array:
-        """The values of the inputs, port by port."""
-        values = [self.inputs[slot.path].value for slot in self.descriptor.outer]
-        return np.concatenate([*values, np.zeros(1)])
+    def input_values(self, inputs: Mapping[Path, Input] | None = None) -> Array:
+        """The values of inputs, port by port; its own where None."""
+        given = self.inputs if inputs is None else inputs
+        return np.concatenate([*(given[slot.path].value for slot in self.descriptor.outer), np.zeros(1)])
 
     def memory(self) -> Memory:
         """Scratch memory for the loop, but for factors."""
@@ -74,10 +75,6 @@ class Model:
             **dict.fromkeys(("residual", "scale", "step", "dense", "pivot"), self.unknowns),
         }  # fmt: skip
         return MemoryOf(**{name: np.zeros(size) for name, size in sizes.items()})
-
-    def storages(self) -> "Model":
-        """The model with its storages only."""
-        return self.only(np.flatnonzero(self.tables.kind == STORING))
 
     def only(self, chosen: Index) -> "Model":
         """The model with these components alone, in this order, at the same places."""
@@ -165,6 +162,12 @@ def compile_model(
     if any(primitive.kernel is None for primitive in descriptor.numbering.primitives):
         return made()  # an exception of a Python component belongs to one run
     return replace(once(descriptor, key, made), inputs=given)
+
+
+def model_of(problem: Problem, t0: float, *, matrix: bool = True) -> Model:
+    """The compiled model of a problem with its inputs at the start, t0 in s; see `compile_model`."""
+    given = problem.inputs(t0, problem.initial)
+    return compile_model(problem.descriptor, problem.reference, given, matrix=matrix)
 
 
 def _resting(d: Descriptor, chosen: Index) -> tuple[Index, Index]:

@@ -54,7 +54,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     """
     if problem.scene is not None or not (model.constraint_rows.size or _bare(problem)):
         return
-    x = problem.descriptor.pack(problem.initial)
+    x = problem.point
     jumping = _jumping(problem, model, x, h)
     if not jumping:
         return

@@ -218,7 +218,7 @@ def _compliance(model: Model, values: Array) -> Any:
 
 def _largest(matrix: Any) -> Array:
     """(nnz,) largest size of an entry in each entry's row."""
-    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    row = matrix.tocoo().row
     most = np.zeros(matrix.shape[0])
     np.maximum.at(most, row, np.abs(matrix.data))
     return most[row]
@@ -229,7 +229,7 @@ def _balanced(matrix: Any, plain: NDArray[np.bool_]) -> Any:
 
     Sizes spread from those of storages, row by row.
     """
-    row, column = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)), matrix.indices
+    row, column = matrix.tocoo().coords
     used, left = matrix.data != 0.0, plain.copy()
     while True:
         size, theirs = np.abs(matrix.data), left[column]

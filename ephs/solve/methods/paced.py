@@ -11,7 +11,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.equations.instant import rates_read
-from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.equations.model import Model, model_of
 from ephs.solve.equations.starting import check_start
 from ephs.solve.methods.driven import advance_driven, advance_whole
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
@@ -52,7 +52,7 @@ class Paced:
 
     def __init__(self, problem: Problem, t0: float, control: Control, make: Callable[[Model], Natural]) -> None:
         d = problem.descriptor
-        self._make, self._model = make, compile_model(d, problem.reference, problem.inputs(t0, problem.initial))
+        self._make, self._model = make, model_of(problem, t0)
         self.problem, self.method = problem, make(self._model)
         self.name, self._step = self.method.name, control.step
         self._within: Natural | None = None
@@ -69,7 +69,7 @@ class Paced:
             The states contradict the constraints.
         """
         check_start(self.problem, self.method.model, h)
-        x = self.problem.descriptor.pack(self.problem.initial)
+        x = self.problem.point
         energies = self.method.energies(x)
         return PacedState(t, self.method.init(x), Row(x, energies, np.zeros(4)))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.march.iteration import FAST, iterate
 from ephs.solve.methods.collocation import moments, radau_for, values
 from ephs.solve.methods.continuous import AccumulatorRates, Matrices
@@ -96,7 +96,7 @@ class Radau:
 
     def __init__(self, problem: Problem, t0: float, control: Control) -> None:
         self.problem = problem
-        self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
+        self.model = model_of(problem, t0)
         self.stores = HeatStores(self.model)
         self.equations = EnergyEquations(self.model, self.stores)
         self._given = self.model.input_values()
@@ -121,8 +121,8 @@ class Radau:
         p = self.problem
         if p.constant:
             return self._given
-        given = p.inputs(t, NO_STATE if p.timed else p.descriptor.unpack(self.stores.entropies(y)))
-        return np.concatenate([*(given[slot.path].value for slot in self.problem.descriptor.outer), np.zeros(1)])
+        state = NO_STATE if p.timed else p.descriptor.unpack(self.stores.entropies(y))
+        return self.model.input_values(p.inputs(t, state))
 
     def start(self, t: float, h: float) -> RadauState:
         """The initial state; rates and multipliers there come from a step too short to move anything.
@@ -133,7 +133,7 @@ class Radau:
             The states contradict the constraints: however short the step, they jump.
         """
         d = self.model.descriptor
-        y = self.stores.numbers(d.pack(self.problem.initial))
+        y = self.stores.numbers(self.problem.point)
         z = self.equations.guess(y)
         account = self._settling.opened(y) if self._settling.active else np.zeros(0)
         sums, stages = np.zeros(4 + len(d.components)), np.zeros((self.scheme.nodes.size, z.size))

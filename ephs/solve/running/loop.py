@@ -353,6 +353,12 @@ class _RunLoop(Generic[S]):
                 self.kept.add(self.stepper.record(block))
         self.blocks, self.pending = [], []
 
+    @property
+    def _resumable(self) -> dict[str, Any]:
+        """What has snapshots of its own, by name."""
+        own = {"watch": self.watch, "breakpoints": self.breakpoints, "forecast": self.forecast}
+        return own if self.policy is None else {**own, "policy": self.policy}
+
     def write(self, *, end: bool = False) -> None:
         """An entry in the journal, if there is one."""
         if self.journal is not None:
@@ -373,10 +379,7 @@ class _RunLoop(Generic[S]):
             "ended": self.ended,
             "state": parts(self.state),
             "method": method,
-            "policy": self.policy.snapshot() if self.policy is not None else None,
-            "watch": self.watch.snapshot(),
-            "breakpoints": self.breakpoints.snapshot(),
-            "forecast": self.forecast.snapshot(),
+            **{name: part.snapshot() for name, part in self._resumable.items()},
             "samples": self.samples.snapshot(),
             "leg": self.leg.snapshot() if self.leg is not None else None,
         }
@@ -391,14 +394,11 @@ class _RunLoop(Generic[S]):
         self.begin = time.perf_counter() - self.setup - found["elapsed"]
         self.ended = found["ended"]
         self.state = like(self.state, found["state"])
-        self.breakpoints.restore(found["breakpoints"])
+        for name, part in self._resumable.items():
+            part.restore(found[name])
         self.stepper.restore(found["method"], self.state)
         self.production.start(self.stepper.row(self.state))
-        if self.policy is not None:
-            self.policy.restore(found["policy"])
-        self.watch.restore(found["watch"])
         self.kept = RowBlocks()
-        self.forecast.restore(found["forecast"])
         self.samples.restore(found["samples"], self.state)
         if self.journal.rows is not None:
             self.kept.add(self.journal.rows, written=True)
