@@ -6,7 +6,7 @@ later factorisation only computes numbers in fixed places, watching its pivots.
 """
 
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +101,17 @@ def paired(n: int, row: Index, column: Index, value: Array) -> Index:
         if np.all(rows >= 0):
             return rows.astype(np.int64)
     raise RuntimeError("singular by its pattern")
+
+
+def row_parts(matrix: Any) -> list[Index]:
+    """The rows of each part that a sparse matrix falls into: rows of different parts have no column in common."""
+    from scipy.sparse import block_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
+    part = part[: matrix.shape[0]]
+    found = np.argsort(part, kind="stable")
+    return [each for each in np.split(found, np.searchsorted(part[found], np.arange(1, count))) if each.size]
 
 
 def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:
