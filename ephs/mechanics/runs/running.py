@@ -17,7 +17,8 @@ from ephs.solve.posing.events import Event
 from ephs.solve.posing.problem import Problem, State
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import RTOL, Control, Tolerance
-from ephs.solve.running.loop import RunRequest, integrate
+from ephs.solve.running.loop import integrate
+from ephs.solve.running.request import RunRequest
 from ephs.solve.running.watching import Progress
 
 CLOSE = 1e-4

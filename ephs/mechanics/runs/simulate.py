@@ -29,7 +29,7 @@ from ephs.solve.posing.sampled import Sampling, holding
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import ATOL, RTOL, Control, Tolerance, told_apart
 from ephs.solve.running.journal import Journal
-from ephs.solve.running.loop import RunRequest
+from ephs.solve.running.request import RunRequest
 from ephs.solve.running.threads import in_one_thread
 from ephs.solve.running.watching import guarded
 

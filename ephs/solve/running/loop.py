@@ -3,30 +3,30 @@
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from typing import Any, Generic, TypeVar, final
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.auditing.audit import Bounds, Tests
+from ephs.solve.auditing.audit import Tests
 from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.march.control import Policy
 from ephs.solve.posing.breakpoints import Breakpoints
 from ephs.solve.posing.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
-from ephs.solve.posing.events import Event, Watch
+from ephs.solve.posing.events import Watch
 from ephs.solve.posing.problem import Problem, States
 from ephs.solve.result.record import RowBlocks, RunRecord, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import SLIVER, Advance, Control, Grid, first_step
 from ephs.solve.running.ending import audited, failures_of, repeatable
-from ephs.solve.running.journal import Written
+from ephs.solve.running.request import RunRequest
 from ephs.solve.running.snapshot import Snapshot, like, parts
 from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, at_time, too_fast
-from ephs.solve.running.watching import Balance, Progress
+from ephs.solve.running.watching import Balance
 
 S = TypeVar("S")
 RESPONSE = 0.1
@@ -36,31 +36,6 @@ BLOCK = 1024
 """Rows buffered before conversion into records."""
 FINAL = (Outcome.PYTHON, Outcome.INPUT, Outcome.EVENT, Outcome.INCONSISTENT, Outcome.INTERRUPTED)
 """Failures that shorter steps cannot avoid."""
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class RunRequest:
-    """What is asked for of a run besides its steps.
-
-    Parameters
-    ----------
-    save_at
-        Times to keep; None: every step.
-    remarks
-        What else the statistics are to say.
-    journal
-        Where the run is written down, and what an earlier part of it left there.
-    bounds
-        What the audit of the run allows; None: there is none.
-    """
-
-    events: tuple[Event, ...] = ()
-    save_at: Array | None = None
-    progress: Progress | None = None
-    remarks: Mapping[str, Any] = field(default_factory=dict)
-    journal: Written | None = None
-    bounds: Bounds | None = None
 
 
 def integrate(
