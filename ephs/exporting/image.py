@@ -25,8 +25,8 @@ from ephs.semantics.spaces import codes
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.records import Table
 from ephs.semantics.systems.system import System
-from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import Proportional
+from ephs.solve.march.records import MarchControl
 from ephs.solve.posing.problem import Problem
 from ephs.solve.running.control import ATOL, RTOL, first_step
 from ephs.solve.running.stepping import Span
@@ -103,7 +103,7 @@ class Image:
     march: Bound
     read: Bound
     rates: Bound
-    control: Table[Steering]
+    control: Table[MarchControl]
     drive: Array
     supply: Array
     out: Array
@@ -186,7 +186,7 @@ def _started(
     control = control_of(problem, tableau(method).order, rtol, atol, step, None, None, None)
     state = equations.start(0.0)
     explicit = Explicit(equations, control, tableau(method))
-    policy = None if step is not None else Proportional(lambda: explicit.exponent, lambda: explicit.share)
+    policy = None if step is not None else Proportional(explicit)
     span = Span(state, 0.0, until, first_step(control, until), control, policy, np.zeros(0), 0)
     leg = explicit.many(span)
     if leg is None:

@@ -17,7 +17,7 @@ from ephs.semantics.stage import Program
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.stage.emission import hexadecimal
 from ephs.semantics.stage.programs import located
-from ephs.solve.march import Ending, MarchControl
+from ephs.solve.march.records import Ending, MarchControl
 
 _DEFINED: Final = re.compile(r"^define (?:internal )?(?:fastcc )?\S+ @([\w.]+)\(", re.MULTILINE)
 _DECLARED: Final = re.compile(r"^declare .*$\n?", re.MULTILINE)

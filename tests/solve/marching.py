@@ -8,8 +8,11 @@ import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Vector, integer, kind_of, table, vector
-from ephs.solve.march import Ending, MarchControl, Memory, Motion, RunAccount, TableauRecord, march
+from ephs.solve.march.account import RunAccount
 from ephs.solve.march.control import DAMPING, STRICT
+from ephs.solve.march.march import march
+from ephs.solve.march.memory import Memory
+from ephs.solve.march.records import Ending, MarchControl, Motion, TableauRecord
 
 
 @final

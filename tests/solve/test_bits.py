@@ -15,7 +15,8 @@ from ephs.semantics.stage import Program
 from ephs.solve.equations.model import Model, compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.newton import natural_program
-from ephs.solve.methods.records import DONE, parts_of
+from ephs.solve.methods.records import DONE
+from ephs.solve.running.snapshot import parts
 from tests.numerics import generators, seeds
 from tests.scenes import shipped
 
@@ -34,7 +35,7 @@ def model_of(name: str) -> tuple[Model, np.ndarray]:
 
 
 def copied(value):
-    return {name: array.copy() for name, array in parts_of(value).items()}
+    return {name: array.copy() for name, array in parts(value).items()}
 
 
 def same(program: Program, name: str, given) -> list:
@@ -71,7 +72,7 @@ def test_a_step_of_order_2(name, seed):
     def given():
         tables = made.tables, method._groups, method.elimination
         return [
-            *map(parts_of, tables), copied(method._memory), copied(method._scratch), x.copy(), state.z.copy(),
+            *map(parts, tables), copied(method._memory), copied(method._scratch), x.copy(), state.z.copy(),
             state.previous.copy(), made.scal(h), made.scal(0.0), made.input_values()[None], state.sums.copy(),
             *[row.copy() for row in rows], np.zeros(4, dtype=np.int64), 1,
         ]  # fmt: skip
@@ -91,7 +92,7 @@ def test_the_stages_of_order_4(name, seed):
 
     def given():
         return [
-            parts_of(made.tables), parts_of(method._groups), np.zeros(made.unknowns, dtype=np.int64), x.copy(),
+            parts(made.tables), parts(method._groups), np.zeros(made.unknowns, dtype=np.int64), x.copy(),
             state.z.copy(), made.scal(h), made.scal(0.0), inputs,
             copied(made.memory()), copied(method._scratch), 1,
         ]  # fmt: skip

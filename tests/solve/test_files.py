@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -115,6 +116,22 @@ def test_reading_loads_none_of_the_packages_for_tables(tmp_path, damped):
     script = f"import sys, ephs; ephs.load_solution({str(file)!r}); print(*{heavy} & {{*sys.modules}})"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_a_variable_needs_no_name_in_words(tmp_path, driven):
+    """Files of other programs may lack it; what it is in is still read, and so are its numbers."""
+    sol = ephs.simulate(driven, 0.5, step=0.1, inputs={"p": {"flow": np.sin}}, audit="off")
+    read = []
+    for kept in (("units", "long_name"), ("units",), ()):
+        sol.save(tmp_path / "sol.nc")
+        with h5py.File(tmp_path / "sol.nc", "r+") as opened:
+            array = next(opened[key] for key in opened if key.startswith("input:"))
+            for name in {"units", "long_name"}.difference(kept):
+                del array.attrs[name]
+        ((_, given),) = ephs.load_solution(tmp_path / "sol.nc").inputs.items()
+        read.append((given.units, bool(given.says)))
+        assert np.array_equal(given.values, next(iter(sol.inputs.values())).values)
+    assert read == [("N", True), ("N", False), ("SI", False)]
 
 
 def test_packed_numbers_are_refused(tmp_path, damped):

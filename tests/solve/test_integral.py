@@ -1,5 +1,7 @@
 """Rates of systems in integral causality: they solve the general equations, and so do their derivatives."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -75,7 +77,7 @@ def test_stages_are_independent():
 
 
 def test_a_step_that_hardly_grows_is_kept():
-    policy = Proportional(lambda: 4.0, hold=lambda: 1.2)
+    policy = Proportional(SimpleNamespace(exponent=4.0, share=0.0, hold=1.2))
     kept = [policy.judge(1.0, error, 100.0)[1] for error in (0.8, 0.5, 0.35)]
     assert kept == [1.0, 1.0, 1.0]
     assert policy.judge(1.0, 0.1, 100.0)[1] == pytest.approx(0.9 * 0.1**-0.25)

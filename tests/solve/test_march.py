@@ -1,6 +1,7 @@
 """Explicit steps as staged functions: orders, references, control, endings, the same bits by every way to run them."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from scipy.integrate import solve_ivp
 import ephs
 from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
-from ephs.solve.march import STEPS, Ending, MarchControl, Motion
 from ephs.solve.march.control import DAMPING, HELD, STRICT, UNFELT, Proportional, held_back, length
+from ephs.solve.march.records import Ending, MarchControl, Motion
+from ephs.solve.march.steps import STEPS
 from tests.numerics import EPS, largest
 from tests.solve.marching import Field, field, program, start
 
@@ -287,7 +289,7 @@ def test_steps_are_judged_by_proportional_integral_control(h, error, before, fai
     assert c.step == pytest.approx(following, rel=100.0 * EPS)
     assert c.before == pytest.approx(max(shared, 1e-4) if accepted else before)
     assert bool(c.failed) == (not accepted)
-    policy = Proportional(lambda: exponent, lambda: share)
+    policy = Proportional(SimpleNamespace(exponent=exponent, share=share, hold=1.0))
     policy.restore({"before": before, "failed": failed})
     assert policy.judge(h, error, 1.0) == (accepted, c.step)
     assert policy.snapshot() == {"before": c.before, "failed": bool(c.failed)}

@@ -12,6 +12,7 @@ from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.solve.auditing.production import Production
 from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.running.stepping import Row
 from examples.failing import driving
 from tests.semantics.zoo import AB, PS, conduction_matrix, friction_matrix
 
@@ -48,7 +49,7 @@ def watch(system, sign=1.0):
     found = Production(problem, sign)
     d = problem.descriptor
     x, energies = d.pack(problem.initial), np.zeros(len(d.components))
-    found.start(x, energies)
+    found.start(Row(x, energies, np.zeros(4)))
     at = {str(slot.path): i for i, slot in enumerate(d.components)}
     return found, SimpleNamespace(x=x, energies=energies, at=at)
 
@@ -64,14 +65,14 @@ def test_a_destruction_beyond_rounding_names_the_component_and_the_size(sign):
     proved, searched = run.at["wall0"], run.at["wall1"]
     moved = run.x + 1e-3
     run.energies[proved] = -sign  # not looked at
-    found.step(0.1, moved, run.energies)
+    found.step(0.1, Row(moved, run.energies, np.zeros(4)))
     worse = run.energies.copy()
     worse[searched] -= sign * 1e-17  # of 2e-3 J/K exchanged, rounding
-    found.step(0.2, moved + 1e-3, worse)
+    found.step(0.2, Row(moved + 1e-3, worse, np.zeros(4)))
     bad = worse.copy()
     bad[searched] -= sign * 1e-9
     with pytest.raises(SolveError) as caught:
-        found.step(0.3, moved + 2e-3, bad)
+        found.step(0.3, Row(moved + 2e-3, bad, np.zeros(4)))
     assert (caught.value.outcome, caught.value.path) == (Outcome.ENTROPY, "wall1")
     assert "-1e-09 J/K in the step to t = 0.3 s" in caught.value.equation
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.stage import Entry, Evaluator, Program, Vector, vector
 from ephs.solve.methods.moves import tighten
-from ephs.solve.methods.records import parts_of
 from ephs.solve.methods.residuals import evaluation_program
 from ephs.solve.methods.scales import SPREAD, TAKES_PART
+from ephs.solve.running.snapshot import parts
 from tests.numerics import generators, seeds
 from tests.scenes import model_of, shipped
 
@@ -24,7 +24,7 @@ def model():
 
 
 def measure(t, z, dropped, memory):
-    return CALLS["measure"](parts_of(t), z, dropped, parts_of(memory))
+    return CALLS["measure"](parts(t), z, dropped, parts(memory))
 
 
 def filled(model, seed):
@@ -45,7 +45,7 @@ def test_flows_that_there_could_be(model, seed):
     rates, count, matrix, scale, memory = filled(model, seed)
     t = model.tables
     efforts = slice(rates, rates + count)
-    CALLS["reach"](parts_of(t), parts_of(memory))
+    CALLS["reach"](parts(t), parts(memory))
     largest = matrix[:, efforts].max(axis=1)
     block = np.zeros(memory.block.size)
     np.maximum.at(block, t.block, scale)
@@ -63,7 +63,7 @@ def test_flows_that_there_could_be(model, seed):
 def test_efforts_of_storages_are_known_to_the_rounding_of_their_balances(model, seed):
     rates, count, matrix, scale, memory = filled(model, seed)
     t = model.tables
-    CALLS["weigh"](parts_of(t), parts_of(memory))
+    CALLS["weigh"](parts(t), parts(memory))
     expected = scale.copy()
     with np.errstate(divide="ignore"):
         least = np.where(matrix > 0.0, scale[:, None] / matrix, np.inf)[rates:, rates : rates + count].min(axis=0)

@@ -22,12 +22,11 @@ from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION
 from ephs.semantics.spaces.rotations import hat
 from ephs.solve.equations.heats import exponential_law
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.posing.errors import OptionError
 from ephs.solve.result.replay import replay
@@ -90,8 +89,7 @@ class _LinearisedMotion:
         self.velocities = model.velocity_derivatives(self.state)
         self.motors = model.layout.attached
         d = model.problem.descriptor
-        storages = [(slot, slot.primitive) for slot in d.components if isinstance(slot.primitive, Storage)]
-        stores = {state.path: storage for slot, storage in storages for state in slot.reads}
+        stores = {state.path: storage for slot, storage in d.storages for state in slot.reads}
         self.stores = [stores[path] for path in model.layout.entropies]
         self.nodes = [i for i, store in enumerate(self.stores) if i in self.motors or not store.environment]
         self.ad = self._ad()
@@ -357,7 +355,7 @@ def _numbered(name: str, count: int) -> list[str]:
 def _play(linear: _LinearisedMotion, t: Array, moved: Array) -> Solution:
     """The mechanism along some displacements (frames, states) of the state."""
     problem = linear.model.problem
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+    model = model_of(problem, 0.0)
     stored, rows = StoredEnergies(model), list[Row]()
     for row in moved:
         at = linear.model.moved(linear.state, linear.free.Z @ row[: linear.k])

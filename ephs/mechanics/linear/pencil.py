@@ -13,12 +13,11 @@ import numpy as np
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.systems.system import System
 from ephs.solve.equations.instant import rates_read
-from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.equations.model import Model, model_of
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import Continuous
 from ephs.solve.methods.stored import StoredEnergies
@@ -132,7 +131,7 @@ class Pencil:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.model: Model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
+        self.model: Model = model_of(problem, 0.0)
         self.equations = Continuous(self.model)
         self.n_w, self.n_e, self.n_l, _ = (int(count) for count in self.model.tables.counts)
         self._given = self.model.input_values()
@@ -251,14 +250,9 @@ class Pencil:
     @property
     def counted(self) -> Index:
         """Places of the rates that must vanish at rest: all but the environment's."""
-        d = self.problem.descriptor
-        return np.array(
-            [
-                i for slot in d.components if isinstance(slot.primitive, Storage) and not slot.primitive.environment
-                    for i in rates_read(slot)
-            ],
-            dtype=np.int64,
-        )  # fmt: skip
+        stored = self.problem.descriptor.storages
+        found = [i for slot, storage in stored if not storage.environment for i in rates_read(slot)]
+        return np.array(found, dtype=np.int64)
 
     def implicit_step(self, x: Array, guess: Array, h: float) -> Array | None:
         """The unknowns at the end of an implicit Euler step of h seconds; None where Newton's method finds none.

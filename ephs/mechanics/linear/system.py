@@ -16,7 +16,6 @@ from ephs.mechanics.linear.statespace import StateSpace
 from ephs.mechanics.linear.structure import PortHamiltonian, Sizes
 from ephs.mechanics.scene.errors import did_you_mean, listing
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares, pseudoinverse, svd, symmetric_eigenvalues
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, NEIGHBOUR, SPANNED, TINY, rank_of
@@ -82,10 +81,7 @@ class LinearSystem:
         self.z = pencil.unknowns(x)
         self.parts = p = pencil.parts(x, self.z)
         self.held = pencil.differentiated(p)
-        still = [
-            i for slot in d.components if isinstance(slot.primitive, Storage) and slot.primitive.environment
-            for i in rates_read(slot)
-        ]  # fmt: skip
+        still = [i for slot, storage in d.storages if storage.environment for i in rates_read(slot)]
         self.left_out = np.array(still, dtype=np.int64)
         self.which = pencil.independent(p, self.left_out)
         self.X = X = pencil.span(p, self.which, self.left_out)

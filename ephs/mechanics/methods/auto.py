@@ -21,8 +21,8 @@ from ephs.mechanics.methods.semi import cheap, semi_implicit
 from ephs.mechanics.methods.stages import costs, scheme_of
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.stage import PLAIN
-from ephs.solve.march import MarchControl as Steering
 from ephs.solve.march.control import PATIENCE, held_back
+from ephs.solve.march.records import MarchControl
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.running.control import Control
 from ephs.solve.running.loop import FINAL
@@ -58,11 +58,10 @@ class Auto(ReducedMethod):
         super().__init__(equations, control)
         name = "rk87" if control.rtol.value < DIGITS else "rk54"
         self._explicit, self._limit = Explicit(equations, control, tableau(name)), LIMITS[name]
-        self._semi: Explicit | None = None
-        self._implicit: Implicit | None = None
+        self._methods: dict[str, Explicit | Implicit] = {name: self._explicit}
         self._active: Explicit | Implicit = self._explicit
         self._contest: Contest | None = None
-        self._nearness, self._failures = Steering.table(1), 0
+        self._nearness, self._failures = MarchControl.table(1), 0
         self._nearness[0].limit = self._limit
         self.counts: dict[str, Any] = {"switches": []}
         touches = _touches(equations)
@@ -92,15 +91,12 @@ class Auto(ReducedMethod):
 
     def _take(self, name: str) -> None:
         """Let a method take the steps that follow."""
-        if name == SEMI:
-            self._semi = self._active = self._semi or semi_implicit(self.equations, self.control)
-        elif name == "radau":
-            self._active = self._implicit = self._implicit or self._made()
-        else:
-            self._active = self._explicit
-        self.exponent, self.share, self.hold = self._active.exponent, self._active.share, self._active.hold
+        if name not in self._methods:
+            self._methods[name] = semi_implicit(self.equations, self.control) if name == SEMI else self._implicit()
+        active = self._active = self._methods[name]
+        self.exponent, self.share, self.hold = active.exponent, active.share, active.hold
 
-    def _made(self) -> "Implicit":
+    def _implicit(self) -> "Implicit":
         from ephs.mechanics.methods.radau import Implicit  # with derivatives, which explicit runs do not need
 
         known = dict(self.counts)
@@ -146,7 +142,7 @@ class Auto(ReducedMethod):
             return
         if self._contest is not None and SEMI in self._names:
             self._contest.without(self._names.index(SEMI))
-        elif self._active is self._semi:
+        elif self._active.name == SEMI:
             self._compete(serves=False)
             self.name = self.counts["chosen"] = self._active.name
 
@@ -171,8 +167,7 @@ class Auto(ReducedMethod):
     def taken(self, state: ReducedState) -> Snapshot:
         """Memory of its methods, and what their choice depends on."""
         return {
-            "explicit": self._explicit.taken(state),
-            "implicit": self._implicit.snapshot(state) if self._implicit is not None else None,
+            "methods": {name: method.snapshot(state) for name, method in self._methods.items()},
             "nearness": [int(self._nearness[0].held), int(self._nearness[0].free), self._failures],
             "contest": None if self._contest is None else self._contest.snapshot(),
             "active": self._active.name,
@@ -181,11 +176,9 @@ class Auto(ReducedMethod):
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        self._explicit.take(own["explicit"], state)
-        if own["implicit"] is not None:
-            self._take("radau")
-            assert self._implicit is not None
-            self._implicit.restore(own["implicit"], state)
+        for name, found in own["methods"].items():
+            self._take(name)
+            self._active.restore(found, state)
         if own["contest"] is None:
             self._contest = None
         elif self._contest is not None:

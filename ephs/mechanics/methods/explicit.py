@@ -16,8 +16,8 @@ from ephs.mechanics.methods.marching import March
 from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.march import STEPS
 from ephs.solve.march.account import WHOLE, WORTH
+from ephs.solve.march.steps import STEPS
 from ephs.solve.methods.own import Method, coefficients_of
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.running.control import Control

@@ -12,7 +12,7 @@ from ephs.mechanics.tree.finding.tables import SPRING
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.kept import once
-from ephs.solve.march import Status
+from ephs.solve.march.records import Status
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

@@ -12,9 +12,10 @@ from ephs.mechanics.tree.equations.accounts import OWN
 from ephs.mechanics.tree.equations.equations import ReducedState
 from ephs.mechanics.tree.finding.naming import within
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.march import STEPS, Ending, RunAccount, Status
-from ephs.solve.march import MarchControl as Steering
+from ephs.solve.march.account import RunAccount
 from ephs.solve.march.control import DAMPING, PATIENCE, STRICT
+from ephs.solve.march.records import Ending, MarchControl, Status
+from ephs.solve.march.steps import STEPS
 from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
 from ephs.solve.running.snapshot import Snapshot
 from ephs.solve.running.stepping import Counts, Span, Taken
@@ -92,7 +93,7 @@ class March:
             "q": np.array(q), "y": eq.vector(span.state), "atol": np.array(method.atol), "rtol": np.array(method.rtol),
             "times": self.times, "carry": start.account[self.own :].copy(),
         }  # fmt: skip
-        self.steering, self.account = Steering.table(1), RunAccount.table(1)
+        self.steering, self.account = MarchControl.table(1), RunAccount.table(1)
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
@@ -127,7 +128,7 @@ class March:
 
     @property
     def control(self) -> Any:
-        """Present state of the march, a record of `Steering`; its numbers are known here."""
+        """Present state of the march, a record of `MarchControl`; its numbers are known here."""
         return self.steering[0]
 
     def advance(self, steps: int) -> bool:

@@ -35,7 +35,7 @@ class ReducedMethod(ABC):
     exponent
         The power of the step with which its estimate of the error falls.
     share
-        How a step's part of the tolerance depends on its length, see `Proportional`.
+        How a step's part of the tolerance depends on its length, see `Steered`.
     atol, rtol
         (counted,) of what counts in an error.
     hold
@@ -112,10 +112,6 @@ class ReducedMethod(ABC):
     def missed(self, attempt: Attempt[ReducedState]) -> float | None:
         """None: the balance of energy shows it."""
         return None
-
-    def at(self, state: ReducedState, t: float) -> ReducedState:
-        """The same state at a time that differs by rounding."""
-        return replace(state, t=t)
 
     def anew(self, state: ReducedState) -> ReducedState:
         """The same state as a start: a new object without memory."""

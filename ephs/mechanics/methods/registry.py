@@ -115,9 +115,7 @@ def on_joints(make: Callable[..., Any]) -> Callable[[Setting], tuple[Stepper[Any
             from ephs.mechanics.impacts.stepping import Impacts
 
             stepper = Impacts(stepper)
-        return stepper, None if setting.control.step is not None else Proportional(
-            lambda: stepper.exponent, lambda: stepper.share, lambda: stepper.hold
-        )
+        return stepper, None if setting.control.step is not None else Proportional(stepper)
 
     return made
 
@@ -208,9 +206,7 @@ def _radau(setting: Setting) -> tuple[Stepper[Any], Policy | None]:
     from ephs.solve.methods.radau import Radau
 
     stepper = Radau(setting.problem, setting.t0, setting.control)
-    return stepper, None if setting.control.step is not None else Proportional(
-        lambda: stepper.exponent, hold=lambda: Radau.hold
-    )
+    return stepper, None if setting.control.step is not None else Proportional(stepper)
 
 
 METHODS: dict[str, MethodEntry] = {}

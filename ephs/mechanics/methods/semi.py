@@ -4,7 +4,7 @@ SSP3(4,3,3) of Pareschi and Russo, J. Sci. Comput. 25 (2005) 129-155, of order 3
 stability, its implicit one is L-stable. No weight is negative, so that no step loses entropy, whatever its length.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, final
 
@@ -24,8 +24,7 @@ from ephs.semantics.derive.irreversible import IrreversibleStep
 from ephs.semantics.derive.relations import onsager
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
-from ephs.solve.march import MarchControl as Steering
-from ephs.solve.march import Status
+from ephs.solve.march.records import MarchControl, Status
 from ephs.solve.running.control import Control
 
 NAME: Final = "semi"
@@ -78,7 +77,7 @@ class Semi:
         self.onsager = once(equations.reduced, "programs of friction", lambda: _programs(equations))
         self._made: tuple[Engine, dict[str, Any], Bound] | None = None
         coordinates, size = equations.engine.sizes
-        self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), Steering.table(1)
+        self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), MarchControl.table(1)
         self._start, self._y, self._k = np.zeros(size), np.zeros(size), np.zeros((len(ARRAYS["a"]), size))
 
     @property
@@ -149,13 +148,10 @@ def _parts(reduced: Reduced) -> Sequence[PackedLink]:
 
 def _programs(equations: ReducedEquations) -> dict[int, int]:
     """Addresses of M/θ₀ of the components of friction, by their numbers."""
-    return {number: onsager(one).compiled()["value"].address for number, one in _relations(equations)}
-
-
-def _relations(equations: ReducedEquations) -> Iterator[tuple[int, IrreversibleStep]]:
-    """Numbers and relations of the components of friction."""
+    out: dict[int, int] = {}
     for number in frictions(equations.engine.tables):
         kernel = equations.problem.descriptor.components[number].primitive.kernel
         assert kernel is not None
         assert isinstance(kernel.relation, IrreversibleStep)
-        yield number, kernel.relation
+        out[number] = onsager(kernel.relation).compiled()["value"].address
+    return out

@@ -5,7 +5,7 @@ Where no rate depends on heats, rates r and heats are eliminated, and a system f
 """
 
 from types import MappingProxyType
-from typing import cast, final
+from typing import Any, cast, final
 
 import numpy as np
 from scipy.sparse import csc_array, eye_array
@@ -19,6 +19,22 @@ PIVOTS = MappingProxyType({"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0
 """Pivots of the diagonal, in the order of least degree: γ² besides what masses times it make of stiffness.
 
 Pivots by size would spoil that order, as stiffness over rotary inertia is far larger than over mass."""
+
+
+def by_freedoms(matrix: Any, increments: int, freedoms: int) -> tuple[Any, Any] | None:
+    """J_rr + J_vv and J_rr J_vv − J_rv of J by (v, r, heats), dense or sparse.
+
+    None where rates depend on heats, or there are other increments than those of the rates: joints close loops.
+    """
+    n, rates = freedoms, slice(freedoms, 2 * freedoms)
+    if increments != n or _largest(matrix[:, 2 * n :]) > NOTHING * _largest(matrix):
+        return None
+    by_places, by_rates = matrix[:n, :n], matrix[rates, rates]
+    return by_rates + by_places, by_rates @ by_places - matrix[rates, :n]
+
+
+def _largest(matrix: Any) -> float:
+    return float(abs(matrix).max()) if matrix.size else 0.0
 
 
 @final
@@ -37,18 +53,9 @@ class SparseSystems:
 
     def __init__(self, matrix: csc_array, increments: int, freedoms: int, solvers: Solvers) -> None:
         self._matrix, self._solvers, self._freedoms = matrix, solvers, freedoms
-        n, rates = freedoms, 2 * freedoms
-        largest = float(np.abs(matrix.data).max(initial=0.0))
-        heats = np.abs(matrix[:, increments + n :].data).max(initial=0.0)
-        self._split = increments == freedoms and float(heats) <= NOTHING * largest
-        if self._split:
-            self._unit = csc_array(eye_array(n))
-            by_places, by_rates = csc_array(matrix[:n, :n]), csc_array(matrix[n:rates, n:rates])
-            self._places, self._rates, self._heats = by_places, by_rates, csc_array(matrix[rates:, :rates])
-            self._damping = csc_array(by_rates + by_places)
-            self._spring = csc_array(by_rates @ by_places - matrix[n:rates, :n])
-        else:
-            self._unit = csc_array(eye_array(matrix.indptr.size - 1))
+        n, rates, self._split = freedoms, 2 * freedoms, by_freedoms(matrix, increments, freedoms)
+        self._unit = csc_array(eye_array(matrix.indptr.size - 1 if self._split is None else n))
+        self._places, self._rates, self._heats = matrix[:n, :n], matrix[n:rates, n:rates], matrix[rates:, :rates]
 
     def solver(self, length: complex) -> Solver:
         """Solver with 1/length − J.
@@ -60,10 +67,11 @@ class SparseSystems:
         """
         n, per = self._freedoms, cast("float", length)  # or complex, as what is solved for is then
         by = 1.0 / per
-        if not self._split:
+        if self._split is None:
             whole = self._solvers.of_sum(self._unit, -length, self._matrix)
             return lambda right: per * whole(right)
-        solve = self._solvers.of(csc_array(by * by * self._unit - by * self._damping + self._spring))
+        damping, spring = self._split
+        solve = self._solvers.of(csc_array(by * by * self._unit - by * damping + spring))
 
         def solved(right: Array) -> Array:
             places, rates, heats = right[:n], right[n : 2 * n], right[2 * n :]

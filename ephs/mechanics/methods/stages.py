@@ -9,17 +9,17 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.jacobian import Jacobian
-from ephs.mechanics.methods.sparse import NOTHING, PIVOTS, SparseSystems
+from ephs.mechanics.methods.sparse import PIVOTS, SparseSystems, by_freedoms
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.naming import counted
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
-from ephs.solve.march import Newton
 from ephs.solve.march.iteration import iterate
+from ephs.solve.march.stiff import Newton
 from ephs.solve.methods.collocation import Collocation, radau_for
 from ephs.solve.methods.kept import KeptMatrices
 from ephs.solve.methods.solvers import Solver, Solvers, dense
-from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError, worst_entry
 from ephs.solve.running.control import Control
 
 SOLVED = 1e-13
@@ -164,7 +164,7 @@ class Stages:
         found = iterate(PLAIN, correct, self.enough, self.rough, self._fast)
         if found.solved:
             return stages, rates[:, eq.nv + eq.n + eq.ns :], bool(found.fast)
-        path, what = counted(eq.reduced, int(np.argmax(np.nan_to_num(worst, nan=np.inf))))
+        path, what = counted(eq.reduced, worst_entry(worst))
         raise SolveError(Outcome.DIVERGED, path, f"{what} at the stages")
 
 
@@ -208,13 +208,11 @@ class KeptJacobian:
         """
         found, f = self._stages.kept.renew(state), self._stages.equations.n
         assert isinstance(found, np.ndarray)
-        by_rates, by_places, by_heats = found[f : 2 * f, f : 2 * f], found[:f, :f], found[f:, 2 * f :]
-        self.memory["matrix"][:] = found
-        self.memory["damping"][:] = by_rates + by_places
-        self.memory["spring"][:] = by_rates @ by_places - found[f : 2 * f, :f]
+        self.memory["matrix"][:], split = found, by_freedoms(found, f, f)
+        if split is not None:
+            self.memory["damping"][:], self.memory["spring"][:] = split
         n: Any = self.newton[0]
-        n.stale, n.young, n.factored = 0, 1, 0.0
-        n.split = int(np.abs(by_heats).max(initial=0.0) <= NOTHING * np.abs(found).max(initial=0.0))
+        n.stale, n.young, n.factored, n.split = 0, 1, 0.0, int(split is not None)
 
     @property
     def cost(self) -> int:

@@ -23,7 +23,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rank import CONSTRAINT, TINY
-from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError, worst_entry
 from ephs.solve.running.control import Control
 from ephs.solve.running.snapshot import Snapshot
 from ephs.solve.running.stepping import Attempt
@@ -149,7 +149,7 @@ class Variational(ReducedMethod):
             middle = self._middle(state, h, xi)
             self.counts["iterations"] += 1
             last = worst
-        path, what = counted(eq.reduced, n + int(np.argmax(np.nan_to_num(np.abs(residual), nan=np.inf))))
+        path, what = counted(eq.reduced, n + worst_entry(np.abs(residual)))
         raise SolveError(Outcome.DIVERGED, path, f"{what} in the middle of the step")
 
     def _start(self, xi: Array, h: float, middle: tuple[Array, ...]) -> Array:

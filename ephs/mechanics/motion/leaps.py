@@ -15,7 +15,6 @@ from ephs.mechanics.shapes.gap import PENETRATED, Gap
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor, StateSlot
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import LEAP
 from ephs.solve.result.states import RecordedStates
@@ -51,8 +50,8 @@ def thin_contacts(descriptor: Descriptor) -> tuple[ThinContact, ...]:
 
     def read() -> tuple[ThinContact, ...]:
         found: dict[Path, list[tuple[StateSlot, Gap]]] = {}
-        for slot in descriptor.components:
-            gap = slot.primitive.gap if isinstance(slot.primitive, Storage) else None
+        for slot, storage in descriptor.storages:
+            gap = storage.gap
             if isinstance(gap, Gap) and gap.thickness < np.inf:
                 whole = Path(slot.path[: max(1, len(slot.path) - 2)])
                 found.setdefault(whole, []).append((slot.reads[0], gap))

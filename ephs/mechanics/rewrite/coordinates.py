@@ -21,7 +21,7 @@ from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import least_squares, singular_values, svd
 from ephs.semantics.spaces.rank import ASSEMBLY, CONSTRAINT, rank_of
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.equations.sparse import Index
 from ephs.solve.posing.errors import OptionError
 from ephs.solve.posing.problem import Problem
@@ -80,7 +80,7 @@ class CutLoop:
 
 def coordinate_steps(scene: Scene, problem: Problem, before: int) -> Iterator[Step]:
     """The steps from a scene's system to its form in joint coordinates, as far as there is one."""
-    model = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial), matrix=False)
+    model = model_of(problem, 0.0, matrix=False)
     try:
         reduced = reduce_system(problem, model)
     except OptionError:

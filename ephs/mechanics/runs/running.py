@@ -10,7 +10,6 @@ import numpy as np
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, Setting, chosen
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
-from ephs.solve.auditing.audit import Bounds
 from ephs.solve.auditing.growth import Again
 from ephs.solve.posing.breakpoints import Breakpoints
 from ephs.solve.posing.errors import OptionError, SolveError
@@ -18,8 +17,8 @@ from ephs.solve.posing.events import Event
 from ephs.solve.posing.problem import Problem, State
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import RTOL, Control, Tolerance
-from ephs.solve.running.journal import Written
 from ephs.solve.running.loop import integrate
+from ephs.solve.running.request import RunRequest
 from ephs.solve.running.watching import Progress
 
 CLOSE = 1e-4
@@ -44,17 +43,7 @@ class Course:
     control: Control
     options: Mapping[str, Any]
 
-    def run(
-        self,
-        breakpoints: Breakpoints,
-        *,
-        events: tuple[Event, ...] = (),
-        save_at: Array | None = None,
-        progress: Progress | None = None,
-        remarks: Mapping[str, Any] | None = None,
-        journal: Written | None = None,
-        bounds: Bounds | None = None,
-    ) -> Solution:
+    def run(self, breakpoints: Breakpoints, request: RunRequest) -> Solution:
         """Run it.
 
         Raises
@@ -64,20 +53,8 @@ class Course:
         """
         seen = breakpoints.of(self.problem)
         setting = Setting(seen, self.start, self.control, self.options, method=self.method.name)
-        return integrate(
-            seen,
-            self.start,
-            self.end,
-            make=lambda: self.method.make(setting),
-            control=self.control,
-            events=events,
-            save_at=save_at,
-            progress=progress,
-            remarks=remarks or {},
-            journal=journal,
-            bounds=bounds,
-            breakpoints=breakpoints,
-        )
+        make = partial(self.method.make, setting)
+        return integrate(seen, self.start, self.end, make, self.control, breakpoints, request)
 
     def serves(self, name: str) -> bool:
         """Whether another method, by its name, accepts the problem with these steps."""
@@ -101,14 +78,14 @@ class Course:
         unit = self.problem.seconds
         end = to / unit
         course = replace(self, end=end, control=replace(self.control, step=h / unit, max_steps=None))
-        return course.run(Breakpoints(self.start, end, np.array(known.times)))
+        return course.run(Breakpoints(self.start, end, np.array(known.times)), RunRequest())
 
     def _independent(self, known: Breakpoints, times: Array, most: int) -> Solution:
         kept = times / self.problem.seconds
         tolerance = Tolerance(CLOSE, {})
         control = Control(tolerance, tolerance, None, 0.0, self.control.most, most)
         course = replace(self, end=float(kept[-1]), control=control, method=METHODS["rk87"], options={})
-        return course.run(Breakpoints(self.start, course.end, np.array(known.times)), save_at=kept)
+        return course.run(Breakpoints(self.start, course.end, np.array(known.times)), RunRequest(save_at=kept))
 
 
 def by_constant_steps(problem: Problem, until: float, step: float) -> Solution:
@@ -121,7 +98,7 @@ def by_constant_steps(problem: Problem, until: float, step: float) -> Solution:
     """
     tolerance = Tolerance(RTOL, {})
     control = Control(tolerance, tolerance, step, 0.0, np.inf, None)
-    return Course(problem, METHODS["natural"], 0.0, until, control, {}).run(Breakpoints(0.0, until))
+    return Course(problem, METHODS["natural"], 0.0, until, control, {}).run(Breakpoints(0.0, until), RunRequest())
 
 
 def seen_from(problem: Problem, events: tuple[Event, ...], progress: Progress | None) -> tuple[Any, Any]:

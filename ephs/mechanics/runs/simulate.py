@@ -29,6 +29,7 @@ from ephs.solve.posing.sampled import Sampling, holding
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import ATOL, RTOL, Control, Tolerance, told_apart
 from ephs.solve.running.journal import Journal
+from ephs.solve.running.request import RunRequest
 from ephs.solve.running.threads import in_one_thread
 from ephs.solve.running.watching import guarded
 
@@ -191,15 +192,9 @@ def simulate(
         serves=course.serves,
     )
     with journaled(journal, problem, asked) as written:
-        solution = course.run(
-            breakpoints,
-            events=watched,
-            save_at=None if times is None else times / unit,
-            progress=told,
-            remarks={"auto": reason} if method == "auto" else {},
-            journal=written,
-            bounds=bounds,
-        )
+        saved = None if times is None else times / unit
+        remarks = {"auto": reason} if method == "auto" else {}
+        solution = course.run(breakpoints, RunRequest(watched, saved, told, remarks, written, bounds))
     return judged(solution, audit)
 
 

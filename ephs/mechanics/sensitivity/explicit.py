@@ -32,7 +32,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import pseudoinverse
 from ephs.semantics.stage import Table
-from ephs.solve.march import Status
+from ephs.solve.march.records import Status
 from ephs.solve.posing.errors import OptionError, SolveError
 from ephs.solve.posing.problem import Problem
 from ephs.solve.running.stepping import Row

@@ -20,14 +20,15 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.decompositions import least_squares
 from ephs.semantics.spaces.rank import IMPLICIT, TINY
 from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Vector
-from ephs.solve.equations.model import Evaluation, Model, compile_model
+from ephs.solve.equations.model import Evaluation, Model, model_of
 from ephs.solve.methods.moves import move_states
 from ephs.solve.methods.natural import Natural, NaturalState
-from ephs.solve.methods.records import Columns, Scratch, parts_of
+from ephs.solve.methods.records import Columns, Scratch
 from ephs.solve.methods.residuals import FAULTS, account, evaluated
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.posing.errors import OptionError, SolveError
 from ephs.solve.posing.problem import Problem
+from ephs.solve.running.snapshot import parts
 from ephs.solve.running.stepping import Row
 
 
@@ -52,7 +53,7 @@ class _Side:
 
     @staticmethod
     def of(problem: Problem, t0: float) -> "_Side":
-        return _Side(problem, compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial)))
+        return _Side(problem, model_of(problem, t0))
 
     def numbers(self, name: str) -> Array:
         """Point at which the equations are evaluated."""
@@ -95,7 +96,7 @@ class _Along:
 
     def __init__(self, side: _Side) -> None:
         model = side.model
-        tables, memory = parts_of(model.tables), parts_of(model.memory())
+        tables, memory = parts(model.tables), parts(model.memory())
         tables["address"] = tables["address"].copy()
         for number in range(tables["address"].size):
             program, entry = relation_of(model.descriptor, number)

@@ -28,7 +28,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.solve.auditing.audit import Bounds
 from ephs.solve.equations.sparse import Index
-from ephs.solve.march import Ending
+from ephs.solve.march.records import Ending
 from ephs.solve.posing.errors import LARGEST
 from ephs.solve.running.control import ATOL, RTOL, Control, first_step
 from ephs.solve.running.stepping import Span

@@ -15,7 +15,8 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage.repeating import Repeated
 from ephs.solve.equations.sparse import Index
-from ephs.solve.march import Ending, MarchControl, RunAccount
+from ephs.solve.march.account import RunAccount
+from ephs.solve.march.records import Ending, MarchControl
 
 Stack = tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]
 """An array of bound calls, and one of its shape for every member, in rows."""

@@ -140,6 +140,11 @@ class Descriptor:
         return self._components or ()
 
     @property
+    def storages(self) -> list[tuple[ComponentSlot, Storage]]:
+        """The components that store energy, with their primitives."""
+        return [(slot, slot.primitive) for slot in self.components if isinstance(slot.primitive, Storage)]
+
+    @property
     def outer(self) -> tuple[JunctionSlot, ...]:
         """The exposed power junctions."""
         n, efforts = self.numbering, self._efforts

@@ -1,5 +1,7 @@
 """Dense linear algebra in place: sums, triangular solutions, Cholesky and LU factors."""
 
+from collections.abc import Callable
+
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector
 
 
@@ -29,6 +31,18 @@ def dot(on: Evaluator, x: Vector, y: Vector) -> Real:
         total.value = total.value + x[i] * y[i]
 
     on.loop(x.size, add)
+    return total.value
+
+
+def sum_of_squares(on: Evaluator, count: Integer, term: Callable[[Integer], Real]) -> Real:
+    """Σ x_i² of so many numbers, added in order."""
+    total = on.variable(0.0)
+
+    def add(i: Integer) -> None:
+        x = term(i)
+        total.value = total.value + x * x
+
+    on.loop(count, add)
     return total.value
 
 

@@ -22,7 +22,7 @@ from ephs.solve.auditing.rounding import exchanged, isolated, rounded, trembling
 from ephs.solve.equations.model import Model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.posing.breakpoints import MOST_FOUND
-from ephs.solve.posing.errors import Other, or_take, serves_not
+from ephs.solve.posing.errors import Other, or_take, serves_not, worst_entry
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -124,7 +124,7 @@ def _nothing() -> float:
 def _energy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
     """The balance of kinetic + potential + heat − work, and of all energies − work."""
     ledgers = solution.ledgers
-    worst = _worst(solution.energy_error)
+    worst = worst_entry(solution.energy_error)
     # destroyed exergy counts as energy; the environment's is its inflow
     destroyed = {path: ledgers.temperature * made for path, made in ledgers.makers.items()}
     parts = {path: energy for path, energy in ledgers.storages.items() if ledgers.exergies[path].any()} | destroyed
@@ -141,7 +141,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     """Accuracy of the bodies' positions, and resolution of the motion by steps."""
     plain = solution.stats.get("plain_defect")
     if plain is not None:
-        instant = int(np.argmin(np.abs(solution.t - plain["at"])))
+        instant = _instant(solution, plain["at"])
         scale = solution.ledgers.scale
         yield Breach(plain["largest"] / scale, lambda: rounded(solution) / scale, instant)
     longest = abs(float(solution.stats.get("longest_step", bounds.step or 0.0)))
@@ -152,7 +152,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     for path, instant, size in solution.linked.length_errors() if solution.linked is not None else ():
         yield Breach(size, _nothing, instant, path, ": segments of tendons must not pass the length zero")
     if isinstance(trials, Missed):
-        yield Breach(trials.size * bounds.tolerance, _nothing, int(np.argmin(np.abs(solution.t - trials.at))))
+        yield Breach(trials.size * bounds.tolerance, _nothing, _instant(solution, trials.at))
         yield from _passed(solution, longest, bounds)
     if bounds.step is None or not isinstance(trials, Trials):
         return
@@ -177,7 +177,7 @@ def _accuracy(solution: "Solution", bounds: Bounds, trials: Tests | None) -> Ite
     elif found is not None:
         h = trials.sufficient(found.trial, bounds.step, bounds.accuracy) if coarse else None
         hint, other = "" if h is None else f" of {h:.1g} s", DAMPING if bounds.undamped else None
-        instant = int(np.argmin(np.abs(solution.t - trials.times[found.trial])))
+        instant = _instant(solution, trials.times[found.trial])
         yield Breach(found.size, _nothing, instant, found.path, hint, other)
 
 
@@ -201,7 +201,7 @@ def _grown(solution: "Solution", bounds: Bounds, trials: Trials) -> GlobalError 
     if off is None:
         return None
     # of order p + 1 in a step, over as many steps more where it is shorter
-    return GlobalError(off.size, int(np.argmin(np.abs(solution.t - own.times[off.trial]))), off.path, resolved=True)
+    return GlobalError(off.size, _instant(solution, own.times[off.trial]), off.path, resolved=True)
 
 
 def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iterator[Breach]:
@@ -213,13 +213,13 @@ def _entropy(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> It
         return
     falls = {path: -np.diff(made, prepend=made[:1]) for path, made in ledgers.makers.items()}
     path = max(falls, key=lambda each: float(falls[each].max()), default=None)
-    instant = _worst(falls[path]) if path is not None else 0
+    instant = worst_entry(falls[path]) if path is not None else 0
     yield Breach(least / scale, rounding, instant, path)
     if isolated(solution, "entropy"):
         fall = -np.diff(ledgers.entropy, prepend=ledgers.entropy[:1])
         # times inside a step are ends of shorter ones from its start: less may be made until its own end
         fall += np.minimum(np.diff(ledgers.made, prepend=ledgers.made[:1]), 0.0)
-        instant = _worst(fall)
+        instant = worst_entry(fall)
         yield Breach(float(fall[instant]) / scale, rounding, instant)
 
 
@@ -227,7 +227,7 @@ def _constraint(solution: "Solution", _bounds: Bounds, _trials: Tests | None) ->
     """Joints are closed."""
     every = len(solution) // INSTANTS + 1
     for path, residual in solution.linked.gaps(every).items() if solution.linked is not None else ():
-        worst = _worst(residual)
+        worst = worst_entry(residual)
         yield Breach(float(residual[worst]), _nothing, len(solution) - 1 - worst * every, path)
 
 
@@ -235,7 +235,7 @@ def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iter
     """Stored entropies and volumes change by what was made; work is a sum of power."""
     ledgers = solution.ledgers
     if "work_apart" in solution.stats:
-        instant = int(np.argmin(np.abs(solution.t - solution.stats["work_apart_at"])))
+        instant = _instant(solution, solution.stats["work_apart_at"])
         size, hint = float(solution.stats["work_apart"]) / ledgers.scale, ": near a dead centre of what is prescribed"
         slack = COARSE - min(COARSE, bounds.ledger)
         yield Breach(size, lambda: slack + rounded(solution) / ledgers.scale, instant, hint=hint)
@@ -246,7 +246,7 @@ def _ledger(solution: "Solution", bounds: Bounds, _trials: Tests | None) -> Iter
         rest = sum((values - values[0] for values in held.values()), start=np.zeros(len(solution)))
         if made is not None:
             rest = rest - (made - made[0])
-        worst = _worst(np.abs(rest))
+        worst = worst_entry(np.abs(rest))
         path = max(held, key=lambda each: abs(float(held[each][worst] - held[each][0])))
         yield Breach(abs(float(rest[worst])) / scale, rounding, worst, path)
 
@@ -255,13 +255,13 @@ def _input(solution: "Solution", _bounds: Bounds, _trials: Tests | None) -> Iter
     """Inputs are piecewise smooth."""
     found = solution.stats.get("jumps", {}).get("found", ())
     if found:
-        last = int(np.argmin(np.abs(solution.t - found[-1]["t"])))
+        last = _instant(solution, found[-1]["t"])
         yield Breach(float(len(found)), _nothing, last, Path.of(found[-1]["input"]))
 
 
-def _worst(values: Array) -> int:
-    """The index of the largest value, or of the first that is not a number."""
-    return int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+def _instant(solution: "Solution", t: float) -> int:
+    """The index of the instant nearest to a time in s."""
+    return int(np.argmin(np.abs(solution.t - t)))
 
 
 @final

@@ -20,7 +20,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.rank import TINY
 from ephs.solve.auditing.rounding import rounded
 from ephs.solve.equations.sparse import Index
-from ephs.solve.posing.errors import Interrupted
+from ephs.solve.posing.errors import Interrupted, worst_entry
 from ephs.solve.running.control import SLIVER
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, in
         rounding = rounded(one) if off.any() else 0.0  # which is all that there is of bodies at rest
         shifts.append((np.where(off <= rounding, 0.0, off / one.ledgers.scale), None))
     for shift, path in shifts:
-        worst = int(np.argmax(np.where(np.isnan(shift), np.inf, shift)))
+        worst = worst_entry(shift)
         found.append((float(np.nan_to_num(shift[worst], nan=np.inf)), int(mine[worst]), path))
     return max(found, key=lambda each: each[0])
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
-from ephs.semantics.primitives.primitives import Storage
 from ephs.solve.auditing.resolution import STILL
 from ephs.solve.auditing.rounding import trembling
 from ephs.solve.equations.instant import compliance_of
@@ -79,9 +78,9 @@ def _may_be(solution: "Solution", h: float) -> bool:
     x = d.pack(solution.state_at(0))
     parity = {i: slot.quantity.parity for slot in d.junctions for i in range(slot.efforts.start, slot.efforts.stop)}
     stiff = light = 0.0
-    for slot in d.components:
-        if isinstance(slot.primitive, Storage) and not slot.primitive.environment and slot.efforts:
-            size = float(np.abs(compliance_of(slot, d, x, problem.reference)).sum(axis=1).max())
+    for slot, storage in d.storages:
+        if not storage.environment and slot.efforts:
+            size = float(np.abs(compliance_of(slot, storage, d, x, problem.reference)).sum(axis=1).max())
             if all(parity[i] < 0 for i in slot.efforts):
                 light = max(light, size)
             else:

@@ -4,13 +4,13 @@ from typing import final
 
 import numpy as np
 
-from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Irreversible, Point, Storage
 from ephs.semantics.systems.kept import once
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import Problem
+from ephs.solve.running.stepping import Row
 
 SHARE = 1e-12
 """Fraction of the entropies exchanged and produced in a step: smaller negative productions are rounding."""
@@ -39,11 +39,11 @@ class Production:
         self.active = bool(self._paths)
         self._still = ROUNDING * _capacity(problem) if self.active else 0.0
 
-    def start(self, x: Array, energies: Array) -> None:
-        """The states and the produced entropies, (point_size,) and (components,), at the start of the next step."""
-        self._last = (x, energies)
+    def start(self, row: Row) -> None:
+        """The start of the next step."""
+        self._last = row
 
-    def step(self, t: float, x: Array, energies: Array) -> None:
+    def step(self, t: float, row: Row) -> None:
         """Check a step that ended at t in s.
 
         Raises
@@ -51,17 +51,17 @@ class Production:
         SolveError
             A component destroyed entropy in it.
         """
-        before, made_before = self._last
-        made = self._sign * (energies[self._watched] - made_before[self._watched])
-        exchanged = float(np.abs(x[self._entropies] - before[self._entropies]).sum())
-        exchanged += float(np.abs(energies[self._makers] - made_before[self._makers]).sum())
+        last, energies = self._last, row.energies
+        made = self._sign * (energies[self._watched] - last.energies[self._watched])
+        exchanged = float(np.abs(row.x[self._entropies] - last.x[self._entropies]).sum())
+        exchanged += float(np.abs(energies[self._makers] - last.energies[self._makers]).sum())
         allowed = SHARE * exchanged + ROUNDING * np.abs(energies[self._watched]) + self._still
         excess = made + allowed
         worst = int(np.argmin(excess))
         if excess[worst] < 0.0:
             size = f"{made[worst]:.3g} J/K in the step to t = {t:.9g} s"
             raise SolveError(Outcome.ENTROPY, str(self._paths[worst]), size)
-        self._last = (x, energies)
+        self._last = row
 
 
 def _watched(d: Descriptor) -> tuple[Index, Index, Index]:
@@ -77,13 +77,10 @@ def _capacity(problem: Problem) -> float:
     """Sum of the heat capacities ds/d(log θ) of what stores entropy, at the initial states, in J/K."""
     d = problem.descriptor
     x, total = problem.point, 0.0
-    for slot in d.components:
-        storage = slot.primitive
-        if not isinstance(storage, Storage) or storage.environment:
-            continue
+    for slot, storage in d.storages:
         point = d.point(slot, x)
         for _, where, quantity in storage.bundle.items():
-            if quantity.kind == "entropy":
+            if quantity.kind == "entropy" and not storage.environment:
                 total += next(filter(None, (_share(storage, point, where, 10.0**k) for k in DECADES)), 0.0)
     return total
 

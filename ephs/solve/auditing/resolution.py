@@ -29,8 +29,8 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Irreversible, Storage
 from ephs.solve.auditing.growth import Again, apart
-from ephs.solve.auditing.retaken import Retaken
-from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.auditing.retaken import MOST, Retaken, Spread, evenly_spread
+from ephs.solve.equations.model import Model, model_of
 from ephs.solve.methods.driven import advance_driven
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.paced import Paced
@@ -39,7 +39,7 @@ from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RowBlocks, RunRecord
 from ephs.solve.running.control import SLIVER
 from ephs.solve.running.snapshot import Snapshot, like, parts
-from ephs.solve.running.stepping import Instants, Stepper
+from ephs.solve.running.stepping import Instant, Instants, Stepper
 
 if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 S = TypeVar("S")
 Tried = tuple[Array, Array]
 """States and energies."""
-EACH, LEAST, MOST = 600, 4, 6
+EACH, LEAST = 600, 4
 """One time is looked at in so many steps, at least and at most so many in all: nine steps each."""
 PAIR = 2
 """Number of steps whose energies are held against those of their halves."""
@@ -215,11 +215,11 @@ def natural_trials(
         return None
     t, d = solution.t, problem.descriptor
     count = int(np.clip(int(solution.stats["steps"]) // EACH, LEAST, MOST))
-    spread = np.unique(np.linspace(0, len(solution) - 1, count, endpoint=False).astype(int)).tolist()
+    spread = evenly_spread(len(solution) - 1, count)
     end = np.inf if int(solution.stats["steps"]) < PAIR else float(t.max()) + SLIVER * h
     instants = [i for i in spread if _clear(float(t[i]), PAIR * h, end, jumps)]
     if own is None or own.model.descriptor is not d:
-        own = make(compile_model(d, problem.reference, problem.inputs(float(t[0]), problem.initial)))
+        own = make(model_of(problem, float(t[0])))
     method, makers = own, np.array([isinstance(slot.primitive, Irreversible) for slot in d.components])
 
     @lru_cache(2 * len(instants))
@@ -250,7 +250,7 @@ def _after(problem: Problem, method: Natural, x: Array, t: float, h: float, coun
 
 @final
 class Samples(Generic[S]):
-    """States of a run at even intervals: one in 2ᵏ, at most twice `MOST`; none if not ``wanted``.
+    """States of a run at even intervals, see `Spread`; none if not ``wanted``.
 
     Besides some of its steps where these are to be ``retaken``.
     """
@@ -258,29 +258,27 @@ class Samples(Generic[S]):
     def __init__(self, *, wanted: bool, retaken: bool = False) -> None:
         self._wanted = wanted
         self.retaken: Retaken[S] = Retaken(wanted=retaken)
-        self.states: list[tuple[float, S]] = []
-        self._rows, self._stride = 0, 1
+        self._spread = Spread[Instant[S]]()
+
+    @property
+    def states(self) -> list[Instant[S]]:
+        """Those that are kept."""
+        return self._spread.kept
 
     def add(self, rows: Instants[S]) -> None:
         """Times and states in order, with what a step made at least."""
-        at, end = self._rows, self._rows + len(rows)
-        while self._wanted and (at := at + -at % self._stride) < end:
-            if len(self.states) == 2 * MOST:
-                self.states, self._stride = self.states[::2], 2 * self._stride
-            else:
-                self.states.append(rows[at - self._rows][:2])
-                at += 1
-        self._rows = end
+        if self._wanted:
+            self._spread.add(rows)
 
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
-        states = [[t, parts(state)] for t, state in self.states]
-        return {"states": states, "counts": [self._rows, self._stride], "retaken": self.retaken.snapshot()}
+        states, counts = [parts(instant) for instant in self.states], [self._spread.count, self._spread.stride]
+        return {"states": states, "counts": counts, "retaken": self.retaken.snapshot()}
 
     def restore(self, snapshot: Snapshot, template: S) -> None:
         """Go on from a snapshot of states like the template."""
-        self.states = [(t, like(template, found)) for t, found in snapshot["states"]]
-        self._rows, self._stride = snapshot["counts"]
+        states = [(t, like(template, found), least) for t, found, least in snapshot["states"]]
+        self._spread.resume(states, snapshot["counts"])
         self.retaken.restore(snapshot["retaken"], template)
 
 
@@ -290,7 +288,7 @@ def trials_of(
     problem: Problem,
     stepper: Stepper[Any],
     order: int,
-    samples: Sequence[tuple[float, Any]],
+    samples: Sequence[Instant[Any]],
     h: float,
     until: float,
     breakpoints: Breakpoints,
@@ -314,11 +312,11 @@ def trials_of(
     if paced is not None:
         return natural
     end = until + (h if steps < PAIR else SLIVER * h)
-    clear = [(t, state) for t, state in samples if _clear(t, PAIR * h, end, jumps)]
+    clear = [(t, state) for t, state, _ in samples if _clear(t, PAIR * h, end, jumps)]
     if not clear:
         return natural
     count = int(np.clip(steps // EACH, LEAST, MOST))
-    chosen = [clear[i] for i in np.unique(np.linspace(0, len(clear), count, endpoint=False).astype(int))]
+    chosen = [clear[i] for i in evenly_spread(len(clear), count)]
     sign = float(np.sign(h))
 
     @lru_cache(2 * len(chosen))

@@ -6,8 +6,9 @@ of the step meet the motion at other times. What they add up to is the error of 
 is meant: without what an unstable motion makes of it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar, final
+from typing import Generic, Protocol, TypeVar, final
 
 import numpy as np
 
@@ -17,10 +18,17 @@ from ephs.solve.running.snapshot import Snapshot, like, parts
 from ephs.solve.running.stepping import Attempt, Stepper
 
 S = TypeVar("S")
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 PARTS = 3
 """Number of steps in place of one: no multiple of the two in the estimate."""
 EACH, MOST = 60, 6
 """One in so many steps is taken again, at most so many and the longest: three steps in place of three times 60."""
+
+
+def evenly_spread(size: int, count: int) -> list[int]:
+    """Numbers of so many things out of some, from the first on."""
+    return np.unique(np.linspace(0, size, count, endpoint=False).astype(int)).tolist()
 
 
 def share_missed(order: int) -> float:
@@ -37,15 +45,52 @@ class Missed:
     at: float
 
 
+class Indexed(Protocol[T_co]):
+    """Things that are had by their number."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, number: int, /) -> T_co: ...
+
+
+@final
+class Spread(Generic[T]):
+    """Some of what is added one after the other, at even intervals: one in 2ᵏ, at most twice `MOST`.
+
+    Attributes
+    ----------
+    kept
+        These.
+    count, stride
+        How many were added; one in so many is kept.
+    """
+
+    def __init__(self) -> None:
+        self.kept: list[T] = []
+        self.count, self.stride = 0, 1
+
+    def add(self, items: Indexed[T]) -> None:
+        """Those that come next."""
+        at, first, self.count = self.count, self.count, self.count + len(items)
+        while (at := at + -at % self.stride) < self.count:
+            if len(self.kept) == 2 * MOST:
+                self.kept, self.stride = self.kept[::2], 2 * self.stride
+            else:
+                self.kept.append(items[at - first])
+                at += 1
+
+    def resume(self, kept: list[T], counts: Sequence[int]) -> None:
+        """Go on from these, and from the number of those added and the stride."""
+        self.kept, (self.count, self.stride) = kept, counts
+
+
 @final
 class Retaken(Generic[S]):
     """Some of the steps of a run, evenly spread, with the longest."""
 
     def __init__(self, *, wanted: bool) -> None:
         self._wanted = wanted
-        self._spread: list[tuple[float, Attempt[S]]] = []
+        self._spread = Spread[tuple[float, Attempt[S]]]()
         self._longest: tuple[float, Attempt[S]] | None = None
-        self._steps, self._stride = 0, 1
 
     def add(self, t: float, attempt: Attempt[S]) -> None:
         """A step from t that was accepted."""
@@ -53,12 +98,7 @@ class Retaken(Generic[S]):
             return
         if self._longest is None or abs(attempt.h) > abs(self._longest[1].h):
             self._longest = t, attempt
-        if not self._steps % self._stride:
-            if len(self._spread) == 2 * MOST:
-                self._spread, self._stride = self._spread[::2], 2 * self._stride
-            if not self._steps % self._stride:
-                self._spread.append((t, attempt))
-        self._steps += 1
+        self._spread.add([(t, attempt)])
 
     def missed(self, stepper: Stepper[S], breakpoints: Breakpoints, seconds: float) -> Missed | None:
         """The error of the run: that of its longest step, or of all by those that are spread, whichever is larger.
@@ -74,10 +114,10 @@ class Retaken(Generic[S]):
         """
         if self._longest is None:
             return None
-        count = min(MOST, self._steps // EACH)
-        chosen = np.unique(np.linspace(0, len(self._spread), count, endpoint=False).astype(int))
+        steps, spread = self._spread.count, self._spread.kept
+        chosen = evenly_spread(len(spread), min(MOST, steps // EACH))
         found: list[tuple[float, float]] = []
-        for t, attempt in [self._longest, *(self._spread[i] for i in chosen)]:
+        for t, attempt in [self._longest, *(spread[i] for i in chosen)]:
             breakpoints.stand(t)
             try:
                 size = stepper.missed(attempt)
@@ -87,14 +127,14 @@ class Retaken(Generic[S]):
                 return None
             found.append((size, t))
         mean = float(np.mean([size for size, _ in found[1:]])) if len(found) > 1 else 0.0
-        return Missed(max(found[0][0], self._steps * mean), max(found)[1] * seconds)
+        return Missed(max(found[0][0], steps * mean), max(found)[1] * seconds)
 
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
-        kept = [self._longest, *self._spread] if self._longest is not None else []
+        kept = [self._longest, *self._spread.kept] if self._longest is not None else []
         return {
             "attempts": [[t, parts(of.start), parts(of.end), of.h, of.error, of.least] for t, of in kept],
-            "counts": [self._steps, self._stride],
+            "counts": [self._spread.count, self._spread.stride],
         }
 
     def restore(self, snapshot: Snapshot, template: S) -> None:
@@ -103,5 +143,5 @@ class Retaken(Generic[S]):
             (t, Attempt(like(template, start), like(template, end), *rest))
             for t, start, end, *rest in snapshot["attempts"]
         ]
-        self._longest, self._spread = (found[0] if found else None), found[1:]
-        self._steps, self._stride = snapshot["counts"]
+        self._longest = found[0] if found else None
+        self._spread.resume(found[1:], snapshot["counts"])

@@ -9,10 +9,9 @@ from ephs.operad import Quantity, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.descriptor.numbering import Index
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces.pairs import Pair
 from ephs.semantics.systems.kept import once
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.methods.stored import StoredEnergies
 from ephs.solve.result.states import RecordedStates
 
@@ -85,7 +84,7 @@ def _storage_sizes(problem: "Problem", t: float, x: Array) -> tuple[float, float
     turning, moving, momenta, velocities = once(d, "places of storages", lambda: _places(d))
     if not (turning.size or moving.size or velocities.size):
         return 0.0, 0.0, 0.0
-    stored = StoredEnergies(compile_model(d, problem.reference, problem.inputs(t, problem.initial)))
+    stored = StoredEnergies(model_of(problem, t))
     sizes = np.abs(stored.efforts(x)[d.rate_size :])
     unit = x.copy()  # momenta of 1 N s along x: velocities are inverse masses
     unit[momenta] = UNIT
@@ -101,10 +100,8 @@ def _places(d: Descriptor) -> tuple[Index, Index, Index, Index]:
     moving: list[int] = []
     momenta: list[list[int]] = []
     velocities: list[int] = []
-    for slot in d.components:
-        if not isinstance(slot.primitive, Storage):
-            continue
-        for (_, where, carried), state in zip(slot.primitive.bundle.items(), slot.reads, strict=True):
+    for slot, storage in d.storages:
+        for (_, where, carried), state in zip(storage.bundle.items(), slot.reads, strict=True):
             twists = _twists(carried)
             if twists is not None:
                 for turns, effort in zip(np.any(twists[:3], axis=0).tolist(), slot.efforts[where], strict=True):

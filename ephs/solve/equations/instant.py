@@ -120,12 +120,11 @@ def instant(
     balance, right = np.zeros((n_e, size)), -flows
     balance[:, lam] = constraint.T
     growth = np.zeros((n_w, size))
-    for slot in d.components:
-        if isinstance(slot.primitive, Storage):
-            rates = np.array(rates_read(slot), dtype=int)
-            balance[list(slot.efforts), rates] += 1.0
-            growth[np.ix_(rates, rates)] -= compliance_of(slot, d, x, reference)
-            growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
+    for slot, storage in d.storages:
+        rates = np.array(rates_read(slot), dtype=int)
+        balance[list(slot.efforts), rates] += 1.0
+        growth[np.ix_(rates, rates)] -= compliance_of(slot, storage, d, x, reference)
+        growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
     for slot in d.outer:
         if not given[slot.path].effort:
             right[slot.efforts] += given[slot.path].value
@@ -184,10 +183,8 @@ def _place(out: Array, slot: ComponentSlot, constraint: Array) -> None:
 def stored_efforts(d: Descriptor, reference: Reference, x: Array) -> dict[int, float]:
     """Efforts that storages give, by place."""
     out: dict[int, float] = {}
-    for slot in d.components:
-        if isinstance(slot.primitive, Storage):
-            values = slot.primitive.effort(d.point(slot, x), reference)
-            out |= dict(zip(slot.efforts, values.tolist(), strict=True))
+    for slot, storage in d.storages:
+        out |= dict(zip(slot.efforts, storage.effort(d.point(slot, x), reference).tolist(), strict=True))
     return out
 
 
@@ -219,10 +216,8 @@ def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Arr
     return out
 
 
-def compliance_of(slot: ComponentSlot, d: Descriptor, x: Array, reference: Reference) -> Array:
+def compliance_of(slot: ComponentSlot, storage: Storage, d: Descriptor, x: Array, reference: Reference) -> Array:
     """∂(effort)/∂(state) of a storage, left-trivialised, by differences of fourth order within the states' domain."""
-    storage = slot.primitive
-    assert isinstance(storage, Storage)
     n = storage.bundle.size
     if storage.kernel is not None and storage.kernel.name == "quadratic":
         return np.array(storage.kernel.parameters).reshape(n, n)
@@ -250,10 +245,9 @@ def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
     """Rates of the states at junctions without constraints: those are all that constraints may read."""
     touched = np.abs(constraint).max(axis=0, initial=0.0) > 0.0
     out = np.zeros(d.rate_size)
-    for slot in d.components:
-        if isinstance(slot.primitive, Storage):
-            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
-                out[rate] = 0.0 if touched[effort] else -flows[effort]
+    for slot, _ in d.storages:
+        for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
+            out[rate] = 0.0 if touched[effort] else -flows[effort]
     return out
 
 

@@ -7,20 +7,20 @@ remained free, and their rank is computed, group by group of those that have fre
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
 from ephs.operad import Path
-from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.descriptor.numbering import starts
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces.decompositions import singular_values
 from ephs.semantics.spaces.rank import CONSTRAINT
 from ephs.solve.equations.instant import is_velocity, rate_balances
-from ephs.solve.equations.sparse import Index
+from ephs.solve.equations.sparse import Index, row_parts
 
 SOUND = 1e-3
 """Least singular value of an invertible block, as a fraction of its row norms."""
@@ -207,35 +207,25 @@ def _use(condition: _EffortCondition, solved: _SolvedEfforts, dims: Index) -> li
 
 def _rank_of_loops(left: list[_EffortCondition], solved: _SolvedEfforts, dims: Index) -> int:
     """Rank of the loop-closing constraints in the free efforts."""
-    written: list[tuple[Mapping[int, Array], Array]] = []
-    sets = DisjointSets[int]()
+    from scipy.sparse import csr_array
+
+    entries: list[list[Array]] = [[np.zeros(0)] for _ in range(3)]
+    at, count = starts(dims), 0
     for condition in left:
-        terms: dict[int, Array] = {}
         for junction, block in condition.blocks.items():
             for free, matrix in solved.by_free(junction, dims).items():
-                term = block @ matrix
-                terms[free] = terms[free] + term if free in terms else term
-        written.append((terms, condition.size))
-        for free in terms:
-            sets.join(next(iter(terms)), free)
-    groups: dict[int, list[tuple[Mapping[int, Array], Array]]] = {}
-    for written_terms, size in written:
-        if written_terms:
-            groups.setdefault(sets.leader(next(iter(written_terms))), []).append((written_terms, size))
-    return sum(_rank(group, dims) for group in groups.values())
+                term = block @ matrix / condition.size[:, None]
+                row, column = np.indices(term.shape)
+                for kept, more in zip(entries, (term, count + row, at[free] + column), strict=True):
+                    kept.append(more.ravel().astype(float))
+        count += condition.size.size
+    values, rows, columns = map(np.concatenate, entries)
+    places = rows.astype(np.int64), columns.astype(np.int64)
+    matrix = csr_array((values, places), shape=(count, int(dims.sum())))
+    return sum(_rank(matrix[members]) for members in row_parts(matrix))
 
 
-def _rank(group: list[tuple[Mapping[int, Array], Array]], dims: Index) -> int:
-    at: dict[int, int] = {}
-    width = 0
-    for terms, _ in group:
-        for free in terms:
-            if free not in at:
-                at[free], width = width, width + int(dims[free])
-    matrix, row = np.zeros((sum(size.size for _, size in group), width)), 0
-    for terms, size in group:
-        for free, block in terms.items():
-            matrix[row : row + size.size, at[free] : at[free] + block.shape[1]] = block / size[:, None]
-        row += size.size
-    sigma = singular_values(matrix)
+def _rank(part: Any) -> int:
+    """Rank of a sparse matrix that does not fall apart."""
+    sigma = singular_values(part[:, np.unique(part.indices)].toarray())
     return int(np.sum(sigma > CONSTRAINT * max(float(sigma[0]), 1.0))) if sigma.size else 0

@@ -18,8 +18,10 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.systems.kept import once
 from ephs.solve.equations.layout import entry_of, laid_out
 from ephs.solve.equations.sparse import Index
-from ephs.solve.methods.records import STORING, Memory, MemoryOf, Tables, TablesOf, parts_of
+from ephs.solve.methods.records import Memory, MemoryOf, Tables, TablesOf
 from ephs.solve.methods.residuals import FAULTS, evaluation_program
+from ephs.solve.posing.problem import Problem
+from ephs.solve.running.snapshot import parts
 
 
 @final
@@ -57,42 +59,22 @@ class Model:
         """(h, θ₀, π₀), arguments of kernels."""
         return np.array([h, self.reference.temperature, self.reference.pressure])
 
-    def input_values(self) -> Array:
-        """The values of the inputs, port by port."""
-        values = [self.inputs[slot.path].value for slot in self.descriptor.outer]
-        return np.concatenate([*values, np.zeros(1)])
+    def input_values(self, inputs: Mapping[Path, Input] | None = None) -> Array:
+        """The values of inputs, port by port; its own where None."""
+        given = self.inputs if inputs is None else inputs
+        return np.concatenate([*(given[slot.path].value for slot in self.descriptor.outer), np.zeros(1)])
 
     def memory(self) -> Memory:
         """Scratch memory for the loop, but for factors."""
         t = self.tables
         n, k, nv, nx = (int(t.dims[:, i].max(initial=0)) for i in range(4))
-        size, rows = int(t.row.size), self.unknowns
-        return MemoryOf(
-            e=np.zeros(n + 1),
-            lam=np.zeros(k + 1),
-            v=np.zeros(max(nv, 6) + 1),
-            x=np.zeros(nx + 8),
-            f=np.zeros(n * n + n + 1),
-            c=np.zeros(k + 2),
-            jac=np.zeros((n + k) * (n + k + nv) + 1),
-            work=np.zeros(4096),
-            data=np.zeros(size),
-            factors=np.zeros(1),
-            residual=np.zeros(rows),
-            scale=np.zeros(rows),
-            block=np.zeros(t.group.size),
-            group=np.zeros(int(t.group.max(initial=0)) + 1),
-            step=np.zeros(rows),
-            dense=np.zeros(rows),
-            flows=np.zeros(int(t.e_index.size) + 1),
-            energy=np.zeros(t.kind.size),
-            defect=np.zeros(2),
-            pivot=np.zeros(rows),
-        )
-
-    def storages(self) -> "Model":
-        """The model with its storages only."""
-        return self.only(np.flatnonzero(self.tables.kind == STORING))
+        sizes = {
+            "e": n + 1, "lam": k + 1, "v": max(nv, 6) + 1, "x": nx + 8, "f": n * n + n + 1, "c": k + 2,
+            "jac": (n + k) * (n + k + nv) + 1, "work": 4096, "data": t.row.size, "factors": 1, "block": t.group.size,
+            "group": t.group.max(initial=0) + 1, "flows": t.e_index.size + 1, "energy": t.kind.size, "defect": 2,
+            **dict.fromkeys(("residual", "scale", "step", "dense", "pivot"), self.unknowns),
+        }  # fmt: skip
+        return MemoryOf(**{name: np.zeros(size) for name, size in sizes.items()})
 
     def only(self, chosen: Index) -> "Model":
         """The model with these components alone, in this order, at the same places."""
@@ -182,6 +164,12 @@ def compile_model(
     return replace(once(descriptor, key, made), inputs=given)
 
 
+def model_of(problem: Problem, t0: float, *, matrix: bool = True) -> Model:
+    """The compiled model of a problem with its inputs at the start, t0 in s; see `compile_model`."""
+    given = problem.inputs(t0, problem.initial)
+    return compile_model(problem.descriptor, problem.reference, given, matrix=matrix)
+
+
 def _resting(d: Descriptor, chosen: Index) -> tuple[Index, Index]:
     """Those of the chosen components whose relations are compiled, and their addresses at rest."""
     n = d.numbering
@@ -227,7 +215,7 @@ def _compiled(d: Descriptor, reference: Reference, given: Mapping[Path, Input], 
         input_at.append(at)
         at += dim
         unknown += dim if prescribed else 0
-    block, group = _blocks(d, given)
+    (block, group), none = _blocks(d, given), np.zeros(kinds.size, dtype=np.int64)
     table = TablesOf(
         counts=np.array([n_rate, n_effort, n_lam, size], dtype=np.int64),
         kind=np.ascontiguousarray(kinds),
@@ -242,16 +230,16 @@ def _compiled(d: Descriptor, reference: Reference, given: Mapping[Path, Input], 
         read_x_at=starts(dims[:, 3]),
         read_w=np.append(w_flat, 0),
         read_w_at=starts(dims[:, 2]),
-        jacobian=np.zeros(1, dtype=np.int64),
-        jacobian_at=np.zeros(kinds.size, dtype=np.int64),
+        jacobian=none[:1],
+        jacobian_at=none,
         states=np.stack([codes, point_at, state_sizes, rate_at, state_dims], axis=1),
         intensive=intensive,
         entropy=np.repeat(entropy, junction_dims),
-        row=np.zeros(1, dtype=np.int64),
-        column=np.zeros(1, dtype=np.int64),
+        row=none[:1],
+        column=none[:1],
         template=np.zeros(1),
-        constraining=np.zeros(0, dtype=np.int64),
-        balancing=np.zeros(0, dtype=np.int64),
+        constraining=none[:0],
+        balancing=none[:0],
         block=block,
         group=group,
         outer=np.array(outer, dtype=np.int64).reshape(-1, 4),
@@ -315,7 +303,7 @@ class Evaluation:
         d, inputs = model.descriptor, model.input_values()
         self._x, self._z = np.zeros(d.point_size), np.zeros(model.unknowns)
         self._scal, self._inputs, self._sums = model.scal(0.0), inputs, np.zeros(4 + model.tables.kind.size)
-        calls, t, m = evaluation_program().compiled(), parts_of(model.tables), parts_of(self.memory)
+        calls, t, m = evaluation_program().compiled(), parts(model.tables), parts(self.memory)
         self._evaluate = calls["evaluate"].bind(t, self._x, self._z, self._scal, self._inputs, m, 0.0)
         self._calls, self._parts = calls, (t, m)
 

@@ -14,7 +14,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
 from ephs.semantics.descriptor.descriptor import Descriptor
-from ephs.semantics.primitives.primitives import Reversible, Storage
+from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces.decompositions import pseudoinverse, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, TINY, rank_of
 from ephs.solve.equations.instant import compliance_of, constraints_of, stored_efforts
@@ -95,13 +95,13 @@ def _storages(
     """Kinetic storages and others: path, places of their efforts, derivative of these by their states."""
     kinetic: list[tuple[Index, Array]] = []
     springs: list[tuple[Path, Index, Array]] = []
-    for slot in d.components:
-        if isinstance(slot.primitive, Storage) and not slot.primitive.environment and slot.efforts:
+    for slot, storage in d.storages:
+        if not storage.environment and slot.efforts:
             at = np.array(slot.efforts, dtype=np.int64)
             if moving[at].all():
-                kinetic.append((at, compliance_of(slot, d, x, problem.reference)))
+                kinetic.append((at, compliance_of(slot, storage, d, x, problem.reference)))
             elif not moving[at].any():
-                springs.append((slot.path, at, compliance_of(slot, d, x, problem.reference)))
+                springs.append((slot.path, at, compliance_of(slot, storage, d, x, problem.reference)))
     return kinetic, springs
 
 

@@ -5,9 +5,8 @@ large matrices, with rows and columns paired by large entries. The fill of exact
 later factorisation only computes numbers in fixed places, watching its pivots.
 """
 
-from collections import deque
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,7 @@ from ephs.semantics.spaces.rank import TINY
 
 Index = NDArray[np.int64]
 
-FAINT = 1e-4
-"""Fraction of the largest entry below which the diagonal takes none for its size alone."""
-PARTS = (1e-2, 1e-4, 1e-8, 0.0)
+PARTS = (0.5, 0.1, 1e-2, 1e-4, 1e-8, 0.0)
 """Fractions of the largest entry below which entries are excluded from the diagonal unless no others remain."""
 MANY = 1000
 """Least number of unknowns for pairing rows and columns: below it fill is irrelevant, small pivots indicate rank."""
@@ -93,41 +90,28 @@ def paired(n: int, row: Index, column: Index, value: Array) -> Index:
     RuntimeError
         No such rows exist: the matrix is singular by its pattern.
     """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
     size = np.abs(value)
-    largest = size.max(initial=TINY)
-    row_of, column_of = np.full(n, -1), np.full(n, -1)
-    for k in np.argsort(-size, kind="stable").tolist():  # the largest entries that do not share rows or columns
-        if size[k] > FAINT * largest and row_of[column[k]] < 0 and column_of[row[k]] < 0:
-            row_of[column[k]], column_of[row[k]] = row[k], column[k]
     for part in PARTS:
-        seen = np.flatnonzero(size > part * largest)
-        seen = seen[np.lexsort((-size[seen], column[seen]))]
-        rows, first = row[seen].tolist(), np.searchsorted(column[seen], np.arange(n + 1)).tolist()
-        for free in np.flatnonzero(row_of < 0).tolist():
-            _augment(free, rows, first, row_of, column_of)
-        if np.all(row_of >= 0):
-            return row_of
+        seen = size > part * size.max(initial=TINY)
+        there = csr_array((np.ones(int(seen.sum())), (column[seen], row[seen])), shape=(n, n))
+        rows = maximum_bipartite_matching(there, perm_type="column")
+        if np.all(rows >= 0):
+            return rows.astype(np.int64)
     raise RuntimeError("singular by its pattern")
 
 
-def _augment(free: int, rows: list[int], first: list[int], row_of: Index, column_of: Index) -> None:
-    """Pair a free column by a shortest augmenting path, with candidate rows ``rows[first[j]:first[j + 1]]`` of each."""
-    came, seen, waiting = {free: (-1, -1)}, set[int](), deque([free])
-    while waiting:
-        j = waiting.popleft()
-        for i in rows[first[j] : first[j + 1]]:
-            if i in seen:
-                continue
-            seen.add(i)
-            other = int(column_of[i])
-            if other >= 0:
-                came[other] = i, j
-                waiting.append(other)
-                continue
-            while j >= 0:  # back along the path
-                row_of[j], column_of[i] = i, j
-                i, j = came[j]
-            return
+def row_parts(matrix: Any) -> list[Index]:
+    """The rows of each part that a sparse matrix falls into: rows of different parts have no column in common."""
+    from scipy.sparse import block_array
+    from scipy.sparse.csgraph import connected_components
+
+    count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
+    part = part[: matrix.shape[0]]
+    found = np.argsort(part, kind="stable")
+    return [each for each in np.split(found, np.searchsorted(part[found], np.arange(1, count))) if each.size]
 
 
 def equilibrate(n: int, row: Index, column: Index, value: Array) -> tuple[Array, Array]:

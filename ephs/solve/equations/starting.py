@@ -4,7 +4,6 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.equations.model import Model
@@ -55,7 +54,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
     """
     if problem.scene is not None or not (model.constraint_rows.size or _bare(problem)):
         return
-    x = problem.descriptor.pack(problem.initial)
+    x = problem.point
     jumping = _jumping(problem, model, x, h)
     if not jumping:
         return
@@ -69,7 +68,7 @@ def check_start(problem: Problem, model: Model, h: float) -> None:
 def _bare(problem: Problem) -> bool:
     """Whether there is a junction without storage: it constrains as a constraint does."""
     d = problem.descriptor
-    stored = {i for slot in d.components if isinstance(slot.primitive, Storage) for i in slot.efforts}
+    stored = {i for slot, _ in d.storages for i in slot.efforts}
     return len(stored) < d.effort_size
 
 

@@ -1,7 +1,7 @@
 """`Unit`: a co-simulation unit of FMI 2.0 or 3.0 as a box with signal ports and power ports, read from its file."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
@@ -196,7 +196,7 @@ def unit_of(
     for name in given:
         unit.variable(name, f"{file.name}, start", "parameter", "input")
     found = {name: _port(unit, f"{file.name}, port {name}", words) for name, words in (ports or {}).items()}
-    return Unit(file, description, variables, feeds, found, given, step)
+    return replace(unit, ports=found)
 
 
 def _for_this_machine(file: Path, description: Any, platform: str) -> None:

@@ -3,8 +3,7 @@
 Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
 """
 
-from collections.abc import Callable
-from typing import Any, TypeAlias, final
+from typing import Any, Protocol, TypeAlias, final
 
 from ephs.semantics.stage import PLAIN, Evaluator, Integer, Real, Truth
 from ephs.solve.march.iteration import BEYOND
@@ -86,48 +85,57 @@ def held_back(on: Evaluator, control: MarchControl) -> Truth:
     return on.both(over, held >= HELD)
 
 
+class Steered(Protocol):
+    """What a method says of the control of its steps, which may change from step to step.
+
+    Attributes
+    ----------
+    exponent
+        The power of the step with which the estimate falls.
+    share
+        How a step's part of the tolerance depends on its length: a step of h in a run of T aims at (h/T)^share of it.
+        With 0 errors add up over the steps, with 1 they make the tolerance together. What is accepted knows the share
+        up to `STRICT` only: where rates jump, no step would be short enough.
+    hold
+        As of `judge`.
+    """
+
+    exponent: float
+    share: float
+    hold: float
+
+
 @final
 class Proportional:
     """Proportional-integral control: the next step by this error and the last one, see `judge`.
 
     Parameters
     ----------
-    exponent
-        Says with which power of the step the estimate falls, which may change from step to step.
-    share
-        Says, as it may change too, how a step's part of the tolerance depends on its length: a step of h in a run of T
-        aims at (h/T)^share of it. With 0 errors add up over the steps, with 1 they make the tolerance together. What
-        is accepted knows the share up to `STRICT` only: where rates jump, no step would be short enough.
-    hold
-        As of `judge`.
+    method
+        What takes the steps.
     """
 
     finest = 0.0
     """Least step as a fraction of the run."""
 
-    def __init__(
-        self,
-        exponent: Callable[[], float],
-        share: Callable[[], float] = lambda: 0.0,
-        hold: Callable[[], float] = lambda: 1.0,
-    ) -> None:
-        self._exponent, self._share, self._hold = exponent, share, hold
+    def __init__(self, method: Steered) -> None:
+        self._method = method
         self._control: Any = MarchControl.table(1)[0]
         self._control.before, self._control.most_step = 1e-4, BEYOND
         self._control.damping, self._control.strict = DAMPING, STRICT
 
     def judge(self, h: float, error: float, span: float) -> tuple[bool, float]:
         """Whether a step is accepted, and the length of the next one or of the next try; span: of the whole run."""
-        c = self._control
-        c.span, c.step, c.exponent, c.share = span, h, self._exponent(), self._share()
-        accepted = judge(PLAIN, c, h, error if error < BEYOND else BEYOND, self._hold())
+        c, method = self._control, self._method
+        c.span, c.step, c.exponent, c.share = span, h, method.exponent, method.share
+        accepted = judge(PLAIN, c, h, error if error < BEYOND else BEYOND, method.hold)
         return bool(accepted), float(c.step)
 
     def wanted(self, h: float, error: float, span: float) -> float:
         """Length of the step whose error would equal the tolerance, without a lower limit."""
-        share = self._share()
+        share = self._method.share
         part = min((span / h) ** share, STRICT)
-        return h * (error * part) ** (-1.0 / (self._exponent() - share))
+        return h * (error * part) ** (-1.0 / (self._method.exponent - share))
 
     def snapshot(self) -> Snapshot:
         """Memory of earlier steps."""

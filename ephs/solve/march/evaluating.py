@@ -1,9 +1,40 @@
 """Rates at the stages of a step, the states at which they are evaluated, and what errors there may be."""
 
+from dataclasses import dataclass
+from typing import final
+
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
 from ephs.solve.march.memory import Errors
-from ephs.solve.march.records import MarchControl, Motion
+from ephs.solve.march.records import MarchControl, Motion, TableauRecord
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class MarchStep:
+    """A step of a motion from a state.
+
+    Attributes
+    ----------
+    base, start
+        Elements and y that it starts from.
+    h
+        Its length in s, negative backward.
+    k
+        (stages + 1, size): rates at its stages; the first is the start.
+    y, q
+        y and elements at its end, in memory for those at its stages.
+    """
+
+    motion: Motion
+    tableau: TableauRecord
+    control: MarchControl
+    base: Vector
+    start: Vector
+    h: Real
+    k: Matrix
+    y: Vector
+    q: Vector
 
 
 def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
@@ -12,29 +43,29 @@ def place(on: Evaluator, motion: Motion, j: Integer) -> Integer:
 
 
 @staged
-def evaluate(
-    on: Evaluator, motion: Motion, control: MarchControl, base: Vector, y: Vector, q: Vector, out: Vector
-) -> Integer:
-    """Evaluate the rates at base·exp(v) and count it; return a status."""
+def evaluate(on: Evaluator, step: MarchStep, y: Vector, q: Vector, out: Vector) -> Integer:
+    """Evaluate the rates at base·exp(v), of v in y, and count it; return a status."""
+    control = step.control
     control.evaluations = control.evaluations + 1
-    status, component = motion.rates(on, base, y, q, out)
+    status, component = step.motion.rates(on, step.base, y, q, out)
     control.component = component
     return status
 
 
-def combine(on: Evaluator, weights: Vector, count: Integer, h: Real, k: Matrix, start: Vector, y: Vector) -> None:
-    """Write start + h Σ weights·k of the first ``count`` rates to y."""
-    copy(on, start, y)
+def combine(on: Evaluator, step: MarchStep, stage: Integer) -> None:
+    """Write y at a stage, start + h Σ a·k, by the rates of those before."""
+    y = step.y
+    copy(on, step.start, y)
 
     def add(s: Integer) -> None:
-        weight = h * weights[s]
+        weight = step.h * step.tableau.a[stage, s]
 
         def entry(j: Integer) -> None:
-            y[j] = y[j] + weight * k[s, j]
+            y[j] = y[j] + weight * step.k[s, j]
 
         on.when(on.negate(on.absolute(weight) <= 0.0), lambda: on.loop(y.size, entry))
 
-    on.loop(count, add)
+    on.loop(stage, add)
 
 
 def allow(on: Evaluator, motion: Motion, errors: Errors, start: Vector, end: Vector) -> None:

@@ -9,8 +9,8 @@ from abc import ABC, abstractmethod
 
 from ephs.semantics.linear.dense import copy
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
-from ephs.solve.march.evaluating import combine
-from ephs.solve.march.records import MarchControl, Motion, TableauRecord
+from ephs.solve.march.evaluating import MarchStep, combine
+from ephs.solve.march.records import Motion
 
 
 class Lagged(ABC):
@@ -51,31 +51,19 @@ class Lagged(ABC):
 
 
 @staged
-def stage(
-    on: Evaluator,
-    motion: Motion,
-    tableau: TableauRecord,
-    control: MarchControl,
-    base: Vector,
-    start: Vector,
-    h: Real,
-    k: Matrix,
-    lagged: Lagged,
-    i: Integer,
-    y: Vector,
-    q: Vector,
-) -> Integer:
+def stage(on: Evaluator, step: MarchStep, lagged: Lagged, i: Integer) -> Integer:
     """Evaluate a stage into its row of k; return a status."""
+    motion, control, h, k, y = step.motion, step.control, step.h, step.k, step.y
     nv, n, status, known = motion.increments, motion.freedoms, on.counter(0), on.same(lagged.again[i], 1)
 
     def observe() -> None:
-        combine(on, tableau.a.row(i), i, h, k, start, y)
+        combine(on, step, i)
         control.evaluations = control.evaluations + 1
-        status.value, control.component = lagged.observe(on, motion, base, y, q)
+        status.value, control.component = lagged.observe(on, motion, step.base, y, step.q)
 
     def resist() -> None:
         copy(on, lagged.seen, k.row(i))
-        copy(on, start.part(nv, n), lagged.reached)
+        copy(on, step.start.part(nv, n), lagged.reached)
 
         def add(j: Integer) -> None:
             weight = h * lagged.scheme[i, j]
@@ -93,46 +81,22 @@ def stage(
     return status.value
 
 
-def end(
-    on: Evaluator,
-    motion: Motion,
-    tableau: TableauRecord,
-    base: Vector,
-    start: Vector,
-    h: Real,
-    k: Matrix,
-    lagged: Lagged,
-    y: Vector,
-    q: Vector,
-) -> None:
+def end(on: Evaluator, step: MarchStep, lagged: Lagged) -> None:
     """Write the step's end to y and q."""
-    count = tableau.a.columns
-    combine(on, tableau.a.row(count), count, h, k, start, y)
-    lagged.advance(on, motion, base, y, q)
+    combine(on, step, step.tableau.a.columns)
+    lagged.advance(on, step.motion, step.base, step.y, step.q)
 
 
 @staged
-def lag(
-    on: Evaluator,
-    motion: Motion,
-    tableau: TableauRecord,
-    control: MarchControl,
-    base: Vector,
-    start: Vector,
-    h: Real,
-    k: Matrix,
-    lagged: Lagged,
-    y: Vector,
-    q: Vector,
-) -> Integer:
+def lag(on: Evaluator, step: MarchStep, lagged: Lagged) -> Integer:
     """Evaluate the stages after the first, and write the step's end to y and q; return a status."""
     at, status = on.counter(1), on.counter(0)
 
     def once() -> Truth:
-        status.value = stage(on, motion, tableau, control, base, start, h, k, lagged, at.value, y, q)
+        status.value = stage(on, step, lagged, at.value)
         at.value = at.value + 1
-        return on.either(on.negate(on.same(status.value, 0)), at.value >= tableau.a.columns)
+        return on.either(on.negate(on.same(status.value, 0)), at.value >= step.tableau.a.columns)
 
     on.repeat(once)
-    end(on, motion, tableau, base, start, h, k, lagged, y, q)
+    end(on, step, lagged)
     return status.value

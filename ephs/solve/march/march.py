@@ -1,14 +1,14 @@
 """Explicit steps, many in one call: stages, closing of constraints, error, step control, records."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 from ephs.semantics.linear.dense import clear, copy
-from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Variable, Vector
+from ephs.semantics.stage import Evaluator, Integer, Real, Truth, Variable, Vector
 from ephs.solve.march.account import WHOLE, WORTH, RunAccount, worth
 from ephs.solve.march.control import PATIENCE, held_back, judge, length
-from ephs.solve.march.evaluating import allow
+from ephs.solve.march.evaluating import MarchStep, allow
 from ephs.solve.march.lagged import Lagged
 from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.newton import filtered
@@ -91,6 +91,11 @@ class _TrialStep:
     def end(self, ending: Integer) -> None:
         self.ending.value = ending
 
+    def whole(self, h: Real) -> MarchStep:
+        """Return a step of h seconds from the state."""
+        m = self.memory
+        return MarchStep(self.motion, self.tableau, self.control, m.q, m.y, h, m.k, m.y1, m.q1)
+
     def unless_ended(self, following: Callable[[], None]) -> None:
         """Go on where there is no ending yet."""
         self.on.when(self.on.negate(self.ended), following)
@@ -102,7 +107,7 @@ class _TrialStep:
 
         def go_on() -> None:
             h = c.tried = length(on, c, rest)
-            on.when(on.same(c.fresh, 0), self._begin)
+            on.when(on.same(c.fresh, 0), lambda: self._begin(h))
             self.unless_ended(self._refresh)
             self.unless_ended(lambda: self._try(h, rest))
 
@@ -111,11 +116,11 @@ class _TrialStep:
 
         on.when(rest <= 0.0, lambda: self.end(Ending.DONE), check_rest)
 
-    def _begin(self) -> None:
-        """Evaluate the rates at the state."""
+    def _begin(self, h: Real) -> None:
+        """Evaluate the rates at the state, the start of a step."""
         on = self.on
         if self.lagged is None:
-            self.status.value = first(on, self.motion, self.memory, self.control)
+            self.status.value = first(on, self.whole(h))
 
         def open_account() -> None:
             self.status.value = self.motion.open(on, self.account, self.memory.q, self.memory.y)
@@ -141,21 +146,17 @@ class _TrialStep:
 
     def _try(self, h: Real, rest: Real) -> None:
         """Take a step of length h, measure its error, and accept it or not."""
-        on, motion, m, c = self.on, self.motion, self.memory, self.control
+        on, m, c, step = self.on, self.memory, self.control, self.whole(self.sign * h)
         self.accepted.value = 0
-        self.status.value = attempt(
-            on, motion, self.tableau, c, m.q, m.y, self.sign * h, m.k, m.errors, m.last, m.y1, m.q1, self.stiff,
-            self.lagged,
-        )  # fmt: skip
+        self.status.value = attempt(on, step, m.errors, m.last, self.stiff, self.lagged)
 
         def estimate_error() -> None:
-            allow(on, motion, m.errors, m.y, m.y1)
+            allow(on, self.motion, m.errors, m.y, m.y1)
             if self.lagged is None:
-                c.stiff = stiffness_of(on, motion, self.tableau, m, h)
+                c.stiff = stiffness_of(on, step, m)
 
         on.when(self.sound, estimate_error)
-        totals = Totals(m.y, m.y1, m.carry, m.carry1, m.change, m.size, m.whole, m.low)
-        error = self._finish(m.k, self.sign * h, m.q1, totals, part=False)
+        error = self._finish(step, m.carry1, part=False)
 
         def weigh() -> None:
             def always() -> None:
@@ -189,14 +190,17 @@ class _TrialStep:
         taken = on.same(self.accepted.value, 1)
         self.unless_ended(lambda: on.when(taken, lambda: self._take(h, rest), self._reject))
 
-    def _finish(self, k: Matrix, h: Real, q: Vector, totals: Totals, *, part: bool) -> Real:
+    def _finish(self, step: MarchStep, carry: Vector, *, part: bool) -> Real:
         """Project the end of a step, or of a part of one, to a state that obeys the laws; return its error."""
-        on, motion, m, c, y = self.on, self.motion, self.memory, self.control, totals.end
+        on, motion, m, c, y, q = self.on, self.motion, self.memory, self.control, step.y, step.q
+        totals = Totals(step.start, y, m.carry, carry, m.change, m.size, m.whole, m.low)
         n, nv, error = motion.freedoms, motion.increments, on.variable(0.0)
         damped = None if self.stiff is None and self.lagged is None else q
 
         def keep_books() -> None:
-            self.status.value = book(on, motion, self.tableau, k, h, totals, self.account.anchor, part, damped)
+            self.status.value = book(
+                on, motion, self.tableau, step.k, step.h, totals, self.account.anchor, part, damped
+            )  # fmt: skip
 
         def settle_end() -> None:
             if motion.closes:
@@ -205,9 +209,9 @@ class _TrialStep:
 
         def measure() -> None:
             if self.stiff is None:
-                error.value = error_of(on, motion, self.tableau, m, k, h, q)
+                error.value = error_of(on, step, m)
             else:
-                error.value = filtered(on, motion, self.tableau, c, m.q, totals.start, k, m.errors, self.stiff)
+                error.value = filtered(on, step, m.errors, self.stiff)
 
             def reveal() -> None:
                 error.value = on.maximum(error.value, drift(on, m.open, y.part(nv, n), m.allowed))
@@ -216,7 +220,7 @@ class _TrialStep:
                 on.when(on.same(c.rough, 0), reveal)
 
         def correct() -> None:
-            self.status.value = motion.correct(on, self.account, h, totals.start, y, q, m.allowed)
+            self.status.value = motion.correct(on, self.account, step.h, step.start, y, q, m.allowed)
 
             def weigh() -> None:
                 share = WORTH if self.lagged is None else WHOLE
@@ -280,16 +284,12 @@ class _TrialStep:
 
         def inside(wanted: Real) -> None:
             copy(on, m.k.row(0), m.k2.row(0))
-            part = self.sign * (wanted - c.time)
-            self.status.value = attempt(
-                on, motion, self.tableau, c, m.q, m.y, part, m.k2, m.errors, m.last, m.y2, m.q2, self.stiff,
-                self.lagged,
-            )  # fmt: skip
+            part = replace(self.whole(self.sign * (wanted - c.time)), k=m.k2, y=m.y2, q=m.q2)
+            self.status.value = attempt(on, part, m.errors, m.last, self.stiff, self.lagged)
 
             # Near a change of rank a part may be wrong and the whole right: closing removes transverse components.
             on.when(self.sound, lambda: allow(on, motion, m.errors, m.y, m.y2))
-            totals = Totals(m.y, m.y2, m.carry, m.carry2, m.change, m.size, m.whole, m.low)
-            error = self._finish(m.k2, part, m.q2, totals, part=True)
+            error = self._finish(part, m.carry2, part=True)
             right = on.either(c.grid > 0.0, on.negate(error > 1.0)) if motion.closes else True
             # Where it is not, the step is taken again carefully, and its part in shorter ones.
             kept = on.both(self.sound, right)

@@ -8,45 +8,33 @@ from typing import final
 
 from ephs.semantics.linear.dense import clear, copy, dot
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
-from ephs.solve.march.evaluating import allow, evaluate, place
+from ephs.solve.march.evaluating import MarchStep, allow, evaluate, place
 from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
-from ephs.solve.march.records import MarchControl, Motion, Status, TableauRecord
+from ephs.solve.march.records import Status
 from ephs.solve.march.stiff import Solver, Stiff, whole
+from ephs.solve.methods.places import add_to
 
 
 @staged
-def newton(
-    on: Evaluator,
-    motion: Motion,
-    control: MarchControl,
-    base: Vector,
-    start: Vector,
-    h: Real,
-    k: Matrix,
-    errors: Errors,
-    stiff: Stiff,
-    y: Vector,
-    q: Vector,
-) -> Integer:
-    """Solve the stages of a step of length h from (base, start), k[0] known; their rates go to k.
+def newton(on: Evaluator, step: MarchStep, errors: Errors, stiff: Stiff) -> Integer:
+    """Solve the stages of a step, k[0] known; their rates go to k.
 
     Returns
     -------
     Integer
         A status: `Status.UNSETTLED` where the iteration does not converge.
     """
-    run = _NewtonParts(on, motion, control, start, h, k, stiff)
-    n = stiff.newton[0]
+    run, k, h, n = _NewtonParts(on, step, stiff), step.k, step.h, stiff.newton[0]
     status, moved = on.counter(0), on.variable(0.0)
     on.when(on.negate(on.absolute(n.factored - h) <= 0.0), Solver(on, stiff, h).factorise)
     clear(on, whole(stiff.stages))
 
     def stage(i: Integer) -> None:
         def check_size() -> None:
-            run.place(i, y)
-            motion.warm(on, start, y)
-            status.value = evaluate(on, motion, control, base, y, q, k.row(i + 1))
+            run.place(i)
+            step.motion.warm(on, step.start, step.y)
+            status.value = evaluate(on, step, step.y, step.q, k.row(i + 1))
 
         on.when(on.same(status.value, 0), check_size)
 
@@ -63,7 +51,7 @@ def newton(
 
     def solve_once() -> None:
         run.solve()
-        moved.value = run.size(errors, y)
+        moved.value = run.size(errors)
         run.move()
 
     found = iterate(on, correct, n.enough, n.rough, FAST)
@@ -78,29 +66,19 @@ def newton(
 
 
 @staged
-def filtered(
-    on: Evaluator,
-    motion: Motion,
-    tableau: TableauRecord,
-    control: MarchControl,
-    base: Vector,
-    start: Vector,
-    k: Matrix,
-    errors: Errors,
-    stiff: Stiff,
-) -> Real:
+def filtered(on: Evaluator, step: MarchStep, errors: Errors, stiff: Stiff) -> Real:
     """Return the error of a step relative to the tolerance, by the embedded method, of order ``stages``.
 
     The difference is filtered by the equations, as its stiff part must be; where it is too large, once more from where
     it leads, as of stiff parts the first estimate is.
     """
-    m, n = stiff.parts.row(0), stiff.newton[0]
+    m, n, motion = stiff.parts.row(0), stiff.newton[0], step.motion
     worst, solver = on.variable(0.0), Solver(on, stiff, n.factored)
 
     def estimate(first: Vector) -> None:
         def each_entry(j: Integer) -> None:
             m[j] = first[j]
-            on.loop(stiff.stages.rows, lambda i: _add(m, j, tableau.error[i + 1] * k[i + 1, j]))
+            on.loop(stiff.stages.rows, lambda i: add_to(m, j, step.tableau.error[i + 1] * step.k[i + 1, j]))
 
         on.loop(m.size, each_entry)
         solver.one()
@@ -113,19 +91,15 @@ def filtered(
         on.loop(motion.counted, compare)
 
     def again() -> None:
-        copy(on, start, stiff.y)
-        on.loop(m.size, lambda j: _add(stiff.y, j, m[j]))
-        motion.warm(on, start, stiff.y)
-        status = evaluate(on, motion, control, base, stiff.y, stiff.q, stiff.rate)
+        copy(on, step.start, stiff.y)
+        on.loop(m.size, lambda j: add_to(stiff.y, j, m[j]))
+        motion.warm(on, step.start, stiff.y)
+        status = evaluate(on, step, stiff.y, stiff.q, stiff.rate)
         on.when(on.same(status, 0), lambda: estimate(stiff.rate))
 
-    on.when(n.factored > -BEYOND, lambda: estimate(k.row(0)))
+    on.when(n.factored > -BEYOND, lambda: estimate(step.k.row(0)))
     on.when(on.negate(worst.value <= 1.0), again)
     return worst.value
-
-
-def _add(x: Vector, j: Integer, by: Real) -> None:
-    x[j] = x[j] + by
 
 
 @final
@@ -134,18 +108,14 @@ class _NewtonParts:
     """The parts of an iteration."""
 
     on: Evaluator
-    motion: Motion
-    control: MarchControl
-    start: Vector
-    h: Real
-    k: Matrix
+    step: MarchStep
     stiff: Stiff
 
-    def place(self, i: Integer, y: Vector) -> None:
+    def place(self, i: Integer) -> None:
         """Write the state at a stage to y."""
-        s = self.stiff
-        copy(self.on, self.start, y)
-        self.on.loop(s.matrix.rows, lambda j: _add(y, j, s.stages[i, j]))
+        s, y = self.stiff, self.step.y
+        copy(self.on, self.step.start, y)
+        self.on.loop(s.matrix.rows, lambda j: add_to(y, j, s.stages[i, j]))
 
     def solve(self) -> None:
         """Write the Newton corrections of the stages."""
@@ -153,7 +123,7 @@ class _NewtonParts:
 
         def defect(j: Integer) -> None:
             def rest(i: Integer) -> None:
-                s.part[i] = self.k[i + 1, j] - self._led(i, j)
+                s.part[i] = self.step.k[i + 1, j] - self._led(i, j)
 
             def turn(i: Integer) -> None:
                 s.parts[i, j] = dot(on, s.into.row(i), s.part)
@@ -168,16 +138,16 @@ class _NewtonParts:
             on.loop(size, entry)
 
         on.loop(size, defect)
-        Solver(on, s, self.h).all()
+        Solver(on, s, self.step.h).all()
         on.loop(s.stages.rows, back)
 
-    def size(self, errors: Errors, y: Vector) -> Real:
+    def size(self, errors: Errors) -> Real:
         """Largest change relative to the tolerance at the stages' values, which are written to y.
 
         What starts from nothing, as heat does, is measured by what it becomes.
         """
-        on, s, worst = self.on, self.stiff, self.on.variable(0.0)
-        copy(on, self.start, y)
+        on, s, worst, motion, y = self.on, self.stiff, self.on.variable(0.0), self.step.motion, self.step.y
+        copy(on, self.step.start, y)
 
         def reach(j: Integer) -> None:
             most = on.variable(0.0)
@@ -190,37 +160,37 @@ class _NewtonParts:
 
         def compare(j: Integer) -> None:
             def stage(i: Integer) -> None:
-                x = on.absolute(s.change[i, place(on, self.motion, j)]) / errors.allowed[j]
+                x = on.absolute(s.change[i, place(on, motion, j)]) / errors.allowed[j]
                 worst.value = on.select(x <= worst.value, worst.value, x)
 
             on.loop(s.stages.rows, stage)
 
         on.loop(s.matrix.rows, reach)
-        allow(on, self.motion, errors, self.start, y)
-        on.loop(self.motion.counted, compare)
+        allow(on, motion, errors, self.step.start, y)
+        on.loop(motion.counted, compare)
         return worst.value
 
     def move(self) -> None:
         """Add the change to the stages."""
         s = self.stiff
         stages, change = whole(s.stages), whole(s.change)
-        self.on.loop(stages.size, lambda j: _add(stages, j, change[j]))
+        self.on.loop(stages.size, lambda j: add_to(stages, j, change[j]))
 
     def rates(self) -> None:
         """Rates that lead to the stages, of all that is not summed: these are those of the stages."""
 
         def stage(i: Integer) -> None:
             def each_entry(j: Integer) -> None:
-                self.k[i + 1, j] = self._led(i, j)
+                self.step.k[i + 1, j] = self._led(i, j)
 
-            self.on.loop(self.motion.summed, each_entry)
+            self.on.loop(self.step.motion.summed, each_entry)
 
         self.on.loop(self.stiff.stages.rows, stage)
 
     def _led(self, i: Integer, j: Integer) -> Real:
         """The rate of one number at a stage that leads to the increments of all stages."""
         s = self.stiff
-        return _summed(self.on, s.inverse.row(i), s.stages, j) / self.h
+        return _summed(self.on, s.inverse.row(i), s.stages, j) / self.step.h
 
 
 def _summed(on: Evaluator, weights: Vector, rows: Matrix, j: Integer) -> Real:

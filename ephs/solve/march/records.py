@@ -185,7 +185,7 @@ class MarchControl(Record):
     least_step, most_step
         Bounds of steps.
     exponent, share, damping, strict
-        As of `ephs.solve.march.control.Proportional`.
+        As of `ephs.solve.march.control.Steered`; `DAMPING` and `STRICT` there.
     before
         Error of the step before.
     stiff, limit

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.linear.dense import clear, copy, sum_of_squares
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import (
     Entry,
@@ -18,7 +18,7 @@ from ephs.semantics.stage import (
     staged,
 )
 from ephs.solve.march.control import judge
-from ephs.solve.march.evaluating import allow, combine, evaluate, place
+from ephs.solve.march.evaluating import MarchStep, allow, combine, evaluate, place
 from ephs.solve.march.lagged import Lagged, lag
 from ephs.solve.march.memory import Errors, Memory, Totals
 from ephs.solve.march.newton import newton
@@ -37,29 +37,21 @@ SPECK = 1e-30
 
 
 @staged
-def first(on: Evaluator, motion: Motion, memory: Memory, control: MarchControl) -> Integer:
-    """Evaluate the rates at the state into the first row of k; return a status."""
-    return evaluate(on, motion, control, memory.q, memory.y, memory.q1, memory.k.row(0))
+def first(on: Evaluator, step: MarchStep) -> Integer:
+    """Evaluate the rates at the start of a step into the first row of k; return a status."""
+    return evaluate(on, step, step.start, step.q, step.k.row(0))
 
 
 @staged
 def attempt(
     on: Evaluator,
-    motion: Motion,
-    tableau: TableauRecord,
-    control: MarchControl,
-    base: Vector,
-    start: Vector,
-    h: Real,
-    k: Matrix,
+    step: MarchStep,
     errors: Errors | None,
     last: Vector,
-    y: Vector,
-    q: Vector,
     stiff: Stiff | None = None,
     lagged: Lagged | None = None,
 ) -> Integer:
-    """Evaluate the stages of a step of length h from (base, start), k[0] known.
+    """Evaluate the stages of a step, k[0] known.
 
     Stages are explicit; with memory for that they are found by Newton's method, to errors that are allowed, or
     semi-implicit ones, which need no k[0].
@@ -71,23 +63,23 @@ def attempt(
         A status.
     """
     if lagged is not None:
-        return lag(on, motion, tableau, control, base, start, h, k, lagged, y, q)
-    count = tableau.a.columns
+        return lag(on, step, lagged)
+    count, start, y = step.tableau.a.columns, step.start, step.y
     stage, status = on.counter(1), on.counter(0)
 
     def once() -> Truth:
         i = stage.value
-        combine(on, tableau.a.row(i), i, h, k, start, y)
+        combine(on, step, i)
         on.when(on.same(i, count - 1), lambda: copy(on, y, last))
-        status.value = evaluate(on, motion, control, base, y, q, k.row(i))
+        status.value = evaluate(on, step, y, step.q, step.k.row(i))
         stage.value = i + 1
         return on.either(on.negate(on.same(status.value, Status.SOUND)), stage.value > count)
 
     if stiff is None:
         on.when(on.same(count, 1), lambda: copy(on, start, last))
     elif errors is not None:
-        allow(on, motion, errors, start, start)
-        status.value = newton(on, motion, control, base, start, h, k, errors, stiff, y, q)
+        allow(on, step.motion, errors, start, start)
+        status.value = newton(on, step, errors, stiff)
         copy(on, y, last)
         stage.value = count
     on.when(on.same(status.value, Status.SOUND), lambda: on.repeat(once))
@@ -158,11 +150,12 @@ def book(
     return status
 
 
-def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real, q: Vector, out: Vector) -> None:
+def _estimate(on: Evaluator, step: MarchStep, weights: Vector, out: Vector) -> None:
     """h Σ weights·k of the counted coordinates, without components transverse to the constraints."""
+    motion, k = step.motion, step.k
 
     def add(s: Integer) -> None:
-        weight = h * weights[s]
+        weight = step.h * weights[s]
 
         def entry(j: Integer) -> None:
             out[j] = out[j] + weight * k[s, place(on, motion, j)]
@@ -173,17 +166,15 @@ def _estimate(on: Evaluator, motion: Motion, weights: Vector, k: Matrix, h: Real
     on.loop(k.rows, add)
     if motion.closes:
         n = motion.freedoms
-        on.loop(2, lambda part: motion.project(on, q, out.part(part * n, n)))
+        on.loop(2, lambda part: motion.project(on, step.q, out.part(part * n, n)))
 
 
 @staged
-def error_of(
-    on: Evaluator, motion: Motion, tableau: TableauRecord, memory: Memory, k: Matrix, h: Real, q: Vector
-) -> Real:
-    """Return the size of the estimates of a step with rates k that ends at q, relative to the tolerance."""
-    m, blended = memory, tableau.eighth[0] > 0
-    _estimate(on, motion, tableau.error, k, h, q, m.fine)
-    on.when(blended, lambda: _estimate(on, motion, tableau.coarse, k, h, q, m.coarse))
+def error_of(on: Evaluator, step: MarchStep, memory: Memory) -> Real:
+    """Return the size of the estimates of a step, relative to the tolerance."""
+    m, tableau = memory, step.tableau
+    _estimate(on, step, tableau.error, m.fine)
+    on.when(tableau.eighth[0] > 0, lambda: _estimate(on, step, tableau.coarse, m.coarse))
     return measure(on, m.fine, m.coarse, m.allowed, tableau.eighth)
 
 
@@ -193,30 +184,17 @@ def measure(on: Evaluator, fine: Vector, coarse: Vector, allowed: Vector, eighth
     Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.4 and II.10.
     """
     two, size = eighth[0] > 0, allowed.size
-    first, second = on.variable(0.0), on.variable(0.0)
-
-    def each_entry(j: Integer) -> None:
-        x = fine[j] / allowed[j]
-        first.value = first.value + x * x
-        y = coarse[j] / allowed[j]
-        second.value = on.select(two, second.value + y * y, 0.0)
-
-    on.loop(size, each_entry)
-    count = on.real(on.select(size > 1, size, 1))
-    both = first.value / on.sqrt((first.value + 0.01 * second.value) * count)
-    return on.select(on.both(two, on.negate(first.value <= 0.0)), both, on.sqrt(first.value / count))
+    first, other = (sum_of_squares(on, size, lambda j, x=x: x[j] / allowed[j]) for x in (fine, coarse))
+    second, count = on.select(two, other, 0.0), on.real(on.select(size > 1, size, 1))
+    both = first / on.sqrt((first + 0.01 * second) * count)
+    return on.select(on.both(two, on.negate(first <= 0.0)), both, on.sqrt(first / count))
 
 
 def drift(on: Evaluator, before: Vector, after: Vector, allowed: Vector) -> Real:
     """Return the error shown by closing: DRIFT of the change of the rates, relative to their tolerance."""
-    n, total = after.size, on.variable(0.0)
-
-    def each_entry(j: Integer) -> None:
-        x = (after[j] - before[j]) / allowed[n + j]
-        total.value = total.value + x * x
-
-    on.loop(n, each_entry)
-    return DRIFT * on.sqrt(total.value / on.real(on.select(n > 1, n, 1)))
+    n = after.size
+    total = sum_of_squares(on, n, lambda j: (after[j] - before[j]) / allowed[n + j])
+    return DRIFT * on.sqrt(total / on.real(on.select(n > 1, n, 1)))
 
 
 def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real) -> Real:
@@ -224,26 +202,20 @@ def stiffness(on: Evaluator, rise: Vector, run: Vector, allowed: Vector, h: Real
 
     Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.2.
     """
-    above, along = on.variable(0.0), on.variable(0.0)
-
-    def each_entry(j: Integer) -> None:
-        x, y = rise[j] / allowed[j], run[j] / allowed[j]
-        above.value, along.value = above.value + x * x, along.value + y * y
-
-    on.loop(allowed.size, each_entry)
-    return on.select(along.value > 0.0, on.absolute(h) * on.sqrt(above.value / along.value), 0.0)
+    above, along = (sum_of_squares(on, allowed.size, lambda j, x=x: x[j] / allowed[j]) for x in (rise, run))
+    return on.select(along > 0.0, on.absolute(h) * on.sqrt(above / along), 0.0)
 
 
-def stiffness_of(on: Evaluator, motion: Motion, tableau: TableauRecord, memory: Memory, h: Real) -> Real:
+def stiffness_of(on: Evaluator, step: MarchStep, memory: Memory) -> Real:
     """Return the stiffness by the last two stages; their differences overwrite the memory of estimates."""
-    count, m = tableau.a.columns, memory
+    count, m, k = step.tableau.a.columns, memory, step.k
 
     def each_entry(j: Integer) -> None:
-        at = place(on, motion, j)
-        m.fine[j], m.coarse[j] = m.k[count, at] - m.k[count - 1, at], m.y1[at] - m.last[at]
+        at = place(on, step.motion, j)
+        m.fine[j], m.coarse[j] = k[count, at] - k[count - 1, at], step.y[at] - m.last[at]
 
-    on.loop(motion.counted, each_entry)
-    return stiffness(on, m.fine, m.coarse, m.allowed, h)
+    on.loop(step.motion.counted, each_entry)
+    return stiffness(on, m.fine, m.coarse, m.allowed, step.h)
 
 
 def _judge(on: Evaluator, control: Table[MarchControl], h: Real, error: Real) -> Integer:

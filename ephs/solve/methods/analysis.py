@@ -5,7 +5,6 @@ show over a step, (mass/h)^(−1/2); never on the saddle-point matrix, whose piv
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, final
 
 import numpy as np
@@ -15,7 +14,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd, symmetric_eigen
 from ephs.semantics.spaces.rank import FOLLOWED, IMPLICIT, REGULAR, TINY, rank_of
 from ephs.solve.equations.model import Model, cancelled, evaluate_at
-from ephs.solve.equations.sparse import Index
+from ephs.solve.equations.sparse import Index, row_parts
 from ephs.solve.methods.records import STORING
 from ephs.solve.posing.errors import SolveError
 
@@ -88,8 +87,7 @@ def dependent_rows(
         (rows,) those to be marked where there is a choice.
     """
     from scipy import linalg
-    from scipy.sparse import block_array, csr_array, hstack
-    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse import csr_array, hstack
 
     t = model.tables
     n_rate, n_effort, size = int(t.counts[0]), int(t.counts[1]), model.unknowns
@@ -114,8 +112,7 @@ def dependent_rows(
     if moving.any():  # conditions on rates alone, of the poses of stabilised joints
         rates = csr_array((values[moving], (of[t.row[moving]], t.column[moving])), shape=(rows.size, n_rate))
         matrix = csr_array(hstack([matrix, rates]))
-    count, part = connected_components(block_array([[None, matrix], [matrix.T, None]]), directed=False)
-    for members in _groups(part[: rows.size], count):
+    for members in row_parts(matrix):
         if members.size > LARGE:
             members = members[entangled(matrix[members])]
         local = matrix[members]
@@ -175,13 +172,6 @@ def exchanged(triangle: Array, pivots: Index, rank: int, weights: Array) -> Inde
     return found[1][: pivots.size - rank]
 
 
-def _groups(part: Index, count: int) -> list[Index]:
-    """The places of each number below count that occurs."""
-    order = np.argsort(part, kind="stable")
-    cuts = np.searchsorted(part[order], np.arange(count + 1))
-    return [order[a:b] for a, b in pairwise(cuts) if b > a]
-
-
 def _compliance(model: Model, values: Array) -> Any:
     """Block-diagonal square root of ∂e/∂w at storages, the identity at efforts that no storage gives; sparse; and
     which efforts these are.
@@ -218,7 +208,7 @@ def _compliance(model: Model, values: Array) -> Any:
 
 def _largest(matrix: Any) -> Array:
     """(nnz,) largest size of an entry in each entry's row."""
-    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    row = matrix.tocoo().row
     most = np.zeros(matrix.shape[0])
     np.maximum.at(most, row, np.abs(matrix.data))
     return most[row]
@@ -229,7 +219,7 @@ def _balanced(matrix: Any, plain: NDArray[np.bool_]) -> Any:
 
     Sizes spread from those of storages, row by row.
     """
-    row, column = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr)), matrix.indices
+    row, column = matrix.tocoo().coords
     used, left = matrix.data != 0.0, plain.copy()
     while True:
         size, theirs = np.abs(matrix.data), left[column]

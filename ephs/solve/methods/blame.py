@@ -6,7 +6,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.solve.equations.model import Model, evaluate_at
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.scales import NOTHING
-from ephs.solve.posing.errors import Outcome, SolveError
+from ephs.solve.posing.errors import Outcome, SolveError, worst_entry
 
 
 def diverged(model: Model, dropped: Index, residual: Array, scale: Array) -> SolveError:
@@ -38,5 +38,5 @@ def _scales(model: Model, scale: Array) -> Array:
 
 
 def _worst(outcome: Outcome, model: Model, ratio: Array) -> SolveError:
-    row = int(np.argmax(np.nan_to_num(ratio, nan=np.inf)))
+    row = worst_entry(ratio)
     return SolveError(outcome, model.row_path(row), model.row_name(row))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth
-from ephs.solve.methods.places import add_to
+from ephs.solve.methods.places import Part, add_to, each_component, each_row
 from ephs.solve.methods.records import STORING, Columns, Dims, row_of
 from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
 
@@ -18,8 +18,7 @@ def bend(on: Evaluator, scheme: Scheme, g: GroupColumns, h: Real, z: Matrix, s: 
     A small capacity warms by orders of magnitude in a step; of other storages α is of the quadrature's order.
     """
 
-    def node(k: Integer) -> None:
-        row = row_of(Node, g.node, k)
+    def node(row: Node, k: Integer) -> None:
         rate, effort = row.rate, row.effort
         rates = [z[i, rate] for i in range(scheme.stages)]
         defect, square = s.gradient[rate] * s.whole[rate] / h, 0.0
@@ -42,38 +41,32 @@ def bend(on: Evaluator, scheme: Scheme, g: GroupColumns, h: Real, z: Matrix, s: 
 
         on.when(square > _NONE, bent)
 
-    on.loop(g.node.size // Node.integer_width, node)
+    each_row(on, Node, g.node, node)
 
 
 def correct_storages(on: Evaluator, scheme: Scheme, t: Columns, h: Real, z: Matrix, s: StageScratch) -> None:
     """Put the one-term corrections of the storages into the residuals of the stages."""
-    n_rate = t.counts[0]
 
-    def component(c: Integer) -> None:
-        n, e_at, w_at = row_of(Dims, t.dims, c).efforts, t.e_at[c], t.read_w_at[c]
+    def storing(part: Part) -> None:
+        defect, square = on.variable(0.0), on.variable(0.0)
 
-        def storing() -> None:
-            defect, square = on.variable(0.0), on.variable(0.0)
+        def port(j: Integer) -> None:
+            rate, effort = part.rate(j), part.balance(j)
+            lost, moved = defect.value + s.gradient[rate] * s.whole[rate] / h, square.value
+            for i in range(scheme.stages):
+                lost = lost - scheme.b[i] * (z[i, effort] - s.residual[i, rate]) * z[i, rate]
+                moved = moved + scheme.b[i] * z[i, rate] * z[i, rate]
+            defect.value, square.value = lost, moved
 
-            def port(j: Integer) -> None:
-                rate, effort = t.read_w[w_at + j], n_rate + t.e_index[e_at + j]
-                lost, moved = defect.value + s.gradient[rate] * s.whole[rate] / h, square.value
-                for i in range(scheme.stages):
-                    lost = lost - scheme.b[i] * (z[i, effort] - s.residual[i, rate]) * z[i, rate]
-                    moved = moved + scheme.b[i] * z[i, rate] * z[i, rate]
-                defect.value, square.value = lost, moved
+        def share(j: Integer) -> None:
+            rate = part.rate(j)
+            for i in range(scheme.stages):
+                s.residual[i, rate] = s.residual[i, rate] - defect.value / square.value * z[i, rate]
 
-            def share(j: Integer) -> None:
-                rate = t.read_w[w_at + j]
-                for i in range(scheme.stages):
-                    s.residual[i, rate] = s.residual[i, rate] - defect.value / square.value * z[i, rate]
+        on.loop(part.n, port)
+        on.when(square.value > _NONE, lambda: on.loop(part.n, share))
 
-            on.loop(n, port)
-            on.when(square.value > _NONE, lambda: on.loop(n, share))
-
-        on.when(on.same(t.kind[c], STORING), storing)
-
-    on.loop(t.kind.size, component)
+    each_component(on, t, STORING, storing)
 
 
 def correct_joints(

@@ -83,14 +83,11 @@ def advance_driven(
     """One step with inputs at the method's nodes; of the state they are taken at the step's own, by iteration."""
     if problem.constant:
         return advance_whole(method, state, h, 1)
-    d = problem.descriptor
+    d, model = problem.descriptor, method.model
 
     def given(states: Sequence[State]) -> Array:
-        rows: list[Array] = []
-        for node, found in zip(method.nodes, states, strict=True):
-            inputs = problem.inputs(t + node * h, found)
-            rows.append(np.concatenate([*(inputs[slot.path].value for slot in d.outer), np.zeros(1)]))
-        return np.array(rows)
+        pairs = zip(method.nodes, states, strict=True)
+        return np.array([model.input_values(problem.inputs(t + node * h, found)) for node, found in pairs])
 
     if problem.timed:
         return advance_whole(method, state, h, 1, given([NO_STATE] * len(method.nodes)))

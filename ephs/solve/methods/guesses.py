@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real
-from ephs.solve.methods.records import STORING, Columns, Dims, row_of
+from ephs.solve.methods.places import Part, each_component
+from ephs.solve.methods.records import STORING, Columns
 from ephs.solve.methods.scales import FAR
 
 RULES: Final = (
@@ -50,50 +51,41 @@ def restrain(on: Evaluator, t: Columns, z: Matrix, step: Matrix) -> Real:
     one step of the method, where whole Newton steps would leave what is positive. All stages take the same part, as the
     states at each depend on the rates at all.
     """
-    least, part, n_rate = on.variable(1.0), on.variable(1.0), t.counts[0]
+    least, share = on.variable(1.0), on.variable(1.0)
 
-    def component(i: Integer) -> None:
-        n, e_at, w_at = row_of(Dims, t.dims, i).efforts, t.e_at[i], t.read_w_at[i]
-
+    def storing(part: Part) -> None:
         def effort(j: Integer) -> None:
-            at = t.e_index[e_at + j]
+            at, row = part.effort(j), part.balance(j)
 
             def stage(k: Integer) -> None:
-                warmth, fall = z[k, n_rate + at] + t.intensive[at], step[k, n_rate + at]
+                warmth, fall = z[k, row] + t.intensive[at], step[k, row]
 
                 def limit(bound: Real) -> None:
-                    part.value = on.minimum(part.value, bound / fall)
+                    share.value = on.minimum(share.value, bound / fall)
 
-                def cool() -> None:
-                    limit(0.5 * warmth)
+                def warm() -> None:
+                    for falls, bound in ((fall > 0.5 * warmth, 0.5), (fall < -3.0 * warmth, -3.0)):
+                        on.when(falls, lambda bound=bound: limit(bound * warmth))
 
-                def heat() -> None:
-                    on.when(fall < -3.0 * warmth, lambda: limit(-3.0 * warmth))
-
-                on.when(warmth > 0.0, lambda: on.when(fall > 0.5 * warmth, cool, heat))
+                on.when(warmth > 0.0, warm)
 
             on.when(t.entropy[at] > 0.0, lambda: on.loop(z.rows, stage))
 
         def shorten() -> None:
-            least.value = on.minimum(least.value, part.value)
+            least.value = on.minimum(least.value, share.value)
 
             def port(j: Integer) -> None:
-                effort, rate = n_rate + t.e_index[e_at + j], t.read_w[w_at + j]
-
                 def stage(k: Integer) -> None:
-                    step[k, effort] = step[k, effort] * part.value
-                    step[k, rate] = step[k, rate] * part.value
+                    for place in (part.balance(j), part.rate(j)):
+                        step[k, place] = step[k, place] * share.value
 
                 on.loop(z.rows, stage)
 
-            on.loop(n, port)
+            on.loop(part.n, port)
 
-        def storing() -> None:
-            part.value = 1.0
-            on.loop(n, effort)
-            on.when(part.value < 1.0, shorten)
+        share.value = 1.0
+        on.loop(part.n, effort)
+        on.when(share.value < 1.0, shorten)
 
-        on.when(on.same(t.kind[i], STORING), storing)
-
-    on.loop(t.kind.size, component)
+    each_component(on, t, STORING, storing)
     return least.value

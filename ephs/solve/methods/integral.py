@@ -30,7 +30,7 @@ from ephs.solve.equations.layout import LINEAR
 from ephs.solve.equations.model import Model
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
-from ephs.solve.methods.places import Part, add_to
+from ephs.solve.methods.places import Part, add_to, each_input
 from ephs.solve.methods.records import (
     COMPONENT,
     REVERSIBLE,
@@ -39,12 +39,11 @@ from ephs.solve.methods.records import (
     OuterPort,
     Scratch,
     efforts_of,
-    parts_of,
     rates_of,
-    row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, called, evaluation_program
 from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.snapshot import parts
 
 
 def _product(on: Evaluator, start: Integers, column: Integers, value: Vector, i: Integer, x: Vector) -> Real:
@@ -82,26 +81,22 @@ def rates(
     fault, n_rate = on.counter(0), t.counts[0]
     efforts = z.part(n_rate, place.size)
 
-    def outer(i: Integer, k: Integer, *, before: bool) -> None:
-        port, first = row_of(OuterPort, t.outer, i), t.input_at[i]
-
-        def each_freedom(j: Integer) -> None:
-            def effort() -> None:
-                if before:
-                    efforts[port.at + j] = inputs[k, first + j]
-                else:
-                    z[port.unknown + j] = m.residual[n_rate + port.at + j]
-
-            def flow() -> None:
-                if not before:
-                    add_to(m.residual, n_rate + port.at + j, -inputs[k, first + j])
-
-            on.when(on.same(port.prescribed, 1), effort, flow)
-
-        on.loop(port.dim, each_freedom)
-
     def stage(k: Integer) -> None:
         x = xs.row(k)
+
+        def prescribed(port: OuterPort, j: Integer, place: Integer) -> None:
+            def effort() -> None:
+                efforts[port.at + j] = inputs[k, place]
+
+            on.when(on.same(port.prescribed, 1), effort)
+
+        def supplied(port: OuterPort, j: Integer, place: Integer) -> None:
+            row = n_rate + port.at + j
+
+            def effort() -> None:
+                z[port.unknown + j] = m.residual[row]
+
+            on.when(on.same(port.prescribed, 1), effort, lambda: add_to(m.residual, row, -inputs[k, place]))
 
         def known(i: Integer) -> None:
             efforts[i] = rest[i] + _product(on, start, column, value, i, x)
@@ -133,11 +128,11 @@ def rates(
             on.when(place[i] >= 0, give)
 
         on.loop(place.size, known)
-        on.loop(t.input_at.size, lambda i: outer(i, k, before=True))
+        each_input(on, t, prescribed)
         on.loop(storing.size, lambda i: component(storing[i], stores=True))
         on.loop(place.size, balance)
         on.loop(others.size, lambda i: component(others[i], stores=False))
-        on.loop(t.input_at.size, lambda i: outer(i, k, before=False))
+        each_input(on, t, supplied)
         on.loop(place.size, advance)
 
     def sound(k: Integer) -> None:
@@ -199,11 +194,11 @@ class Integral:
         kinds = t.kind == STORING
         self._calls = [np.flatnonzero(kept & ~constant & chosen) for chosen in (kinds, ~kinds)]
         resting = replace(t, address=model.resting(np.concatenate(self._calls)))
-        self._tables = parts_of(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
+        self._tables = parts(resting), *self._calls, place, rest, *_by_rows(slopes), *_by_rows(flows)
         self._bound: dict[int, Any] = {}
         self._sums, self._given = np.zeros(4 + t.kind.size), model.input_values()
         self._account = evaluation_program().compiled()["account"].bind(
-            parts_of(t), self._z, 1.0, self._given, parts_of(self._memory), self._sums
+            parts(t), self._z, 1.0, self._given, parts(self._memory), self._sums
         )  # fmt: skip
 
     @staticmethod
@@ -268,7 +263,7 @@ class Integral:
         if stages not in self._bound:
             arrays = [np.zeros((stages, width)) for width in (self.unknowns, inputs.shape[1], self.unknowns)]
             call = integral_program().compiled()["rates"].bind(
-                *self._tables, *arrays, self._z, self.model.scal(0.0), parts_of(self._memory)
+                *self._tables, *arrays, self._z, self.model.scal(0.0), parts(self._memory)
             )  # fmt: skip
             self._bound[stages] = call, arrays
         call, (states, given, found) = self._bound[stages]

@@ -3,7 +3,8 @@
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.stage import Evaluator, Integer, Real, Vector, staged
-from ephs.solve.methods.records import Columns, StateRecord, row_of
+from ephs.solve.methods.places import each_row
+from ephs.solve.methods.records import Columns, StateRecord
 
 
 def tighten(q: Vector) -> None:
@@ -46,8 +47,7 @@ def retract(on: Evaluator, code: Integer, x: Vector, v: Vector, out: Vector) -> 
 def move_states(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v: Vector) -> None:
     """Move all states, in place, by h times their rates; v is scratch for one of them."""
 
-    def state(k: Integer) -> None:
-        row = row_of(StateRecord, t.states, k)
+    def state(row: StateRecord, _: Integer) -> None:
         point = x.part(row.at, row.size)
 
         def increment(j: Integer) -> None:
@@ -58,4 +58,4 @@ def move_states(on: Evaluator, t: Columns, x: Vector, h: Real, rates: Vector, v:
         flat = on.either(on.same(row.code, codes.VECTOR), on.same(row.code, codes.SE2))
         on.when(on.negate(flat), lambda: tighten(point))
 
-    on.loop(t.states.size // StateRecord.integer_width, state)
+    each_row(on, StateRecord, t.states, state)

@@ -33,7 +33,7 @@ from ephs.solve.methods.blame import contradicted, diverged
 from ephs.solve.methods.collocation import moments
 from ephs.solve.methods.guesses import BEFORE
 from ephs.solve.methods.newton import natural_program
-from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order, OrderOf, parts_of
+from ephs.solve.methods.records import COMPONENT, DIVERGED, DONE, INCONSISTENT, Memory, Order, OrderOf
 from ephs.solve.methods.residuals import FAULTS
 from ephs.solve.methods.scheme import gauss
 from ephs.solve.methods.spread import closing_of, groups_of, memory_of
@@ -280,8 +280,8 @@ class Natural:
             scal, inputs, outcome = model.scal(0.0), self._given(None), np.zeros(4, dtype=np.int64)
             rows = np.zeros((steps, size)), np.zeros((steps, components)), np.zeros((steps, 5))
             call = natural_program(self.stages).compiled()["advance"].bind(
-                parts_of(model.tables), parts_of(self._groups), parts_of(o), parts_of(self._memory),
-                parts_of(self._scratch), x, z, previous, scal, model.scal(0.0), inputs, sums, *rows, outcome, 0,
+                parts(model.tables), parts(self._groups), parts(o), parts(self._memory),
+                parts(self._scratch), x, z, previous, scal, model.scal(0.0), inputs, sums, *rows, outcome, 0,
             )  # fmt: skip
             self._bound = _Loop(o, state, scal, inputs, rows, outcome, call)
         return self._bound
@@ -315,8 +315,8 @@ class Natural:
             s.data[0] = values
         else:
             fault = natural_program(stages).compiled()["linearise"](
-                parts_of(t), parts_of(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), inputs,
-                parts_of(self._memory), parts_of(s), 1,
+                parts(t), parts(self._groups), dropped, x, z, model.scal(h), model.scal(0.0), inputs,
+                parts(self._memory), parts(s), 1,
             )  # fmt: skip
             if fault:
                 raise SolveError.of_component(fault % FAULTS, model, fault // FAULTS)

@@ -20,7 +20,7 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.methods.guesses import BEFORE, extrapolated, restrain
 from ephs.solve.methods.moves import move_states
-from ephs.solve.methods.places import add_to
+from ephs.solve.methods.places import add_to, each_row
 from ephs.solve.methods.records import (
     COMPONENT,
     DIVERGED,
@@ -31,7 +31,6 @@ from ephs.solve.methods.records import (
     Columns,
     Elimination,
     Scratch,
-    row_of,
 )
 from ephs.solve.methods.residuals import FAULTS, account, balance, evaluated
 from ephs.solve.methods.scales import COMMON, FAR, measure
@@ -86,8 +85,7 @@ def _assemble(
 
         on.when(on.same(o.dropped[i], 1), leave)
 
-    def entry(k: Integer) -> None:
-        place = row_of(StageEntry, g.where, k)
+    def entry(place: StageEntry, k: Integer) -> None:
         i, j, source = place.row, place.column, place.source
 
         def hold() -> None:
@@ -108,19 +106,18 @@ def _assemble(
 
         on.when(source < 0, hold, take)
 
-    def node(k: Integer) -> None:
-        rate = row_of(Node, g.node, k).rate
+    def node(row: Node, k: Integer) -> None:
         for i in range(stages):
             first = stages * (stages * k + i)
             for j in range(stages):
-                add_to(s.matrix, g.entry[first + j], -(z[i, rate] * s.share[k, j]))
+                add_to(s.matrix, g.entry[first + j], -(z[i, row.rate] * s.share[k, j]))
             add_to(s.matrix, g.entry[first + i], -s.factor[k])
 
     if scheme.single:
         on.loop(z.columns, pin)
         return m.data
-    on.loop(s.matrix.size, entry)
-    on.loop(g.node.size // Node.integer_width, node)
+    each_row(on, StageEntry, g.where, entry)
+    each_row(on, Node, g.node, node)
     return s.matrix
 
 

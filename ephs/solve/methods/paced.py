@@ -11,7 +11,7 @@ from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.auditing.retaken import PARTS, share_missed
 from ephs.solve.equations.instant import rates_read
-from ephs.solve.equations.model import Model, compile_model
+from ephs.solve.equations.model import Model, model_of
 from ephs.solve.equations.starting import check_start
 from ephs.solve.methods.driven import advance_driven, advance_whole
 from ephs.solve.methods.natural import Chunk, Natural, NaturalState
@@ -21,7 +21,7 @@ from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.running.control import Control, Grid
 from ephs.solve.running.snapshot import Snapshot
-from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Row, Span, Taken
+from ephs.solve.running.stepping import Attempt, Instant, Instants, Row, Span, Taken
 
 FIRST = 16
 """Steps in the first compiled call, by which the time of a step becomes known."""
@@ -52,7 +52,7 @@ class Paced:
 
     def __init__(self, problem: Problem, t0: float, control: Control, make: Callable[[Model], Natural]) -> None:
         d = problem.descriptor
-        self._make, self._model = make, compile_model(d, problem.reference, problem.inputs(t0, problem.initial))
+        self._make, self._model = make, model_of(problem, t0)
         self.problem, self.method = problem, make(self._model)
         self.name, self._step = self.method.name, control.step
         self._within: Natural | None = None
@@ -69,7 +69,7 @@ class Paced:
             The states contradict the constraints.
         """
         check_start(self.problem, self.method.model, h)
-        x = self.problem.descriptor.pack(self.problem.initial)
+        x = self.problem.point
         energies = self.method.energies(x)
         return PacedState(t, self.method.init(x), Row(x, energies, np.zeros(4)))
 
@@ -122,10 +122,6 @@ class Paced:
         for _ in range(PARTS):
             end, _ = self._single(end, attempt.h / PARTS)
         return self._off(attempt.start, attempt.end, end)[0] / share_missed(self.method.order)
-
-    def at(self, state: PacedState, t: float) -> PacedState:
-        """The same state at a time that differs by rounding."""
-        return replace(state, t=t)
 
     def anew(self, state: PacedState) -> PacedState:
         """The same state as one to start from: unknowns are guessed afresh."""
@@ -247,9 +243,7 @@ class _FixedSteps:
         if chunk.steps:
             self._rows = taken if span.save_at is None else self._between(taken, span.save_at)
             self.state = replace(taken.state(chunk.steps - 1), inner=inner)
-            shortest, longest = min(self.counts.shortest, h), max(self.counts.longest, h)
-            least = min(self.counts.least, float(taken.least.min()))
-            self.counts = Counts(done + chunk.steps, 0, shortest, longest, least, grid.h)
+            self.counts = self.counts.after(h, float(taken.least.min()), chunk.steps)
         if chunk.failure is not None:
             raise chunk.failure
         self._most = steps
@@ -299,10 +293,9 @@ def _counted(problem: Problem) -> Array:
         if slot.multipliers:
             bound[list(slot.efforts)] = True
     out = np.ones(d.rate_size, dtype=bool)
-    for slot in d.components:
-        if slot.primitive.kind == "storage":
-            for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
-                out[rate] = not bound[effort]
+    for slot, _ in d.storages:
+        for rate, effort in zip(rates_read(slot), slot.efforts, strict=True):
+            out[rate] = not bound[effort]
     odd = {i for s in d.states if s.quantity.parity < 0 for i in range(s.rates.start, s.rates.stop)}
     out[[i for i in range(d.rate_size) if i not in odd]] = True
     return out

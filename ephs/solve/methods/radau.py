@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import PLAIN
-from ephs.solve.equations.model import compile_model
+from ephs.solve.equations.model import model_of
 from ephs.solve.march.iteration import FAST, iterate
 from ephs.solve.methods.collocation import moments, radau_for, values
 from ephs.solve.methods.continuous import AccumulatorRates, Matrices
@@ -23,7 +23,7 @@ from ephs.solve.methods.records import IRREVERSIBLE
 from ephs.solve.methods.settling import PUT, TOTAL, Settling
 from ephs.solve.methods.solvers import Solvers
 from ephs.solve.methods.stores import HeatStores
-from ephs.solve.posing.errors import LARGEST, Outcome, SolveError
+from ephs.solve.posing.errors import LARGEST, Outcome, SolveError, worst_entry
 from ephs.solve.posing.problem import NO_STATE, Problem
 from ephs.solve.result.record import RunRecord, record_of
 from ephs.solve.running.control import Control
@@ -92,11 +92,11 @@ class Radau:
     """The method for one problem whose states are on vector spaces."""
 
     name = "radau"
-    hold = 1.2
+    share, hold = 0.0, 1.2
 
     def __init__(self, problem: Problem, t0: float, control: Control) -> None:
         self.problem = problem
-        self.model = compile_model(problem.descriptor, problem.reference, problem.inputs(t0, problem.initial))
+        self.model = model_of(problem, t0)
         self.stores = HeatStores(self.model)
         self.equations = EnergyEquations(self.model, self.stores)
         self._given = self.model.input_values()
@@ -121,8 +121,8 @@ class Radau:
         p = self.problem
         if p.constant:
             return self._given
-        given = p.inputs(t, NO_STATE if p.timed else p.descriptor.unpack(self.stores.entropies(y)))
-        return np.concatenate([*(given[slot.path].value for slot in self.problem.descriptor.outer), np.zeros(1)])
+        state = NO_STATE if p.timed else p.descriptor.unpack(self.stores.entropies(y))
+        return self.model.input_values(p.inputs(t, state))
 
     def start(self, t: float, h: float) -> RadauState:
         """The initial state; rates and multipliers there come from a step too short to move anything.
@@ -133,7 +133,7 @@ class Radau:
             The states contradict the constraints: however short the step, they jump.
         """
         d = self.model.descriptor
-        y = self.stores.numbers(d.pack(self.problem.initial))
+        y = self.stores.numbers(self.problem.point)
         z = self.equations.guess(y)
         account = self._settling.opened(y) if self._settling.active else np.zeros(0)
         sums, stages = np.zeros(4 + len(d.components)), np.zeros((self.scheme.nodes.size, z.size))
@@ -186,10 +186,6 @@ class Radau:
 
     def missed(self, attempt: Attempt[RadauState]) -> None:
         """None: the balance of energy shows it."""
-
-    def at(self, state: RadauState, t: float) -> RadauState:
-        """The same state at a time that differs by rounding."""
-        return replace(state, t=t)
 
     def anew(self, state: RadauState) -> RadauState:
         """The same state as one to start from, whose rates may be others than before."""
@@ -321,8 +317,8 @@ class Radau:
         if found.solved:
             self._kept.stale = not found.fast
             return stages, int(found.tries)
-        entry = int(np.argmax(np.nan_to_num(parts.max(axis=0), nan=np.inf)))
-        raise SolveError(Outcome.DIVERGED, self.model.state_path(entry), "its rate at the stages")
+        path = self.model.state_path(worst_entry(parts.max(axis=0)))
+        raise SolveError(Outcome.DIVERGED, path, "its rate at the stages")
 
     def _rounded(self, state: RadauState, h: float, stages: Array, change: Array) -> bool:
         """Whether rounding, of the equations' terms and of the numbers' sums, alone changes the stages' rates so much.

@@ -214,11 +214,6 @@ def flat() -> Kind:
     )
 
 
-def parts_of(value: Any) -> dict[str, Any]:
-    """The arrays of tables, of an order or of memory, by name: an argument of a program."""
-    return {field.name: getattr(value, field.name) for field in fields(value)}
-
-
 def kind_of(cls: Any) -> Kind:
     """The kind of argument that is all the arrays of a class, by the variables of their types."""
     kinds: dict[Any, Any] = {Whole: flat, Numbers: vector, Rows: matrix}

@@ -16,7 +16,7 @@ from ephs.semantics.stage import (
     staged,
 )
 from ephs.semantics.stage.reaching import Reached
-from ephs.solve.methods.places import Part, add_to
+from ephs.solve.methods.places import Part, add_to, each_component, each_input
 from ephs.solve.methods.records import (
     COMPONENT,
     IRREVERSIBLE,
@@ -119,23 +119,21 @@ def balance(
         By their rates, and energies of all components at the end: what is changed.
     """
 
-    def component(i: Integer) -> None:
-        part = Part.of(t, i)
-
+    def storing(part: Part) -> None:
         def port(j: Integer) -> None:
             row = part.balance(j)
 
             def take() -> None:
                 more = -m.residual[row]
                 add_to(entropies, part.rate(j), by * more)
-                add_to(energies, i, (z[row] + t.intensive[part.effort(j)]) * (h * more))
+                add_to(energies, part.i, (z[row] + t.intensive[part.effort(j)]) * (h * more))
                 m.residual[row] = 0.0  # a second storage there gets no more
 
             on.when(t.entropy[part.effort(j)] > 0.0, take)
 
-        on.when(on.same(t.kind[i], STORING), lambda: on.loop(part.n, port))
+        on.loop(part.n, port)
 
-    on.loop(t.kind.size, component)
+    each_component(on, t, STORING, storing)
 
 
 def _store(on: Evaluator, part: Part, z: Vector, weight: Real, m: Scratch) -> None:
@@ -224,27 +222,21 @@ def _relate(on: Evaluator, part: Part, z: Vector, weight: Real, m: Scratch) -> N
 def _prescribe(on: Evaluator, t: Columns, z: Vector, inputs: Vector, m: Scratch) -> None:
     """Given quantities of outer ports: flows, or efforts whose flows are unknown."""
 
-    def port(i: Integer) -> None:
-        outer = row_of(OuterPort, t.outer, i)
-        at, unknown, first = t.counts[0] + outer.at, outer.unknown, t.input_at[i]
+    def freedom(outer: OuterPort, j: Integer, place: Integer) -> None:
+        row, unknown, given = t.counts[0] + outer.at + j, outer.unknown + j, inputs[place]
 
-        def each_freedom(j: Integer) -> None:
-            row, given = at + j, inputs[first + j]
+        def take(flow: Real) -> None:
+            add_to(m.residual, row, -flow)
+            add_to(m.scale, row, on.absolute(flow))
 
-            def take(flow: Real) -> None:
-                add_to(m.residual, row, -flow)
-                add_to(m.scale, row, on.absolute(flow))
+        def effort() -> None:
+            m.residual[unknown] = z[row] - given
+            m.scale[unknown] = on.absolute(z[row]) + on.absolute(given)
+            take(z[unknown])
 
-            def effort() -> None:
-                m.residual[unknown + j] = z[row] - given
-                m.scale[unknown + j] = on.absolute(z[row]) + on.absolute(given)
-                take(z[unknown + j])
+        on.when(on.same(outer.prescribed, 1), effort, lambda: take(given))
 
-            on.when(on.same(outer.prescribed, 1), effort, lambda: take(given))
-
-        on.loop(outer.dim, each_freedom)
-
-    on.loop(t.input_at.size, port)
+    each_input(on, t, freedom)
 
 
 def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Scratch, sums: Vector) -> Real:
@@ -253,65 +245,58 @@ def account(on: Evaluator, t: Columns, z: Vector, h: Real, inputs: Vector, m: Sc
     sums = heat, supplied energy, supplied exergy, entropy made, and the entropy made by each component, or of a working
     one the energy that it supplied.
     """
-    n_rate, least = t.counts[0], on.variable(FAR)
+    least = on.variable(FAR)
 
-    def component(i: Integer) -> None:
-        def produced() -> None:
-            part, heat, made = Part.of(t, i), on.variable(0.0), on.variable(0.0)
+    def booked(part: Part, places: tuple[int, ...], amount: Real) -> None:
+        for place in (*places, 4 + part.i):
+            add_to(sums, place, amount)
+        m.energy[part.i] = sums[4 + part.i]
 
-            def each_freedom(j: Integer) -> None:
-                effort, flow = part.effort(j), m.flows[part.e_at + j]
+    def produced(part: Part) -> None:
+        heat, made = on.variable(0.0), on.variable(0.0)
 
-                def warm() -> None:
-                    made.value = made.value - flow
+        def port(j: Integer) -> None:
+            effort, flow = part.effort(j), m.flows[part.e_at + j]
 
-                def work() -> None:
-                    heat.value = heat.value + (z[n_rate + effort] + t.intensive[effort]) * flow
+            def warm() -> None:
+                made.value = made.value - flow
 
-                on.when(t.entropy[effort] > 0.0, warm, work)
+            def work() -> None:
+                heat.value = heat.value + (z[part.balance(j)] + t.intensive[effort]) * flow
 
-            on.loop(part.n, each_freedom)
-            add_to(sums, 0, h * heat.value)
-            add_to(sums, 3, h * made.value)
-            add_to(sums, 4 + i, h * made.value)
-            m.energy[i] = sums[4 + i]
-            least.value = on.minimum(least.value, h * made.value)
+            on.when(t.entropy[effort] > 0.0, warm, work)
 
-        def worked() -> None:
-            part, work = Part.of(t, i), on.variable(0.0)
+        on.loop(part.n, port)
+        add_to(sums, 0, h * heat.value)
+        booked(part, (3,), h * made.value)
+        least.value = on.minimum(least.value, h * made.value)
 
-            def each_freedom(j: Integer) -> None:
-                work.value = work.value - z[n_rate + part.effort(j)] * m.flows[part.e_at + j]
+    def worked(part: Part) -> None:
+        work = on.variable(0.0)
 
-            on.loop(part.n, each_freedom)
-            for place in (1, 2):
-                add_to(sums, place, h * work.value)
-            add_to(sums, 4 + i, h * work.value)
-            m.energy[i] = sums[4 + i]
+        def port(j: Integer) -> None:
+            work.value = work.value - z[part.balance(j)] * m.flows[part.e_at + j]
 
-        on.when(on.same(t.kind[i], IRREVERSIBLE), produced)
-        on.when(on.same(t.kind[i], WORKING), worked)
+        on.loop(part.n, port)
+        booked(part, (1, 2), h * work.value)
 
-    def port(i: Integer) -> None:
-        outer, first = row_of(OuterPort, t.outer, i), t.input_at[i]
+    def freedom(outer: OuterPort, j: Integer, place: Integer) -> None:
+        at, flow = outer.at + j, on.variable(0.0)
+        effort = z[t.counts[0] + at]
 
-        def each_freedom(j: Integer) -> None:
-            effort, at, flow = z[n_rate + outer.at + j], outer.at + j, on.variable(0.0)
+        def unknown() -> None:
+            flow.value = z[outer.unknown + j]
 
-            def unknown() -> None:
-                flow.value = z[outer.unknown + j]
+        def given() -> None:
+            flow.value = inputs[place]
 
-            def given() -> None:
-                flow.value = inputs[first + j]
+        on.when(on.same(outer.prescribed, 1), unknown, given)
+        add_to(sums, 1, h * (effort + t.intensive[at]) * flow.value)
+        add_to(sums, 2, h * effort * flow.value)
 
-            on.when(on.same(outer.prescribed, 1), unknown, given)
-            add_to(sums, 1, h * (effort + t.intensive[at]) * flow.value)
-            add_to(sums, 2, h * effort * flow.value)
-
-        on.loop(outer.dim, each_freedom)
-
-    on.loop(t.kind.size, component)
-    on.loop(t.input_at.size, port)
+    each_component(on, t, IRREVERSIBLE, produced)
+    each_component(on, t, WORKING, worked)
+    each_input(on, t, freedom)
     return on.select(least.value < FAR, least.value, 0.0)
 
 

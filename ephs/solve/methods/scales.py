@@ -8,7 +8,7 @@ from typing import Final
 
 from ephs.semantics.linear.dense import clear
 from ephs.semantics.stage import Evaluator, Integer, Integers, Real, Vector
-from ephs.solve.methods.places import Part, raise_to
+from ephs.solve.methods.places import Part, each_component, raise_to
 from ephs.solve.methods.records import IRREVERSIBLE, STORING, Columns, Scratch
 
 NOTHING = 1e-200
@@ -97,10 +97,8 @@ def still(on: Evaluator, t: Columns, z: Vector, m: Scratch) -> None:
         def made(j: Integer) -> None:
             effort = part.effort(j)
             warm = t.entropy[effort] > 0.0
-            on.when(warm, lambda: None, lambda: setattr(power, "value", power.value + able(effort)))
-
-        def able(effort: Integer) -> Real:
-            return m.dense[effort] * on.absolute(z[t.counts[0] + effort])
+            able = m.dense[effort] * on.absolute(z[part.balance(j)])
+            power.value = on.select(warm, power.value, power.value + able)
 
         def heat(j: Integer) -> None:
             effort, row = part.effort(j), part.balance(j)
@@ -138,22 +136,17 @@ def weigh(on: Evaluator, t: Columns, m: Scratch) -> None:
 
         on.loop(entries.size, each_entry)
 
-    def component(i: Integer) -> None:
-        def stored() -> None:
-            part = Part.of(t, i)
+    def storing(part: Part) -> None:
+        def row(j: Integer) -> None:
+            effort = part.effort(j)
+            on.when(least[effort] < FAR, lambda: raise_to(on, m.scale, part.rate(j), least[effort]))
 
-            def row(j: Integer) -> None:
-                effort = part.effort(j)
-                on.when(least[effort] < FAR, lambda: raise_to(on, m.scale, part.rate(j), least[effort]))
-
-            on.loop(part.n, row)
-
-        on.when(on.same(t.kind[i], STORING), stored)
+        on.loop(part.n, row)
 
     on.loop(n_effort, begin)
     known(t.balancing)
     known(t.constraining)
-    on.loop(t.kind.size, component)
+    each_component(on, t, STORING, storing)
 
 
 def measure(on: Evaluator, t: Columns, z: Vector, dropped: Integers, m: Scratch) -> Real:

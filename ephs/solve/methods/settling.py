@@ -21,9 +21,10 @@ from ephs.solve.march.account import ROUNDING, RunAccount, rounding, worth
 from ephs.solve.march.noted import Noted
 from ephs.solve.march.storing import Missing, Moved, store
 from ephs.solve.methods.places import Part
-from ephs.solve.methods.records import STORING, Columns, Scratch, parts_of
+from ephs.solve.methods.records import STORING, Columns, Scratch
 from ephs.solve.methods.residuals import FAULTS, called
 from ephs.solve.posing.errors import SolveError
+from ephs.solve.running.snapshot import parts
 
 ANCHOR, LEFT, PUT, TOTAL, HEAT, CARRY = range(6)
 """Numbers of a state's account: those of `RunAccount`; the heat in J that went to stores of heat, and its rounding."""
@@ -139,7 +140,7 @@ class Settling:
         self._account = RunAccount.table(1)
         self._states, self._start, self._along, self._beside, trial, self._allowed = np.zeros((6, d.point_size))
         self._settled = settling_program().compiled()["settled"].bind(
-            parts_of(tables), weights, np.zeros(model.unknowns), model.scal(0.0), parts_of(model.memory()),
+            parts(tables), weights, np.zeros(model.unknowns), model.scal(0.0), parts(model.memory()),
             self._account, self._states, self._start, self._along, self._beside, trial, self._allowed, self._free,
             0.0, 0.0, 0,
         )  # fmt: skip

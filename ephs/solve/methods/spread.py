@@ -31,14 +31,13 @@ def memory_of(model: Model, groups: Groups, stages: int) -> Stages:
     """Scratch memory of the stages."""
     t, n, k, nodes = model.tables, model.unknowns, stages, len(groups.node)
     size, entries, rates = int(model.descriptor.point_size), int(t.row.size), int(t.counts[0])
-    return StagesOf(
-        x=np.zeros((k, size)), v=np.zeros((k, rates)), turn=np.zeros((k, 8)), outer=np.zeros((k, 8)),
-        whole=np.zeros(rates), mean=np.zeros(n), gradient=np.zeros(rates), share=np.zeros((nodes, k)),
-        factor=np.zeros(nodes), end=np.zeros(nodes), gap=np.zeros(n), energy=np.zeros(t.kind.size),
-        residual=np.zeros((k, n)), scale=np.zeros((k, n)), data=np.zeros((k, entries)), slope=np.zeros((k, entries)),
-        matrix=np.zeros(len(groups.where)), change=np.zeros(k * n), dense=np.zeros(k * n), pivot=np.zeros(k * n),
-        one=np.zeros(8),
-    )  # fmt: skip
+    shapes = {
+        "x": (k, size), "v": (k, rates), "turn": (k, 8), "outer": (k, 8), "whole": rates, "mean": n, "gradient": rates,
+        "share": (nodes, k), "factor": nodes, "end": nodes, "gap": n, "energy": t.kind.size, "residual": (k, n),
+        "scale": (k, n), "data": (k, entries), "slope": (k, entries), "matrix": len(groups.where), "one": 8,
+        **dict.fromkeys(("change", "dense", "pivot"), k * n),
+    }  # fmt: skip
+    return StagesOf(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
 def closing_of(model: Model, groups: Groups) -> NDArray[np.bool_]:

@@ -25,8 +25,8 @@ from ephs.semantics.spaces.vectors import apply, dot
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
 from ephs.solve.methods.corrections import bend, correct_joints, correct_storages
 from ephs.solve.methods.moves import retract, somewhere
-from ephs.solve.methods.places import Part
-from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, StateRecord, row_of
+from ephs.solve.methods.places import Part, each_component, each_row
+from ephs.solve.methods.records import STORING, Columns, Scratch, StateRecord
 from ephs.solve.methods.residuals import evaluated
 from ephs.solve.methods.scales import rest
 from ephs.solve.methods.scheme import GroupColumns, Node, Scheme, StageScratch, Velocity
@@ -95,8 +95,7 @@ def linearise(
     n_rate, n, h = t.counts[0], z.columns, scal[0]
     fault, zero, mean_at = on.counter(0), on.counter(0).value, somewhere(on, s.mean)
 
-    def state(k: Integer) -> None:
-        row = row_of(StateRecord, t.states, k)
+    def state(row: StateRecord, _: Integer) -> None:
         rate, dim = row.rate, row.dim
         exponents(on, scheme, row.code, h, z, rate, dim, s.v, rate, s.whole.part(rate, dim), s.turn)
 
@@ -113,8 +112,7 @@ def linearise(
     def mean(j: Integer) -> None:
         s.mean[j] = dot(scheme.b, [z[i, j] for i in range(scheme.stages)])
 
-    def velocity(k: Integer) -> None:
-        row = row_of(Velocity, g.velocity, k)
+    def velocity(row: Velocity, _: Integer) -> None:
         first = n_rate + row.effort
 
         def exponent() -> None:
@@ -127,10 +125,10 @@ def linearise(
 
         on.when(on.negate(on.same(row.code, codes.VECTOR)), exponent)
 
-    on.loop(t.states.size // StateRecord.integer_width, state)
+    each_row(on, StateRecord, t.states, state)
     on.loop(n_rate, mean_rate)
     on.loop(n, mean, start=n_rate)
-    on.loop(g.velocity.size // Velocity.integer_width, velocity)
+    each_row(on, Velocity, g.velocity, velocity)
     # the step as a whole: discrete gradients, and whether joints close
     fault.value = evaluated(on, t, somewhere(on, x), mean_at, scal, inputs.row(zero), m, h)
 
@@ -143,11 +141,10 @@ def linearise(
             copy(on, m.residual, s.residual.row(i))
             copy(on, m.scale, s.scale.row(i))
             on.when(on.same(fresh, 1), derivatives)
-            on.when(on.same(fault.value, 0), lambda: on.loop(t.kind.size, resting))
+            on.when(on.same(fault.value, 0), lambda: each_component(on, t, STORING, resting))
 
-        def resting(c: Integer) -> None:
-            part, size = Part.of(t, c), on.absolute(h)
-            on.when(on.same(t.kind[c], STORING), lambda: rest(on, part, size, s.slope.row(i), s.scale.row(i)))
+        def resting(part: Part) -> None:
+            rest(on, part, on.absolute(h), s.slope.row(i), s.scale.row(i))
 
         def derivatives() -> None:
             copy(on, m.data, s.data.row(i))
@@ -178,24 +175,21 @@ def _over_the_step(
     on: Evaluator, t: Columns, g: GroupColumns, h: Real, n: Integer, m: Scratch, s: StageScratch
 ) -> None:
     """Energies, discrete gradients, temperatures at the end and gaps, as `evaluated` left them in m."""
-    n_rate = t.counts[0]
 
-    def component(i: Integer) -> None:
-        s.energy[i] = m.energy[i]
-
+    def storing(part: Part) -> None:
         def port(j: Integer) -> None:
-            rate = t.read_w[t.read_w_at[i] + j]
-            s.gradient[rate] = s.mean[n_rate + t.e_index[t.e_at[i] + j]] - m.residual[rate]
+            rate = part.rate(j)
+            s.gradient[rate] = s.mean[part.balance(j)] - m.residual[rate]
 
-        on.when(on.same(t.kind[i], STORING), lambda: on.loop(row_of(Dims, t.dims, i).efforts, port))
+        on.loop(part.n, port)
 
-    def node(k: Integer) -> None:
-        row = row_of(Node, g.node, k)
+    def node(row: Node, k: Integer) -> None:
         s.end[k] = s.gradient[row.rate] - s.whole[row.rate] / h * m.data[row.slope]
 
     def gap(j: Integer) -> None:
         s.gap[j] = m.residual[j]
 
-    on.loop(t.kind.size, component)
-    on.loop(g.node.size // Node.integer_width, node)
-    on.loop(n, gap, start=n_rate + t.counts[1])
+    copy(on, m.energy, s.energy)
+    each_component(on, t, STORING, storing)
+    each_row(on, Node, g.node, node)
+    on.loop(n, gap, start=t.counts[0] + t.counts[1])

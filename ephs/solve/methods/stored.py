@@ -7,7 +7,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.equations.model import Evaluation, Model
-from ephs.solve.methods.records import efforts_of, rates_of
+from ephs.solve.methods.records import STORING, efforts_of, rates_of
 from ephs.solve.posing.errors import SolveError
 
 
@@ -25,16 +25,15 @@ class StoredEnergies:
         model = self.model
         d, n_rate = model.descriptor, int(model.tables.counts[0])
         z = np.zeros(model.unknowns)
-        found = self._storages = self._storages or Evaluation(model.storages())
+        found = self._storages = self._storages or Evaluation(model.only(np.flatnonzero(model.tables.kind == STORING)))
         status, _ = found.at(x, z, 0.0)
         if not status:
             t = found.model.tables
             z[n_rate + efforts_of(t, slice(None))] = -found.memory.residual[rates_of(t, slice(None))]
             return z
-        for slot in d.components:  # one after the other, as one of them has no effort there
-            if slot.primitive.kind == "storage":
-                with suppress(Exception):
-                    z[[n_rate + i for i in slot.efforts]] = slot.primitive.effort(d.point(slot, x), model.reference)
+        for slot, storage in d.storages:  # one after the other, as one of them has no effort there
+            with suppress(Exception):
+                z[[n_rate + i for i in slot.efforts]] = storage.effort(d.point(slot, x), model.reference)
         return z
 
     def energies(self, x: Array) -> Array:

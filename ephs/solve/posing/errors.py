@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import nearest_of as nearest_of
 
 if TYPE_CHECKING:
@@ -28,73 +29,92 @@ __all__ = [
     "or_take",
     "serves_not",
     "solve_error_of",
+    "worst_entry",
 ]
 
 
 class Outcome(StrEnum):
-    """Cause that ended a run, in words; `advice` is the remedy."""
+    """Cause that ended a run, in words, with its remedy."""
 
-    DIVERGED = "the equations of the step have no solution near the state"
-    SINGULAR = "the equations of the step are singular"
-    CONTRADICTION = "a constraint contradicts the others"
-    OPEN = "a loop that cannot be closed near the state"
-    SHAKY = "a mechanism that is movable to first order only"
-    TURN = "a rotation of π or more in one step"
-    TEMPERATURE = "an absolute temperature that is not positive"
-    ENTROPY = "a component that destroys entropy"
-    LAWLESS = "a step in which a component loses entropy"
-    EXTENT = "a length or a volume that is not positive"
-    DOMAIN = "an energy or a flow that is not a finite number"
-    DEPTH = "surfaces that overlap so deeply that their contact has no direction"
-    RANGE = "a state beyond the range of numbers"
-    PYTHON = "a Python function of the model raised an exception"
-    INCONSISTENT = "an initial state that contradicts the constraints"
-    TINY = "a step below the smallest allowed one"
-    MANY = "more steps than are allowed"
-    UNDETERMINED = "the motion is not determined"
-    RESTLESS = "no state found in which nothing moves"
-    INPUT = "an input's function has no value"
-    EVENT = "an event's function has no value"
-    UNWRITTEN = "the journal cannot be written"
-    PROGRESS = "the progress function raised an exception"
-    UNLAWFUL = "the result does not pass its audit"
-    MEMORY = "not enough memory"
-    INTERRUPTED = "interrupted"
+    advice: str
+    """Advice for the user."""
 
-    @property
-    def advice(self) -> str:
-        """Advice for the user."""
-        return _ADVICE[self]
+    def __new__(cls, value: str, advice: str) -> "Outcome":
+        """An outcome whose value is the cause."""
+        made = str.__new__(cls, value)
+        made._value_, made.advice = value, advice
+        return made
+
+    DIVERGED = "the equations of the step have no solution near the state", "take a smaller step"
+    SINGULAR = "the equations of the step are singular", "take a smaller step, or start elsewhere"
+    CONTRADICTION = (
+        "a constraint contradicts the others",
+        "check prescribed motions and initial values, or take a smaller step",
+    )
+    OPEN = (
+        "a loop that cannot be closed near the state",
+        "take a smaller step, or check prescribed motions: the mechanism may be at the end of its travel",
+    )
+    SHAKY = (
+        "a mechanism that is movable to first order only",
+        "change its geometry or add springs: rigid joints transmit no force across their line",
+    )
+    TURN = "a rotation of π or more in one step", "take a smaller step: h·|ω| must stay below π"
+    TEMPERATURE = (
+        "an absolute temperature that is not positive",
+        "check initial temperatures and heat capacities, or take a smaller step",
+    )
+    ENTROPY = (
+        "a component that destroys entropy",
+        "correct the component's function; if it is right, take a smaller step",
+    )
+    LAWLESS = (
+        "a step in which a component loses entropy",
+        "take a smaller step, as its damping may be stiff; if that is refused too, correct the component",
+    )
+    EXTENT = "a length or a volume that is not positive", "check initial values, or take a smaller step"
+    DOMAIN = (
+        "an energy or a flow that is not a finite number",
+        "check initial values and the component's function there, or take a smaller step",
+    )
+    DEPTH = (
+        "surfaces that overlap so deeply that their contact has no direction",
+        "give the contact more stiffness, use thicker shapes, or start with the surfaces apart",
+    )
+    RANGE = "a state beyond the range of numbers", "check initial values and inputs, or take a smaller step"
+    PYTHON = "a Python function of the model raised an exception", "see the exception above this one"
+    INCONSISTENT = (
+        "an initial state that contradicts the constraints",
+        "give initial values that satisfy the constraints",
+    )
+    TINY = (
+        "a step below the smallest allowed one",
+        "loosen rtol and atol, lower min_step, or look for a singularity at this time",
+    )
+    MANY = "more steps than are allowed", "raise max_steps, or loosen rtol and atol"
+    UNDETERMINED = "the motion is not determined", "add a storage, friction or a constraint there, which determines it"
+    RESTLESS = (
+        "no state found in which nothing moves",
+        "start nearer to one, or add a spring, a stop of the drive or an environment",
+    )
+    INPUT = (
+        "an input's function has no value",
+        "see the exception above this one, or return as many finite numbers as expected",
+    )
+    EVENT = (
+        "an event's function has no value",
+        "see the exception above this one, or give a function that returns a number everywhere",
+    )
+    UNWRITTEN = "the journal cannot be written", "free space on the disk, then resume the run with the same journal"
+    PROGRESS = "the progress function raised an exception", "see the exception above this one"
+    UNLAWFUL = (
+        "the result does not pass its audit",
+        'the whole solution is in .partial; audit="warn" returns it with a warning',
+    )
+    MEMORY = "not enough memory", "keep fewer times with save_at, or take longer steps"
+    INTERRUPTED = "interrupted", "the solution up to there is in .partial"
 
 
-_ADVICE = {
-    Outcome.DIVERGED: "take a smaller step",
-    Outcome.SINGULAR: "take a smaller step, or start elsewhere",
-    Outcome.CONTRADICTION: "check prescribed motions and initial values, or take a smaller step",
-    Outcome.OPEN: "take a smaller step, or check prescribed motions: the mechanism may be at the end of its travel",
-    Outcome.SHAKY: "change its geometry or add springs: rigid joints transmit no force across their line",
-    Outcome.TURN: "take a smaller step: h·|ω| must stay below π",
-    Outcome.TEMPERATURE: "check initial temperatures and heat capacities, or take a smaller step",
-    Outcome.ENTROPY: "correct the component's function; if it is right, take a smaller step",
-    Outcome.LAWLESS: "take a smaller step, as its damping may be stiff; if that is refused too, correct the component",
-    Outcome.EXTENT: "check initial values, or take a smaller step",
-    Outcome.DOMAIN: "check initial values and the component's function there, or take a smaller step",
-    Outcome.DEPTH: "give the contact more stiffness, use thicker shapes, or start with the surfaces apart",
-    Outcome.RANGE: "check initial values and inputs, or take a smaller step",
-    Outcome.PYTHON: "see the exception above this one",
-    Outcome.INCONSISTENT: "give initial values that satisfy the constraints",
-    Outcome.TINY: "loosen rtol and atol, lower min_step, or look for a singularity at this time",
-    Outcome.MANY: "raise max_steps, or loosen rtol and atol",
-    Outcome.UNDETERMINED: "add a storage, friction or a constraint there, which determines it",
-    Outcome.RESTLESS: "start nearer to one, or add a spring, a stop of the drive or an environment",
-    Outcome.INPUT: "see the exception above this one, or return as many finite numbers as expected",
-    Outcome.EVENT: "see the exception above this one, or give a function that returns a number everywhere",
-    Outcome.UNWRITTEN: "free space on the disk, then resume the run with the same journal",
-    Outcome.PROGRESS: "see the exception above this one",
-    Outcome.UNLAWFUL: 'the whole solution is in .partial; audit="warn" returns it with a warning',
-    Outcome.MEMORY: "keep fewer times with save_at, or take longer steps",
-    Outcome.INTERRUPTED: "the solution up to there is in .partial",
-}
 Other = tuple[str, str]
 """Another method by its name, and what it does."""
 _OTHERS: Mapping[Outcome, Other] = {
@@ -115,6 +135,11 @@ def serves_not(_name: str) -> bool:
 def or_take(other: Other | None, serves: Callable[[str], bool]) -> str:
     """End of an advice that names another method, where that one accepts the problem; else nothing."""
     return f", or take {other[0]}, which {other[1]}" if other is not None and serves(other[0]) else ""
+
+
+def worst_entry(values: Array) -> int:
+    """Number of the largest entry, or of the first that is no number."""
+    return int(np.argmax(np.nan_to_num(values, nan=np.inf)))
 
 
 @final

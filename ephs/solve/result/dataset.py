@@ -71,6 +71,14 @@ class DatasetVariable:
         """Its unit and meaning under the names of the CF conventions."""
         return {"units": self.units, "long_name": self.says}
 
+    @property
+    def labels(self) -> Labels:
+        """Names and units of the entries of a state, or of an input."""
+        if not self.axes:
+            return Labels("", (), (self.units,))
+        ((dimension, names), *_), each, size = self.axes, self.units.split(", "), self.values.shape[1]
+        return Labels(dimension, names, tuple(each if len(each) == size else each * size) or ("1",))
+
     @classmethod
     def of(cls, values: Array, labels: Labels, says: str) -> "DatasetVariable":
         """Variable of a state's values."""

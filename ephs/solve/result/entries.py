@@ -8,7 +8,7 @@ defect of the whole.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import reduce
 from typing import final
 
@@ -126,29 +126,17 @@ def _tree(path: Path, leaves: Mapping[Path, LedgerEntry]) -> LedgerEntry:
     for leaf, entry in leaves.items():
         below.setdefault(next(iter(leaf.relative_to(path))), {})[leaf] = entry
     parts = {name: _tree(path / Path((name,)), inner) for name, inner in below.items()}
-    names = ("energy", "exergy", "entropy", "volume", "momentum", "made", "destroyed", "defect", "exergy_defect")
+    names = [field.name for field in fields(LedgerEntry)][1:-1]  # but its path and its parts
     sums = {name: reduce(np.add, [getattr(part, name) for part in parts.values()]) for name in names}
     return LedgerEntry(path, **sums, parts=parts)
 
 
 def _leaves(ledgers: Ledgers) -> dict[Path, LedgerEntry]:
-    n = ledgers.heat.size
-    nothing = np.zeros(n)
-    out: dict[Path, LedgerEntry] = {}
+    nothing, out = np.zeros(ledgers.heat.size), dict[Path, LedgerEntry]()
+    stored = ledgers.storages, ledgers.exergies, ledgers.entropies, ledgers.volumes, ledgers.momenta
     for path in dict.fromkeys([*ledgers.storages, *ledgers.makers]):
-        made = ledgers.makers.get(path, nothing)
-        out[path] = LedgerEntry(
-            path,
-            ledgers.storages.get(path, nothing),
-            ledgers.exergies.get(path, nothing),
-            ledgers.entropies.get(path, nothing),
-            ledgers.volumes.get(path, nothing),
-            ledgers.momenta.get(path, nothing),
-            made,
-            ledgers.temperature * made,
-            nothing,
-            nothing,
-        )
+        *held, made = (book.get(path, nothing) for book in (*stored, ledgers.makers))
+        out[path] = LedgerEntry(path, *[*held, made, ledgers.temperature * made, nothing, nothing])
     return out
 
 

@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path as File
-from typing import Any, final
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ephs.solve.posing.problem import Problem
 from ephs.solve.result.dataset import FORMAT, TIME, Content, DatasetVariable, content
 from ephs.solve.result.durable import durable
 from ephs.solve.result.guard import MOST, name_for_file, name_from_file
-from ephs.solve.result.labels import Labels, labels_of
+from ephs.solve.result.labels import OWN, labels_of
 from ephs.solve.result.ledger import Ledgers
 from ephs.solve.result.omitted import AXES, REST, restored, shortened, with_zeros
 from ephs.solve.result.solution import Solution
@@ -79,11 +79,7 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
             t, rest = _values(opened["t"]), _rest(file, opened)
     except OSError as error:
         raise ValueError(f"{file}: not a netCDF file ({error})") from error
-    states = groups.get("state", {})
-    inputs = {
-        path: DatasetVariable.of(each.values, each.labels, str(each.attributes["long_name"]))
-        for path, each in groups.get("input", {}).items()
-    }
+    states, inputs = groups.get("state", {}), groups.get("input", {})
     model, temperature = attributes["model"], float(attributes["reference_temperature"])
     problem = problem_of(model, t, {path: given.values for path, given in inputs.items()}) if model else None
     if problem is not None:
@@ -91,8 +87,8 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
     else:
         labels = {path: each.labels for path, each in states.items()}
     known, books = {path: each.values for path, each in states.items()}, _ledgers(groups, temperature)
+    short = Solution(attributes["name"], t, known, lambda: books, {}, problem, labels, inputs)
     if problem is not None and problem.motion is not None:
-        short = Solution(attributes["name"], t, known, lambda: books, {}, problem, labels, inputs)
         if rest:
             try:
                 known = restored(known, rest, problem.motion(short).contact_poses())
@@ -101,32 +97,10 @@ def load(path: str | File, problem_of: Callable[[str, Array, Inputs], Problem]) 
         known = {slot.path: known[slot.path] for slot in problem.descriptor.states if slot.path in known}
         books = with_zeros(books, problem, t.size)
     elif problem is not None and t.size:  # a mechanism is read as it was solved: by its first instant
-        first = Solution(attributes["name"], t, known, lambda: books, {}, problem, labels, inputs).state_at(0)
-        problem = replace(problem, initial=first)
+        problem = replace(problem, initial=short.state_at(0))
     stats = _stats(json.loads(attributes["stats"]), problem)
     found = Audit.of_record(stats.pop("audit", Audit().record()))
     return Solution(attributes["name"], t, known, lambda: books, stats, problem, labels, inputs, lambda: found)
-
-
-@final
-@dataclass(frozen=True, slots=True, eq=False)
-class _Stored:
-    """A variable of a file: its values, its attributes, and its second dimension with names of entries, if any."""
-
-    values: Array
-    attributes: Mapping[str, Any]
-    dimension: str
-    names: tuple[str, ...]
-
-    @property
-    def labels(self) -> Labels:
-        """Names and units of its entries."""
-        units = str(self.attributes.get("units", "SI"))
-        if self.values.ndim == 1:
-            return Labels("", (), (units,))
-        size = self.values.shape[1]
-        each = units.split(", ")
-        return Labels(self.dimension, self.names, tuple(each if len(each) == size else each * size) or ("1",))
 
 
 def _rest(file: File, opened: Any) -> dict[Path, Array]:
@@ -142,10 +116,10 @@ def _rest(file: File, opened: Any) -> dict[Path, Array]:
     return {Path.of(path): values[:, :, i] for i, path in enumerate(map(str, names.asstr()[...]))}
 
 
-def _groups(file: File, opened: Any) -> dict[str, dict[Path, _Stored]]:
+def _groups(file: File, opened: Any) -> dict[str, dict[Path, DatasetVariable]]:
     """States, inputs and ledgers of a file by group and path; derived variables are not read."""
     known = {"state", "input", *(field.name for field in fields(Ledgers))}
-    groups: dict[str, dict[Path, _Stored]] = {}
+    groups: dict[str, dict[Path, DatasetVariable]] = {}
     for key in opened:
         group, _, rest = name_from_file(key).partition(":")
         if group in known:
@@ -153,17 +127,17 @@ def _groups(file: File, opened: Any) -> dict[str, dict[Path, _Stored]]:
     return groups
 
 
-def _stored(file: File, key: str, array: Any) -> _Stored:
-    attributes = {name: _plain(array.attrs[name]) for name in ("units", "long_name") if name in array.attrs}
+def _stored(file: File, key: str, array: Any) -> DatasetVariable:
+    """A variable of a file."""
+    units, says = (str(_plain(array.attrs.get(name, other))) for name, other in (("units", OWN), ("long_name", "")))
     if packed := {"scale_factor", "add_offset"}.intersection(array.attrs):
         raise ValueError(f"{file}: {name_from_file(key)} has the attribute {min(packed)}, expected unpacked numbers")
-    dimension, names = "", ()
-    if array.ndim > 1:
-        scale = array.dims[1][0]
-        dimension = name_from_file(str(scale.name).lstrip("/"))
-        text = scale.dtype.kind == "O"
-        names = tuple(map(str, scale.asstr()[...] if text else range(array.shape[1])))
-    return _Stored(_values(array), attributes, dimension, names)
+    if array.ndim == 1:
+        return DatasetVariable(_values(array), units, says)
+    scale = array.dims[1][0]
+    text = scale.dtype.kind == "O"
+    names = tuple(map(str, scale.asstr()[...] if text else range(array.shape[1])))
+    return DatasetVariable(_values(array), units, says, ((name_from_file(str(scale.name).lstrip("/")), names),))
 
 
 def _values(array: Any) -> Array:
@@ -176,7 +150,7 @@ def _plain(value: Any) -> Any:
     return single.decode() if isinstance(single, bytes) else single
 
 
-def _ledgers(groups: Mapping[str, Mapping[Path, _Stored]], temperature: float) -> Ledgers:
+def _ledgers(groups: Mapping[str, Mapping[Path, DatasetVariable]], temperature: float) -> Ledgers:
     """Ledgers by path are groups; a single ledger has its name alone."""
     totals: dict[str, Any] = {}
     for field in fields(Ledgers):

@@ -1,7 +1,8 @@
 """Kept instants of a run, as arrays."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
@@ -9,6 +10,12 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.solve.running.stepping import Instants, Row
+
+UNSOLVED: Mapping[str, Any] = MappingProxyType({
+    "method": "none", "form": "paper", "steps": 0, "rejected": 0, "unknowns": 0, "setup_s": 0.0, "integrate_s": 0.0,
+    "least_production": 0.0,
+})  # fmt: skip
+"""Statistics of what no run has computed."""
 
 
 @final
@@ -84,7 +91,7 @@ class RowBlocks:
         last = self._blocks[-1] if self._blocks else None
         if last is None or not last.t.size or last.t[-1] != t:
             return None
-        return RunRecord(*(getattr(last, f.name)[-1:] for f in fields(RunRecord)))
+        return last[-1:]
 
     def fresh(self) -> RunRecord | None:
         """Instants since the last call."""

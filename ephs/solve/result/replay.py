@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.problem import Problem
-from ephs.solve.result.record import RowBlocks, record_of
+from ephs.solve.result.record import UNSOLVED, RowBlocks, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.ending import solution_of
 from ephs.solve.running.stepping import Row
@@ -14,8 +14,4 @@ def replay(problem: Problem, t: Array, rows: Sequence[Row], remark: str) -> Solu
     """The solution of what is kept at the times t; ``remark`` stands for the method."""
     found = record_of([(float(when), None, 0.0) for when in t], rows)
     record = found if rows else RowBlocks().whole(problem.descriptor)
-    stats = {
-        "method": remark, "form": "paper", "steps": max(0, len(rows) - 1), "rejected": 0, "setup_s": 0.0,
-        "integrate_s": 0.0, "unknowns": 0, "least_production": 0.0,
-    }  # fmt: skip
-    return solution_of(problem, record, stats)
+    return solution_of(problem, record, {**UNSOLVED, "method": remark, "steps": max(0, len(rows) - 1)})

@@ -14,14 +14,12 @@ if TYPE_CHECKING:
     from ephs.solve.result.solution import Solution
 
 
-def heat_storages(descriptor: Descriptor, *, environments: bool) -> dict[Path, ComponentSlot]:
+def heat_storages(descriptor: Descriptor, *, environments: bool) -> dict[Path, tuple[ComponentSlot, Storage]]:
     """Storages with one entropy among their states by path, with or without ``environments``."""
     return {
-        slot.path: slot
-        for slot in descriptor.components
-        if isinstance(slot.primitive, Storage)
-        and sum(s.quantity.kind == "entropy" for s in slot.reads) == 1
-        and (environments or not slot.primitive.environment)
+        slot.path: (slot, storage)
+        for slot, storage in descriptor.storages
+        if sum(s.quantity.kind == "entropy" for s in slot.reads) == 1 and (environments or not storage.environment)
     }
 
 
@@ -31,13 +29,12 @@ def temperature_at(solution: "Solution", path: Path) -> Array:
     if problem is None:
         raise TypeError(f"{solution.name} was read from a file without its system, from which temperatures follow")
     known = heat_storages(problem.descriptor, environments=True)
-    slot = known.get(path) or known.get(Path(tuple(path)[:-1]))
-    if slot is None or path not in {slot.path, *(s.path for s in slot.reads if s.quantity.kind == "entropy")}:
+    found = known.get(path) or known.get(Path(tuple(path)[:-1]))
+    if found is None or path not in {found[0].path, *(s.path for s in found[0].reads if s.quantity.kind == "entropy")}:
         names = list(map(str, known))
         listed = ", ".join(names) or "none"
         raise KeyError(f"{path}: no such storage with one entropy; known: {listed}{nearest_of(str(path), names)}")
-    storage = slot.primitive
-    assert isinstance(storage, Storage)
+    slot, storage = found
     if storage.environment:
         return np.full(len(solution), problem.reference.temperature)
     (at,) = (where.start for _, where, quantity in storage.bundle.items() if quantity.kind == "entropy")

@@ -8,9 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ephs.operad import Quantity
 from ephs.semantics.bundles.errors import SemanticsError
-from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.systems.kept import once
 from ephs.solve.auditing.audit import Bounds, Tests, audit
 from ephs.solve.auditing.findings import Audit
@@ -94,21 +92,15 @@ def _half_turned(outcome: Outcome, partial: Solution) -> tuple[str, str] | None:
     if not (len(partial) and partial.problem is not None and outcome in (*_AT_SPEED, *_AT_LENGTH)):
         return None
     state = partial.state_at(len(partial) - 1)
-    for slot in partial.problem.descriptor.components:
-        if not isinstance(slot.primitive, Storage):
-            continue
-        point = {port: state[slot.path / port] for port in slot.primitive.bundle.ports}
-        turns = [point[port][0] for port, _, of in slot.primitive.bundle.items() if _is_turn(of)]
+    for slot, storage in partial.problem.descriptor.storages:
+        point = {port: state[slot.path / port] for port in storage.bundle.ports}
+        relative = [(port, of.space.size) for port, _, of in storage.bundle.items() if of.kind == "relative_pose"]
+        turns = [point[port][0] for port, size in relative if size in (4, 7)]  # quaternions come first
         turned = max((2.0 * np.arccos(min(abs(float(w)), 1.0)) for w in turns), default=0.0)
-        if turned > HALF_TURN and slot.primitive.energy(point) != 0.0:
+        if turned > HALF_TURN and storage.energy(point) != 0.0:
             told = f"{slot.path} has turned by half a turn, where its strain ends"
             return told, f", or take more elements in place of {slot.path}"
     return None
-
-
-def _is_turn(quantity: Quantity) -> bool:
-    """Whether a relative pose has a quaternion, its first numbers."""
-    return quantity.kind == "relative_pose" and quantity.space.size in (4, 7)
 
 
 def _fast(run: Run, outcome: Outcome, partial: Solution) -> tuple[str, str]:

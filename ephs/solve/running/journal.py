@@ -20,7 +20,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.errors import OptionError, Outcome, SolveError
 from ephs.solve.result.durable import sync_folder
-from ephs.solve.result.record import RunRecord, joined
+from ephs.solve.result.record import UNSOLVED, RunRecord, joined
 from ephs.solve.running.snapshot import Snapshot, parts
 
 FORMAT = 1
@@ -180,9 +180,7 @@ def read_journal(path: str | os.PathLike[str]) -> Contents:
     rows: list[RunRecord] = []
     heading: Any = None
     snapshot: Snapshot | None = None
-    stats: Mapping[str, Any] = {"method": "none", "form": "paper", "steps": 0, "rejected": 0, "unknowns": 0}
-    stats = {**stats, "setup_s": 0.0, "integrate_s": 0.0, "least_production": 0.0}
-    certain = end = 0
+    stats, certain, end = UNSOLVED, 0, 0
     try:
         for payload, after in _payloads(file):
             if heading is None:

@@ -3,29 +3,30 @@
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.auditing.audit import Bounds, Tests
+from ephs.solve.auditing.audit import Tests
 from ephs.solve.auditing.forecast import Forecast
 from ephs.solve.auditing.production import Production
 from ephs.solve.auditing.resolution import Samples, trials_of
 from ephs.solve.march.control import Policy
 from ephs.solve.posing.breakpoints import Breakpoints
 from ephs.solve.posing.errors import OptionError, Outcome, SolveError, serves_not, solve_error_of
-from ephs.solve.posing.events import Event, Watch
+from ephs.solve.posing.events import Watch
 from ephs.solve.posing.problem import Problem, States
 from ephs.solve.result.record import RowBlocks, RunRecord, record_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.control import SLIVER, Advance, Control, Grid, first_step
 from ephs.solve.running.ending import audited, failures_of, repeatable
-from ephs.solve.running.journal import Written
+from ephs.solve.running.request import RunRequest
 from ephs.solve.running.snapshot import Snapshot, like, parts
-from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, too_fast
-from ephs.solve.running.watching import Balance, Progress
+from ephs.solve.running.stepping import Attempt, Counts, Instant, Instants, Leg, Row, Span, Stepper, at_time, too_fast
+from ephs.solve.running.watching import Balance
 
 S = TypeVar("S")
 RESPONSE = 0.1
@@ -41,16 +42,10 @@ def integrate(
     problem: Problem,
     t0: float,
     until: float,
-    *,
     make: Callable[[], tuple[Stepper[S], Policy | None]],
     control: Control,
-    events: tuple[Event, ...] = (),
-    save_at: Array | None = None,
-    progress: Progress | None = None,
-    remarks: Mapping[str, Any] | None = None,
-    journal: Written | None = None,
-    bounds: Bounds | None = None,
-    breakpoints: Breakpoints | None = None,
+    breakpoints: Breakpoints,
+    request: RunRequest,
 ) -> Solution:
     """Solve an initial value problem, forward or backward in time.
 
@@ -58,14 +53,8 @@ def integrate(
     ----------
     make
         Makes the method, and what chooses its steps; None: they are constant.
-    remarks
-        What else the statistics are to say.
-    journal
-        Where the run is written down, and what an earlier part of it left there.
-    bounds
-        What the audit of the run allows; None: there is none.
     breakpoints
-        Where inputs jump, and steps end; None: nowhere.
+        Where inputs jump, and steps end.
 
     Raises
     ------
@@ -75,10 +64,7 @@ def integrate(
     begin = time.perf_counter()
     if not (np.isfinite(until) and until != t0):
         raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
-    run = _RunLoop(
-        problem, t0, until, *make(), control, events, save_at, progress, remarks or {}, begin, journal, bounds,
-        breakpoints or Breakpoints(t0, until),
-    )  # fmt: skip
+    run = _RunLoop(problem, t0, until, *make(), control, breakpoints, request, begin)
     with failures_of(run):
         run.start()
         run.setup = time.perf_counter() - begin
@@ -100,32 +86,27 @@ class _RunLoop(Generic[S]):
         stepper: Stepper[S],
         policy: Policy | None,
         control: Control,
-        events: tuple[Event, ...],
-        save_at: Array | None,
-        progress: Progress | None,
-        remarks: Mapping[str, Any],
-        begin: float,
-        journal: Written | None,
-        bounds: Bounds | None,
         breakpoints: Breakpoints,
+        request: RunRequest,
+        begin: float,
     ) -> None:
-        self.breakpoints = breakpoints
+        self.breakpoints, self.request, self.journal = breakpoints, request, request.journal
         self.problem, self.until, self.stepper, self.control = problem, until, stepper, control
-        self.policy, self.events, self.progress, self.begin = policy, events, progress, begin
-        self.remarks, self.journal, self.bounds, self.save_at = remarks, journal, bounds, save_at
+        self.policy, self.begin, self.bounds, self.save_at = policy, begin, request.bounds, request.save_at
         self.t = self.t0 = t0
         self.grid = None if policy else Grid(abs(until - t0), float(control.step or 0.0))
         self.sign = 1.0 if until > t0 else -1.0
         self.setup, self.looked, self.ended = 0.0, begin, False
-        self.steps = self.rejected = self.saved = 0
+        self.saved, self.counts = 0, Counts()
         self.way = Advance(t0, abs(until - t0) if policy else 0.0)
-        self.shortest, self.longest, self.least = np.inf, 0.0, np.inf
         self.blocks: list[Instants[S]] = []
         self.pending: list[Instant[S]] = []
         self.kept = RowBlocks()
-        self.samples: Samples[S] = Samples(wanted=policy is None, retaken=bounds is not None and bounds.retaken)
+        self.samples: Samples[S] = Samples(
+            wanted=policy is None, retaken=self.bounds is not None and self.bounds.retaken
+        )
         self.watch = Watch((), t0, {})
-        order, serves = (bounds.order, bounds.serves) if bounds else (1, serves_not)
+        order, serves = (self.bounds.order, self.bounds.serves) if self.bounds else (1, serves_not)
         self.forecast = Forecast(stepper.name, order, until, serves)
         self.leg: Leg[S] | None = None
         self.first: Row | None = None
@@ -138,15 +119,16 @@ class _RunLoop(Generic[S]):
             raise OptionError("max_steps", self.control.max_steps, f"at least the grid's {self.grid.count} steps")
         self.state = self.stepper.start(self.t0, self.sign * self.h)
         row = self.first = self.stepper.row(self.state)
-        self.balance = Balance(self.problem, row.x, row.energies, row.sums)
+        self.balance = Balance(self.problem, row)
         self.production = Production(self.problem, self.sign)
-        self.production.start(row.x, row.energies)
+        self.production.start(row)
         if self.save_at is None or (self.save_at.size and self.save_at[0] == self.t0):
             self.kept.add(record_of([(self.t0, None, 0.0)], [row]))
             self.saved = 1
         self.samples.add([(self.t0, self.state, 0.0)])
         self.stepper.prepare(self.state, self.sign * self.h)
-        self.watch = Watch(self.events, self.t0, self._here() if self.events else {})
+        events = self.request.events
+        self.watch = Watch(events, self.t0, self._here() if events else {})
 
     def advance(self, stood: Snapshot | None) -> None:
         """Run to the end or to a terminal event: in compiled code while possible, then step by step.
@@ -156,9 +138,8 @@ class _RunLoop(Generic[S]):
         stepwise = self.watch.events or self.production.active or self.breakpoints.active
         compiled = not stepwise and (self.journal is None or self.journal.snapshot is None or stood is not None)
         while compiled and not self.ended and self.t != self.until:  # leg after leg, while the method has one
-            counts = Counts(self.steps, self.rejected, self.shortest, self.longest, self.least, self.h)
             here = self.state, self.t0, self.until, self.h, self.control, self.policy, self.save_at, self.saved
-            self.leg = self.stepper.many(Span(*here, counts))
+            self.leg = self.stepper.many(Span(*here, replace(self.counts, h=self.h)))
             if self.leg is None:
                 break
             if stood is not None:
@@ -172,32 +153,38 @@ class _RunLoop(Generic[S]):
         """Compiled steps until the end, or until the compiled code stops."""
         done, most = False, BURST
         while not (done or leg.left):
-            if self.control.max_steps is not None and self.steps >= self.control.max_steps:
-                raise SolveError(Outcome.MANY, "", f"{self.control.max_steps}")
-            burst = most if self.control.max_steps is None else min(most, self.control.max_steps - self.steps)
-            begin, before = time.perf_counter(), self.steps
+            self._require_steps_left()
+            burst = most if self.control.max_steps is None else min(most, self.control.max_steps - self.counts.steps)
+            begin, before = time.perf_counter(), self.counts.steps
             try:
                 done = leg.advance(burst)
             finally:
-                fresh, counts = leg.rows(), leg.counts
+                fresh, self.counts = leg.rows(), leg.counts
                 self.blocks.append(fresh)
                 self.samples.add(fresh)
                 self.saved += len(fresh)
-                self.t, self.steps, self.rejected, self.h = leg.time, counts.steps, counts.rejected, counts.h
-                self.shortest, self.longest, self.least = counts.shortest, counts.longest, counts.least
-                self.state = leg.state
-            each = (time.perf_counter() - begin) / max(1, self.steps - before)
+                self.t, self.h, self.state = leg.time, self.counts.h, leg.state
+            each = (time.perf_counter() - begin) / max(1, self.counts.steps - before)
             most = int(np.clip(RESPONSE / each, 1, BURST))
             if not leg.left:  # else a journal would lead from one method into the other
                 self._look()
 
+    def _require_steps_left(self) -> None:
+        """Refuse more steps than are allowed."""
+        if self.control.max_steps is not None and self.counts.steps >= self.control.max_steps:
+            raise SolveError(Outcome.MANY, "", f"{self.control.max_steps}")
+
+    @property
+    def _next_on_grid(self) -> int:
+        """Number of the next step on the grid of constant ones."""
+        return self.counts.steps - self.breakpoints.split + 1
+
     def _advance_stepwise(self) -> None:
         control, grid = self.control, self.grid
         while self.t != self.until and not self.ended:
-            if control.max_steps is not None and self.steps >= control.max_steps:
-                raise SolveError(Outcome.MANY, "", f"{control.max_steps}")
+            self._require_steps_left()
             if grid:
-                self.h = (self.steps - self.breakpoints.split + 1) * grid.h - abs(self.t - self.t0)
+                self.h = self._next_on_grid * grid.h - abs(self.t - self.t0)
             end = self.breakpoints.end(self.t, self.h, self._here)
             rest = abs(end - self.t)
             if grid and rest - self.h <= SLIVER * grid.h:
@@ -234,7 +221,7 @@ class _RunLoop(Generic[S]):
             self._look()
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
-        self.rejected += 1
+        self.counts = replace(self.counts, rejected=self.counts.rejected + 1)
         finest = self.policy.finest if self.policy else 0.0
         self.h = self.control.allowed(h, max(abs(self.t), abs(self.until)), cause, finest * abs(self.until - self.t0))
 
@@ -242,19 +229,17 @@ class _RunLoop(Generic[S]):
         """Keep a step; whether an event ends the run with it."""
         t = self.t + attempt.h if end is None else end
         if end is None and self.policy is None:
-            t = self.t0 + self.sign * (self.steps - self.breakpoints.split + 1) * float(self.control.step or 0.0)
-        after = self.stepper.at(attempt.end, t)
+            t = self.t0 + self.sign * self._next_on_grid * float(self.control.step or 0.0)
+        after = at_time(attempt.end, t)
         stopped = None
         if self.watch.events:
             stopped = self.watch.step(self.t, t, self._at(after), lambda s: self._at(self.stepper.inside(attempt, s)))
             if stopped is not None and stopped != t:
-                t, after = stopped, self.stepper.at(self.stepper.inside(attempt, stopped), stopped)
+                t, after = stopped, at_time(self.stepper.inside(attempt, stopped), stopped)
         self.watch.add((h for h in attempt.happened if self.sign * (t - h[0]) >= 0.0), self._at)
         if self.production.active:
-            row = self.stepper.row(after)
-            self.production.step(t, row.x, row.energies)
-        self.least = min(self.least, attempt.least)
-        self.shortest, self.longest = min(self.shortest, abs(attempt.h)), max(self.longest, abs(attempt.h))
+            self.production.step(t, self.stepper.row(after))
+        self.counts = self.counts.after(abs(attempt.h), attempt.least)
         if self.save_at is None:
             self.pending.append((t, after, attempt.least))
         else:
@@ -266,24 +251,22 @@ class _RunLoop(Generic[S]):
         self.samples.add([(t, after, attempt.least)])
         self.samples.retaken.add(self.t, attempt)
         self.state, self.t, self.cause = after, t, None
-        self.steps += 1
         if self.policy is not None:
-            self.forecast.look(self.steps, t, self.stepper.stats)
+            self.forecast.look(self.counts.steps, t, self.stepper.stats)
         return stopped is not None
 
     def _look(self) -> None:
         """Report progress and write the journal at intervals; a run that does not come forward ends."""
-        self.way.require(self.steps, self.t)
+        self.way.require(self.counts.steps, self.t)
         if self.journal is not None and self.journal.due:
             self.write()
         elif len(self.pending) + sum(map(len, self.blocks)) >= BLOCK:
             self._settle()
-        now = time.perf_counter()
-        if self.progress is not None and (self.t == self.until or now - self.looked > 0.5 * RESPONSE):
+        now, progress = time.perf_counter(), self.request.progress
+        if progress is not None and (self.t == self.until or now - self.looked > 0.5 * RESPONSE):
             self.looked = now
-            row = self.stepper.row(self.state)
-            error = self.balance.error(row.x, row.energies, row.sums)
-            self.progress(self.t, self.until, {**self.stats(), "energy_error": error})
+            error = self.balance.error(self.stepper.row(self.state))
+            progress(self.t, self.until, {**self.stats(), "energy_error": error})
 
     def _at(self, state: S) -> Mapping[Path, Array]:
         return States(self.problem.descriptor.unpack(self.stepper.row(state).x))
@@ -293,21 +276,22 @@ class _RunLoop(Generic[S]):
 
     def stats(self) -> dict[str, Any]:
         """Statistics of the run so far."""
+        counts = self.counts
         return {
             "method": self.stepper.name,
-            "steps": self.steps,
-            "rejected": self.rejected,
-            "shortest_step": float(self.shortest) if self.steps else 0.0,
-            "longest_step": self.longest,
+            "steps": counts.steps,
+            "rejected": counts.rejected,
+            "shortest_step": float(counts.shortest) if counts.steps else 0.0,
+            "longest_step": counts.longest,
             "dependent_equations": 0,
             **({"step": self.control.step} if self.policy is None else {}),
             **self.stepper.stats(),
-            **self.remarks,
+            **self.request.remarks,
             **self.breakpoints.stats(),
             **self.forecast.stats(),
             "setup_s": self.setup,
             "integrate_s": time.perf_counter() - self.begin - self.setup,
-            "least_production": float(self.least) if np.isfinite(self.least) else 0.0,
+            "least_production": float(counts.least) if np.isfinite(counts.least) else 0.0,
             **self.watch.stats(),
         }
 
@@ -316,7 +300,7 @@ class _RunLoop(Generic[S]):
         stats = self.stats()
         self._settle()
         ends = self._ends()
-        stats |= {**self.stepper.stats(), **self.remarks}  # also known from rows
+        stats |= {**self.stepper.stats(), **self.request.remarks}  # also known from rows
         return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends, self._trials)
 
     def _trials(self, solution: Solution) -> Tests | None:
@@ -344,6 +328,12 @@ class _RunLoop(Generic[S]):
                 self.kept.add(self.stepper.record(block))
         self.blocks, self.pending = [], []
 
+    @property
+    def _resumable(self) -> dict[str, Any]:
+        """What has snapshots of its own, by name."""
+        own = {"watch": self.watch, "breakpoints": self.breakpoints, "forecast": self.forecast}
+        return own if self.policy is None else {**own, "policy": self.policy}
+
     def write(self, *, end: bool = False) -> None:
         """An entry in the journal, if there is one."""
         if self.journal is not None:
@@ -358,17 +348,13 @@ class _RunLoop(Generic[S]):
             return None
         return {
             "t": self.t,
-            "h": self.h,
-            "counts": [self.steps, self.rejected, self.saved],
-            "lengths": [float(self.shortest), float(self.longest), float(self.least)],
+            "counts": parts(replace(self.counts, h=self.h)),
+            "saved": self.saved,
             "elapsed": time.perf_counter() - self.begin - self.setup,
             "ended": self.ended,
             "state": parts(self.state),
             "method": method,
-            "policy": self.policy.snapshot() if self.policy is not None else None,
-            "watch": self.watch.snapshot(),
-            "breakpoints": self.breakpoints.snapshot(),
-            "forecast": self.forecast.snapshot(),
+            **{name: part.snapshot() for name, part in self._resumable.items()},
             "samples": self.samples.snapshot(),
             "leg": self.leg.snapshot() if self.leg is not None else None,
         }
@@ -378,21 +364,16 @@ class _RunLoop(Generic[S]):
         found = self.journal.snapshot if self.journal is not None else None
         if self.journal is None or found is None:
             return None
-        self.t, self.h = found["t"], found["h"]
-        self.steps, self.rejected, self.saved = found["counts"]
-        self.shortest, self.longest, self.least = found["lengths"]
+        self.t, self.saved, self.counts = found["t"], found["saved"], like(self.counts, found["counts"])
+        self.h = self.counts.h
         self.begin = time.perf_counter() - self.setup - found["elapsed"]
         self.ended = found["ended"]
         self.state = like(self.state, found["state"])
-        self.breakpoints.restore(found["breakpoints"])
+        for name, part in self._resumable.items():
+            part.restore(found[name])
         self.stepper.restore(found["method"], self.state)
-        row = self.stepper.row(self.state)
-        self.production.start(row.x, row.energies)
-        if self.policy is not None:
-            self.policy.restore(found["policy"])
-        self.watch.restore(found["watch"])
+        self.production.start(self.stepper.row(self.state))
         self.kept = RowBlocks()
-        self.forecast.restore(found["forecast"])
         self.samples.restore(found["samples"], self.state)
         if self.journal.rows is not None:
             self.kept.add(self.journal.rows, written=True)

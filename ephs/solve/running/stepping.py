@@ -1,7 +1,7 @@
 """Interface between the time loop and a method: one or many steps per call; steps and records."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar, final
 
 import numpy as np
@@ -142,11 +142,21 @@ class Counts:
     least: float = float("inf")
     h: float = 0.0
 
+    def after(self, h: float, least: float, steps: int = 1) -> "Counts":
+        """The counts after further steps of h seconds."""
+        lengths = min(self.shortest, h), max(self.longest, h)
+        return Counts(self.steps + steps, self.rejected, *lengths, min(self.least, least), self.h)
+
 
 def too_fast(method: str, worst: str, asked: float) -> SolveError:
     """Refusal of the step length, in s, that a tolerance requires at a state."""
     told = f"{method} would need steps of about {asked:.1g} s" if np.isfinite(asked) else "its error is not finite"
     return SolveError(Outcome.TINY, worst, told)
+
+
+def at_time(state: S, t: float) -> S:
+    """A method's state at a time that differs by rounding."""
+    return replace(state, t=t)  # pyright: ignore[reportArgumentType, reportCallIssue]
 
 
 class Leg(Protocol[S_co]):
@@ -225,10 +235,6 @@ class Stepper(Protocol[S]):
 
     def missed(self, attempt: Attempt[S]) -> float | None:
         """Error of a step, by others of another length, in tolerances; None where the balance of energy shows it."""
-        ...
-
-    def at(self, state: S, t: float) -> S:
-        """The same state at a time within rounding."""
         ...
 
     def anew(self, state: S) -> S:

@@ -1,15 +1,14 @@
 """Progress of a run: the defect of its energy balance, and the callback for it."""
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from typing import Any, final
 
-import numpy as np
-
-from ephs.semantics.bundles.bundle import Array
 from ephs.solve.posing.errors import OptionError, Outcome, SolveError
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.ledger import ledgers
-from ephs.solve.result.record import RunRecord
+from ephs.solve.result.record import record_of
+from ephs.solve.running.stepping import Row
 
 Progress = Callable[[float, float, Mapping[str, Any]], None]
 """Called with the time, the end, and statistics so far."""
@@ -17,17 +16,14 @@ Progress = Callable[[float, float, Mapping[str, Any]], None]
 
 @final
 class Balance:
-    """The energy balance since a first row (states, energies, and the first four sums of a `RunRecord`)."""
+    """The energy balance since a first row."""
 
-    def __init__(self, problem: Problem, x: Array, energies: Array, sums: Array) -> None:
-        self._problem = problem
-        self._first = (x.copy(), energies.copy(), sums[:4].copy())
-        self._scale = 0.0
+    def __init__(self, problem: Problem, first: Row) -> None:
+        self._problem, self._first, self._scale = problem, deepcopy(first), 0.0
 
-    def error(self, x: Array, energies: Array, sums: Array) -> float:
+    def error(self, row: Row) -> float:
         """The defect now, relative to the largest K + |V − V₀| + |heat| + |work| so far."""
-        rows = [np.array(pair) for pair in zip(self._first, (x, energies, sums[:4]), strict=True)]
-        totals = ledgers(self._problem, RunRecord(np.zeros(2), rows[0], rows[1], np.pad(rows[2], ((0, 0), (0, 1)))))
+        totals = ledgers(self._problem, record_of([(0.0, None, 0.0)] * 2, [self._first, row]))
         self._scale = max(self._scale, totals.scale)
         return float(totals.defect(mechanical=self._problem.mechanical)[-1]) * totals.scale / self._scale
 

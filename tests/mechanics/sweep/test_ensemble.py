@@ -15,7 +15,7 @@ from ephs.mechanics.sweep.images import STARTS, Images
 from ephs.mechanics.sweep.outputs import outputs_of
 from ephs.mechanics.tree.finding.tables import TREE
 from ephs.show.charts.family_scenes import parallelogram
-from ephs.solve.march import Ending
+from ephs.solve.march.records import Ending
 from tests.scenes import ROOT, equations_of
 
 CHAIN, GRAVITY = ROOT / "benchmarks/scenes/revolute-chain-4.toml", "world.gravity[2]"

@@ -11,8 +11,9 @@ from ephs.mechanics.tree.engine.programs import lagged_program, motion_program, 
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.stage import Program, Record, Table, members
 from ephs.semantics.stage.calling import Bound
-from ephs.solve.march import MarchControl, RunAccount, Totals
-from ephs.solve.march.account import WORTH
+from ephs.solve.march.account import WORTH, RunAccount
+from ephs.solve.march.memory import Totals
+from ephs.solve.march.records import MarchControl
 
 
 @final

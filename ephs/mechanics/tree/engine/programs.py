@@ -20,18 +20,14 @@ from ephs.semantics.stage import (
     Vector,
     kind_of,
 )
-from ephs.solve.march import (
-    MarchControl,
-    Memory,
-    RunAccount,
-    Stiff,
-    TableauRecord,
-    Totals,
-    march,
-)
-from ephs.solve.march.account import worth
+from ephs.solve.march.account import RunAccount, worth
+from ephs.solve.march.evaluating import MarchStep
 from ephs.solve.march.lagged import end, stage
+from ephs.solve.march.march import march
+from ephs.solve.march.memory import Memory, Totals
+from ephs.solve.march.records import MarchControl, TableauRecord
 from ephs.solve.march.steps import attempt, book
+from ephs.solve.march.stiff import Stiff
 
 _MOVING: dict[str, Any] = {"tables": kind_of(Tables), "work": kind_of(Work)}
 """Kinds of a mechanism's arguments, which all entry functions have first."""
@@ -69,7 +65,7 @@ def motion_program(*, looped: bool) -> Program:
         q: Vector,
         h: Real,
     ) -> Integer:
-        return attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
+        return attempt(on, MarchStep(motion, tableau, control[0], base, start, h, k, y, q), None, last)
 
     def rates(on: Evaluator, motion: Mechanism, base: Vector, y: Vector, q: Vector, out: Vector) -> Integer:
         return motion.rates(on, base, y, q, out)[0]
@@ -168,12 +164,12 @@ def lagged_program(*, looped: bool) -> Program:
         i: Integer,
         h: Real,
     ) -> Integer:
-        status = on.counter(0)
+        status, step = on.counter(0), MarchStep(motion, tableau, control[0], base, start, h, k, y, q)
 
         def next_stage() -> None:
-            status.value = stage(on, motion, tableau, control[0], base, start, h, k, drags, i, y, q)
+            status.value = stage(on, step, drags, i)
 
-        on.when(i < tableau.a.columns, next_stage, lambda: end(on, motion, tableau, base, start, h, k, drags, y, q))
+        on.when(i < tableau.a.columns, next_stage, lambda: end(on, step, drags))
         return status.value
 
     return Program(

@@ -28,7 +28,9 @@ from ephs.semantics.stage import (
     Vector,
 )
 from ephs.solve.equations.heats import PLAIN
-from ephs.solve.march import MarchControl, RunAccount, TableauRecord
+from ephs.solve.march.account import RunAccount
+from ephs.solve.march.evaluating import MarchStep
+from ephs.solve.march.records import MarchControl, TableauRecord
 from ephs.solve.march.steps import attempt
 
 BEYOND: Final = 1e100
@@ -59,7 +61,8 @@ def step_program(*, looped: bool) -> Program:
         status = on.counter(motion.rates(on, base, start, q, k.row(0))[0])
 
         def stages() -> None:
-            status.value = attempt(on, motion, tableau, control[0], base, start, h, k, None, last, y, q)
+            taken = MarchStep(motion, tableau, control[0], base, start, h, k, y, q)
+            status.value = attempt(on, taken, None, last)
 
         def end() -> None:
             status.value = settle_step(on, motion, account, allowed, base, start, y, q, h)

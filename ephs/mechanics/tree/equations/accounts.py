@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
-from ephs.solve.march import Status
 from ephs.solve.march.account import WORTH
 from ephs.solve.march.noted import Noted
+from ephs.solve.march.records import Status
 from ephs.solve.posing.errors import OptionError, nearest_of
 from ephs.solve.running.snapshot import Snapshot
 

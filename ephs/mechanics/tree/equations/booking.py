@@ -15,8 +15,8 @@ from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import Table
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
-from ephs.solve.equations.model import STORING
 from ephs.solve.equations.sparse import Index
+from ephs.solve.methods.records import STORING
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.result.record import RunRecord
 

@@ -30,8 +30,8 @@ from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.spaces.rank import SPARSE, TINY
-from ephs.solve.equations.model import compile_model
-from ephs.solve.march import Status
+from ephs.solve.equations.model import model_of
+from ephs.solve.march.records import Status
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.posing.problem import NO_STATE, Problem
 from ephs.solve.running.control import Tolerance
@@ -61,9 +61,7 @@ class ReducedEquations:
     @paused_collector()
     def __init__(self, problem: Problem, t0: float, *, pushed: bool = False, apart: bool = False) -> None:
         self.problem, self._apart = problem, apart
-        self.model = model = compile_model(
-            problem.descriptor, problem.reference, problem.inputs(t0, problem.initial), matrix=False
-        )
+        self.model = model = model_of(problem, t0, matrix=False)
         self.reduced = reduced = reduce_system(problem, model)
         self._dense: Dense | None = None
         t = reduced.tables
