@@ -11,7 +11,6 @@ from ephs.operad.charges import ENTROPY, VOLUME
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.descriptor import ComponentSlot
 from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
-from ephs.solve.equations.heats import exponential_law
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
 
@@ -190,6 +189,8 @@ def _carried(problem: Problem, record: RunRecord, makers: Mapping[Path, Array]) 
 def heat_beside(problem: Problem) -> list[tuple[ComponentSlot, list[ComponentSlot]]]:
     """Storages of heat beside other energy, or by a law of their own, each with the components at its entropies, of
     which one makes entropy at least."""
+    from ephs.solve.equations.heats import exponential_law
+
     d, found = problem.descriptor, list[tuple[ComponentSlot, list[ComponentSlot]]]()
     entropies = {junction.at for junction in d.junctions if junction.quantity.kind == "entropy"}
     for holder in d.components:
