@@ -61,6 +61,7 @@ def test_a_heat_that_sums_do_not_know_is_not_a_number(text, tmp_path):
     sol = ephs.simulate(scene_of_text(text), 0.05, method="rk87")
     assert np.isnan(sol.heat).all()
     assert sol.energy_error.max() < 1e-11
+    assert not ephs.simulate(scene_of_text(text), 0.02, method="rk87", step=2e-5).audit.findings  # runs are compared
     assert json.loads(json.dumps(sol.summary(), allow_nan=False))["heat"] is None
     sol.save(tmp_path / "run.nc")
     assert np.isnan(ephs.load_solution(tmp_path / "run.nc").heat).all()

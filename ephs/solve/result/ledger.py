@@ -78,6 +78,11 @@ class Ledgers:
         return self.kinetic + self.potential + self.thermal + self.environment
 
     @property
+    def loss(self) -> Array:
+        """(n,) heat of friction in J, and what is destroyed where that is not known."""
+        return np.where(np.isnan(self.heat), self.temperature * self.made, self.heat)
+
+    @property
     def scale(self) -> float:
         """Largest K + |V − V₀| + |heat| + |work| over the run; where nothing moves, what the storages exchange; in J.
 
@@ -87,7 +92,7 @@ class Ledgers:
         v = self.potential
         if not v.size:
             return 1.0
-        lost = np.fmax(np.abs(self.heat), self.temperature * np.abs(self.made))
+        lost = np.maximum(np.abs(self.loss), self.temperature * np.abs(self.made))
         moved = float(np.max(self.kinetic + np.abs(v - v[0]) + lost + np.abs(self.work)))
         still = STILL * float(np.abs(v).max())
         if moved > still:
