@@ -130,13 +130,11 @@ class Draft:
             entries.pop(key, None)
         entries["motion"] = {"rate": 0.0}
 
-    def gear(self, name: str, first: str, second: str, ratio: float, offset: float = 0.0) -> None:
-        """Couple the coordinate of a joint of one degree of freedom to another's, which is 0: ratio · coordinate +
-        offset.
-        """
+    def gear(self, name: str, first: str, second: str, ratio: float, start: float = 0.0) -> None:
+        """Couple the rate of a joint of one degree of freedom to another's, times the ratio, from its start on."""
         joints = [self._joint_names[first], self._joint_names[second]]
-        if offset:
-            self._joint(first)["coordinate"] = offset
+        if start:
+            self._joint(first)["coordinate"] = start
         if ratio:
             self._add("gears", name, {"joints": joints, "ratio": float(ratio)})
         else:

@@ -86,8 +86,9 @@ def read_urdf(root: FileElement, draft: Draft, base: str) -> None:
     for link in order[1:]:
         name = of_child[link]
         _joint(name, joints[name], *ends[name], settings.get(name, []), draft)
-    for name, joint in joints.items():
-        _mimic(name, joint, joints, draft)
+    mimics = _mimicry(joints, draft)
+    for name in mimics:
+        _mimic(name, mimics, joints, draft)
     for number, element in enumerate(root.findall("transmission")):
         _transmission(element, element.get("name") or f"transmission_{number + 1}", joints, draft)
     for name, joint in joints.items():
@@ -272,23 +273,35 @@ def _joint(name: str, joint: FileElement, parent: str, child: str, gazebo: list[
     joint.named("joints", name, _PLAIN_JOINT if d else _PLAIN_FIXED)
 
 
-def _mimic(name: str, joint: FileElement, joints: Mapping[str, FileElement], draft: Draft) -> None:
-    """Couple a joint to its mimicked joint, if both have one degree of freedom and the latter starts at 0."""
-    mimic = joint.find("mimic")
-    if mimic is None:
-        return
-    key, other = f"joints.{name}.mimic", mimic.get("joint") or ""
-    ratio, offset = (
-        _attribute(mimic, word, key, draft, default) for word, default in (("multiplier", 1.0), ("offset", 0.0))
-    )
-    followed = joints.get(other)
-    moves = [KINDS.get(str(each.get("type"))) for each in (joint, followed) if each is not None]
-    if followed is None:
+def _mimicry(joints: Mapping[str, FileElement], draft: Draft) -> dict[str, tuple[str, float, float]]:
+    """Of each joint that mimics another: this one, multiplier and offset."""
+    found: dict[str, tuple[str, float, float]] = {}
+    for name, joint in joints.items():
+        if (mimic := joint.find("mimic")) is not None:
+            words = ("multiplier", 1.0), ("offset", 0.0)
+            ratio, offset = (_attribute(mimic, word, f"joints.{name}.mimic", draft, default) for word, default in words)
+            found[name] = mimic.get("joint") or "", ratio, offset
+    return found
+
+
+def _mimic(
+    name: str, mimics: Mapping[str, tuple[str, float, float]], joints: Mapping[str, FileElement], draft: Draft
+) -> None:
+    """Couple a joint to its mimicked joint, if both have one degree of freedom; one that mimics none starts at 0."""
+    other, ratio, start = mimics[name]
+    if other not in joints:
         draft.leave("mimicry of", f"{name} (of {other}, which is not there)")
-    elif other == name or set(moves) - {"revolute", "prismatic"} or (followed.has("mimic") and offset):
+        return
+    moves = {KINDS.get(str(joints[each].get("type"))) for each in (name, other)}
+    chain, factor = [name, other], ratio
+    while chain[-1] in mimics and chain[-1] not in chain[:-1]:
+        further, more, offset = mimics[chain[-1]]
+        start, factor = start + factor * offset, factor * more
+        chain.append(further)
+    if chain[-1] in chain[:-1] or moves - {"revolute", "prismatic"}:
         draft.leave("mimicry of", f"{name} (of {other})")
     else:
-        draft.gear(name, name, other, ratio, offset)
+        draft.gear(name, name, other, ratio, start)
 
 
 def _transmission(element: FileElement, name: str, joints: Mapping[str, FileElement], draft: Draft) -> None:

@@ -30,6 +30,7 @@ from ephs.solve.auditing.audit import Bounds
 from ephs.solve.equations.sparse import Index
 from ephs.solve.march.records import Ending
 from ephs.solve.posing.errors import LARGEST
+from ephs.solve.result.ledger import heat_beside
 from ephs.solve.running.control import ATOL, RTOL, Control, first_step
 from ephs.solve.running.stepping import Span
 
@@ -253,6 +254,8 @@ def _reading(equations: ReducedEquations, output: Output) -> Any:
         It needs the whole solution.
     """
     n, ns, reduced = equations.n, equations.ns, equations.reduced
+    if output.name == "heat" and heat_beside(equations.problem):
+        raise Unlike
     if output.name in ("heat", "work"):
         at = n + ns + ("heat", "work").index(output.name)
         return lambda q, y: y[:, at]

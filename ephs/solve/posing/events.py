@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, TypeVar, final
 
 import numpy as np
@@ -13,6 +14,14 @@ from ephs.solve.posing.problem import States
 from ephs.solve.running.snapshot import Snapshot
 
 S = TypeVar("S")
+Point = tuple[float, float]
+"""A time in s, and the value of an event's function there."""
+SPLIT = 0.5 * (3.0 - 5.0**0.5)
+"""Where an interval is divided: by the golden section, so that points do not fall in with periods."""
+MARGIN = 3.0
+"""How many times as far as two points within say a function may bend."""
+MOST_SPLITS, MOST_CALLS = 4, 100
+"""How often a step is divided, and how often a function is called within it, where it does not come to rest."""
 
 
 @final
@@ -125,15 +134,18 @@ class Watch:
     ) -> float | None:
         """Record the events after t0 and up to t1; return the time of a terminal one, if any.
 
-        A function that is zero at t0 has crossed there already; it counts again only after it has left zero.
+        A function that is zero at t0 has crossed there already; it counts again only after it has left zero. Where it
+        bends, it is called at instants within the step, too, so that it cannot cross and come back unseen.
         """
         after = [event.value(t1, end) for event in self.events]
         found: list[tuple[float, int]] = []
         for i, (event, a, b) in enumerate(zip(self.events, self._before, after, strict=True)):
-            rising = (b > a) == (t1 > t0)
-            crossed = a != 0.0 and (b == 0.0 or (a < 0.0) != (b < 0.0))
-            if crossed and (event.direction == 0 or (event.direction > 0) == rising):
-                found.append((t1 if b == 0.0 else _located(event, t0, t1, a, b, inside), i))
+            look = _Look(event, inside)
+            for x, y in pairwise(look.points((t0, a), (t1, b))):
+                rising = (y[1] > x[1]) == (t1 > t0)
+                crossed = x[1] != 0.0 and (y[1] == 0.0 or (x[1] < 0.0) != (y[1] < 0.0))
+                if crossed and (event.direction == 0 or (event.direction > 0) == rising):
+                    found.append((look.zero(x, y), i))
         self._before = after
         found.sort(key=lambda pair: abs(pair[0] - t0))
         for t, i in found:
@@ -163,17 +175,54 @@ class Watch:
         self.crossings = [Crossing.of_record(record) for record in snapshot["crossings"]]
 
 
-def _located(
-    event: Event, t0: float, t1: float, a: float, b: float, inside: Callable[[float], Mapping[Path, Array]]
-) -> float:
-    """The zero of an event's function, whose values at both times are a and b, between them."""
-    from scipy.optimize import brentq
+@final
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """Looks for zeros of an event's function within a step, whose states ``inside`` has."""
 
-    def value(t: float) -> float:
-        if t == t0:
-            return a
-        return b if t == t1 else event.value(t, inside(t))
+    event: Event
+    inside: Callable[[float], Mapping[Path, Array]]
 
-    precision = 4.0 * float(np.spacing(max(abs(t0), abs(t1))))
-    root: Any = brentq(value, t0, t1, xtol=precision, maxiter=200)
-    return float(root)
+    def points(self, first: Point, last: Point) -> list[Point]:
+        """Times and values from the first to the last, between each two of which it crosses zero once at most.
+
+        Two points within say how far the function bends from its chord. Where more than that could lead it to zero and
+        back, or make it turn where it crosses, there are more points.
+        """
+        out, waiting, left = [first], [(first, last, 0)], MOST_CALLS
+        while waiting:
+            begin, end, depth = waiting.pop()
+            (t0, a), (t1, b) = begin, end
+            times = [t0 + share * (t1 - t0) for share in (SPLIT, 1.0 - SPLIT)]
+            if not left or depth > MOST_SPLITS or not min(t0, t1) < min(times) < max(times) < max(t0, t1):
+                out.append(end)
+                continue
+            left -= 2
+            inner = [(t, self.event.value(t, self.inside(t))) for t in times]
+            values = [a, *(value for _, value in inner), b]
+            chord = [a + share * (b - a) for share in (SPLIT, 1.0 - SPLIT)]
+            bend = max(abs(value - line) for value, line in zip(values[1:3], chord, strict=True))
+            crosses = min(values) <= 0.0 <= max(values)
+            if MARGIN * bend > (0.25 * abs(b - a) if crosses else min(map(abs, values))):
+                parts = pairwise([begin, *inner, end])
+                waiting += [(x, y, depth + 1) for x, y in reversed(list(parts))]
+            else:
+                out += [*inner, end]
+        return out
+
+    def zero(self, first: Point, last: Point) -> float:
+        """The zero between two points."""
+        from scipy.optimize import brentq
+
+        (t0, a), (t1, b) = first, last
+        if b == 0.0:
+            return t1
+
+        def value(t: float) -> float:
+            if t == t0:
+                return a
+            return b if t == t1 else self.event.value(t, self.inside(t))
+
+        precision = 4.0 * float(np.spacing(max(abs(t0), abs(t1))))
+        root: Any = brentq(value, t0, t1, xtol=precision, maxiter=200)
+        return float(root)

@@ -107,6 +107,33 @@ def test_a_joint_that_mimics_another_follows_it(write, quiet):
     assert np.abs(shoulder.rate - 0.5).max() > 0.1
 
 
+def test_a_joint_that_mimics_one_that_mimics_starts_where_that_one_does(write, quiet):
+    """Each follows the one before from the start on; a ring of them is named."""
+    mimics = {"j1": ("j0", 2.0, 0.4), "j2": ("j1", -1.5, 0.0), "j3": ("j2", 0.5, -0.2)}
+    names = ["j0", "j2", "j1", "j3"]  # in an order of the file that is not theirs
+
+    def robot(mimics):
+        links = "".join(
+            f'<link name="l{i}"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial></link>'
+            for i in range(5)
+        )
+        joints = "".join(
+            f'<joint name="{name}" type="continuous"><parent link="l{i}"/><child link="l{i + 1}"/><axis xyz="0 0 1"/>'
+            + ('<mimic joint="{}" multiplier="{}" offset="{}"/>'.format(*mimics[name]) if name in mimics else "")
+            + "</joint>"
+            for i, name in enumerate(names)
+        )
+        return write(f'<robot name="r">{links}{joints}</robot>')
+
+    sol = ephs.simulate(quiet(robot(mimics)).with_state(rates={"j0": 1.0, "j1": 2.0, "j2": -3.0, "j3": -1.5}), 0.2)
+    for name, (other, ratio, offset) in mimics.items():
+        one, followed = (sol.joint(each).coordinate for each in (name, other))
+        assert np.allclose(one, ratio * followed + offset, rtol=0.0, atol=1e-9)
+        assert offset or np.abs(one[0]).max() > 0.1  # the control: without an offset of its own it does not start at 0
+    with pytest.warns(ephs.ModelWarning, match=r"mimicry of: j2 \(of j1\), j1 \(of j2\)"):
+        ephs.load(robot({"j1": ("j2", 2.0, 0.0), "j2": ("j1", 0.5, 0.0)}))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
