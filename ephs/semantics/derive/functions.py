@@ -17,6 +17,8 @@ from ephs.semantics.stage.numbers import Real
 
 NEAR: Final = 0.5
 """Up to this size of the argument series serve."""
+STEEP: Final = 1e75
+"""Slope of roots at zero in place of ∞: a finite one times the zero beside it, as in x·√|x|, is zero."""
 Value = Callable[[Evaluator, Real], Real]
 
 
@@ -156,6 +158,60 @@ def _of_absolute(on: Evaluator, a: Real, b: Real) -> Real:
     return on.select(kink, 0.0, (a + b) / on.select(kink, 1.0, below))
 
 
+def _from_zero(on: Evaluator, x: Real, root: Callable[[Real], Real]) -> Real:
+    """A root of x, which is vertical at 0."""
+    zero = on.absolute(x) <= 0.0
+    return on.select(zero, STEEP * x, root(on.select(zero, 1.0, x)))
+
+
+def _fourth(on: Evaluator, x: Real) -> Real:
+    return on.sqrt(on.sqrt(x))
+
+
+def _of_roots(on: Evaluator, below: Real, above: Real = 1.0) -> Real:
+    zero = below <= 0.0
+    return on.select(zero, STEEP, above / on.select(zero, 1.0, below))
+
+
+def _of_three_fourths(on: Evaluator, a: Real, b: Real) -> Real:
+    """(v³ − u³)/(v⁴ − u⁴) of the fourth roots u, v."""
+    u, v = _fourth(on, a), _fourth(on, b)
+    squares = u * u + v * v
+    return _of_roots(on, squares * (u + v), squares + u * v)
+
+
+ROOTS: Final[Mapping[int, SlopeRule]] = MappingProxyType(
+    {
+        1: SlopeRule(
+            lambda on, x: _from_zero(on, x, lambda x: _fourth(on, x)),
+            lambda on, a, b: _of_roots(on, (on.sqrt(a) + on.sqrt(b)) * (_fourth(on, a) + _fourth(on, b))),
+        ),
+        2: SlopeRule(lambda on, x: _from_zero(on, x, on.sqrt), lambda on, a, b: _of_roots(on, on.sqrt(a) + on.sqrt(b))),
+        3: SlopeRule(lambda on, x: _from_zero(on, x, lambda x: on.sqrt(x) * _fourth(on, x)), _of_three_fourths),
+    }
+)
+"""Powers of 1/4, 1/2 and 3/4, by quarters."""
+
+
+def real_power(p: Real) -> SlopeRule:
+    """xᵖ, of which 0 is 0 for p > 0."""
+
+    def value(on: Evaluator, x: Real) -> Real:
+        zero = on.both(on.absolute(x) <= 0.0, p > 0.0)
+        return on.select(zero, on.select(p > 1.0, 0.0, STEEP) * x, on.exp(p * on.log(on.select(zero, 1.0, x))))
+
+    def slope(on: Evaluator, a: Real, b: Real) -> Real:
+        """√(aᵖ bᵖ) 2 sinh(p l/2)/(b − a) with l = ln b − ln a, where a and b are of one size."""
+        zero, near = on.absolute(a + b) <= 0.0, on.absolute(b - a) < NEAR * (a + b)
+        one, two = on.select(near, a, 1.0), on.select(near, b, 1.0)
+        log = _of_logarithm(on, one, two)
+        close = p * log * on.exp(0.5 * p * (on.log(one) + on.log(two))) * sinhc(on, 0.5 * p * log * (two - one))
+        far = (value(on, b) - value(on, a)) / on.select(zero, 1.0, on.select(near, 1.0, b - a))
+        return on.select(zero, on.select(p > 1.0, 0.0, STEEP), on.select(near, close, far))
+
+    return SlopeRule(value, slope)
+
+
 def _half_turn_series() -> tuple[float, ...]:
     """Coefficients z₁, z₂, … of 1 − φ cot φ = Σ z_k φ²ᵏ, by its differential equation φ w′ = w² − w + φ²."""
     found = [1.0 / 3.0]
@@ -188,7 +244,7 @@ def series(coefficients: Sequence[float]) -> SlopeRule:
 
 FUNCTIONS: Final[Mapping[str, SlopeRule]] = MappingProxyType(
     {
-        "sqrt": SlopeRule(lambda on, x: on.sqrt(x), lambda on, a, b: 1.0 / (on.sqrt(a) + on.sqrt(b))),
+        "sqrt": ROOTS[2],
         "absolute": SlopeRule(lambda on, x: on.absolute(x), _of_absolute),
         "sin": SlopeRule(lambda on, x: on.sin(x), lambda on, a, b: on.cos(0.5 * (a + b)) * sinc(on, 0.5 * (b - a))),
         "cos": SlopeRule(lambda on, x: on.cos(x), lambda on, a, b: -(on.sin(0.5 * (a + b)) * sinc(on, 0.5 * (b - a)))),
