@@ -190,14 +190,15 @@ ROOTS: Final[Mapping[int, SlopeRule]] = MappingProxyType(
         3: SlopeRule(lambda on, x: _from_zero(on, x, lambda x: on.sqrt(x) * _fourth(on, x)), _of_three_fourths),
     }
 )
-"""Powers of 1/4, 1/2 and 3/4, by quarters."""
+"""Powers of 1/4, 1/2 and 3/4, by quarters: factors of powers above 1/2. The others have no derivative at 0, where the
+root of a square, a length, has no direction."""
 
 
 def real_power(p: Real) -> SlopeRule:
-    """xᵖ, of which 0 is 0 for p > 0."""
+    """xᵖ; at 0 as `ROOTS` for p > 1/2."""
 
     def value(on: Evaluator, x: Real) -> Real:
-        zero = on.both(on.absolute(x) <= 0.0, p > 0.0)
+        zero = on.both(on.absolute(x) <= 0.0, p > 0.5)
         return on.select(zero, on.select(p > 1.0, 0.0, STEEP) * x, on.exp(p * on.log(on.select(zero, 1.0, x))))
 
     def slope(on: Evaluator, a: Real, b: Real) -> Real:
@@ -207,7 +208,8 @@ def real_power(p: Real) -> SlopeRule:
         log = _of_logarithm(on, one, two)
         close = p * log * on.exp(0.5 * p * (on.log(one) + on.log(two))) * sinhc(on, 0.5 * p * log * (two - one))
         far = (value(on, b) - value(on, a)) / on.select(zero, 1.0, on.select(near, 1.0, b - a))
-        return on.select(zero, on.select(p > 1.0, 0.0, STEEP), on.select(near, close, far))
+        steep = on.select(p > 0.5, STEEP, math.inf)
+        return on.select(zero, on.select(p > 1.0, 0.0, steep), on.select(near, close, far))
 
     return SlopeRule(value, slope)
 
@@ -244,7 +246,7 @@ def series(coefficients: Sequence[float]) -> SlopeRule:
 
 FUNCTIONS: Final[Mapping[str, SlopeRule]] = MappingProxyType(
     {
-        "sqrt": ROOTS[2],
+        "sqrt": SlopeRule(lambda on, x: on.sqrt(x), lambda on, a, b: 1.0 / (on.sqrt(a) + on.sqrt(b))),
         "absolute": SlopeRule(lambda on, x: on.absolute(x), _of_absolute),
         "sin": SlopeRule(lambda on, x: on.sin(x), lambda on, a, b: on.cos(0.5 * (a + b)) * sinc(on, 0.5 * (b - a))),
         "cos": SlopeRule(lambda on, x: on.cos(x), lambda on, a, b: -(on.sin(0.5 * (a + b)) * sinc(on, 0.5 * (b - a)))),

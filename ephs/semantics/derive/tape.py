@@ -160,7 +160,9 @@ def _power(on: Evaluator, x: Real, exponent: float) -> Real:
     quarters = round(4.0 * abs(exponent))
     whole, rest = divmod(quarters, 4)
     out: Real | None = _whole(x, whole) if whole else None
-    if rest:
+    if quarters <= 2:
+        out = on.sqrt(x) if rest == 2 else on.sqrt(on.sqrt(x))
+    elif rest:
         part = _ruled(on, x, ROOTS[rest])
         out = part if out is None else out * part
     assert out is not None
