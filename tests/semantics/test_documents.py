@@ -341,6 +341,20 @@ def test_a_document_by_hand():
     assert read.fillings["a"].energy({Path.of("q"): np.array([3.0])}) == 3.5
 
 
+@pytest.mark.parametrize("edge", [-3.25, 77.25])
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_what_holds_beside_the_zero_of_a_sign_only_is_not_proved(edge, everywhere):
+    """sign² is 1 but where the sign is 0; it is sign · sign there, too."""
+    sign = ["sign", ["-", "x", edge]]
+    nothing = ["-", ["*", sign, sign] if everywhere else 1.0, ["^", sign, 2.0]]
+    ports = {"q": {"quantity": "momentum"}, "x": {"quantity": "displacement"}}
+    pattern = {"format": 1, "junctions": ports, "boxes": {"a": {"q": "q", "x": "~x"}}}
+    read = [["q", ports["q"]], ["x", {**ports["x"], "exposed": "state"}]]
+    parts = [{"reversible": "g", "ports": read, "L": [[nothing]]}, {"pattern": pattern, "fillings": {"a": 0}}]
+    made = System.from_dict({"format": 1, "parts": parts}).fillings["a"]
+    assert made.verdict == ("proved" if everywhere else "searched")
+
+
 @pytest.mark.parametrize(
     "broken, words",
     [

@@ -4,12 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import ephs
 from ephs import Pattern, junction, library
 from ephs import quantity as Q
 from ephs.mechanics.methods.registry import METHODS
 from ephs.mechanics.runs.system_problem import problem_of_system
+from ephs.operad import Path
 from ephs.solve.auditing.production import Production
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.running.stepping import Row
@@ -108,3 +110,36 @@ def test_domains_are_bounds_of_ports():
         domain={"p": (-9.0, 9.0)},
     )
     assert slow.verdict == "proved"
+
+
+def heated(conduction):
+    """A body with a resistor on it, and one with which it exchanges heat."""
+    pattern = Pattern(
+        {"b": junction(Q.flux_linkage, exposed=True), "a": junction(Q.entropy), "s": junction(Q.entropy)},
+        {"coil": {"b": "b", "s": "s"}, "other": {"s": "a"}, "body": {"s": "s"}, "wall": {"a": "a", "b": "s"}},
+    )
+    bodies = {name: library.thermal_capacity(c1=300.0 * c, c2=c) for name, c in (("other", 60.0), ("body", 20.0))}
+    return pattern(coil=library.resistor(r=100.0), wall=conduction, **bodies)
+
+
+CONDUCTANCES = {"linear": lambda a, b: 1.5 + 0.0 * a, "radiation": lambda a, b: 4e-8 * (a * a + b * b) * (a + b)}
+
+
+@pytest.mark.parametrize("law", CONDUCTANCES)
+@pytest.mark.parametrize("steps", [{"step": 4.0}, {"rtol": 1e-4}, {"rtol": 1e-8}], ids=str)
+@pytest.mark.parametrize("ahead", [3.0, 12.0, 40.0])
+def test_heat_that_turns_around_within_a_step_makes_the_entropy_of_its_component(law, steps, ahead):
+    """The other body begins hotter by some K, and is overtaken: no component loses entropy, and each makes its own."""
+    k, current, until = CONDUCTANCES[law], 0.8, 60.0
+    wall = conduction(lambda a, b: k(a, b) * conduction_matrix(a, b))
+    start, inputs = {"other.s": 60.0 * np.log1p(ahead / 300.0)}, {"b": {"effort": current}}
+    sol = ephs.simulate(heated(wall), until, initial=start, inputs=inputs, method="radau", **steps)
+
+    def rates(_, y):
+        a, b = y[:2]
+        passed, heat = k(a, b) * (a - b), 100.0 * current**2
+        return [-passed / 60.0, (passed + heat) / 20.0, passed * (1.0 / b - 1.0 / a), heat / b]
+
+    exact = solve_ivp(rates, (0.0, until), [300.0 + ahead, 300.0, 0.0, 0.0], rtol=1e-11, atol=1e-12).y[2:, -1]
+    found = np.array([sol.ledgers.makers[Path.of(path)][-1] for path in ("wall", "coil")])
+    assert np.all(np.abs(found - exact) <= 10.0 * steps.get("rtol", 1e-4) * exact.sum())

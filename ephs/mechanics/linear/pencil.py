@@ -6,6 +6,7 @@ from the last two leaves conditions on x alone, whose kernel is what the states 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.descriptor.descriptor import StateSlot
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, REGULAR, TINY, rank_of
 from ephs.semantics.systems.system import System
@@ -33,6 +35,10 @@ SETTLED, LEAST = 1e-12, 1e-6
 """Relative step at which Newton's method ends, with this least scale of unknowns."""
 ROUNDING = 1e-13
 """The same in implicit steps, whose matrices are better conditioned."""
+BESIDE, BESIDE_ZERO = (1e-9, 1e-12), (1e-24, 1e-30)
+"""Distances at which derivatives are compared with difference quotients: parts of a number, and from 0."""
+NOISE = 64.0 * float(np.finfo(float).eps)
+"""Rounding of an equation, relative to its terms."""
 NOTHING = 1e-12
 """Conditions below this part of the largest stiffness are rounding."""
 
@@ -183,6 +189,35 @@ class Pencil:
             z[:n_w], unknowns[w, b], -states[w], unknowns[b, w], unknowns[b, b], states[b], unknowns[b, c],
             unknowns[c, b], states[c], force, given,
         )  # fmt: skip
+
+    def require_derivatives(self, x: Array, z: Array) -> None:
+        """Refuse a state at which the equations have none: their difference quotients do not tend to the matrix.
+
+        Raises
+        ------
+        OptionError
+            A state is at a kink or a jump of an energy or a flow.
+        """
+        matrices, here = self.equations.matrices(x, z, self._given), self.equations.residual(x, z, self._given)
+        states, terms = matrices.states.toarray()[:, : self.n_w], np.abs(matrices.unknowns) @ np.abs(z)
+        d = self.problem.descriptor
+
+        def off(slot: StateSlot, w: Array, step: float, size: float) -> Array:
+            """Error of each equation's difference quotient, 0 where it is rounding."""
+            noise = NOISE * (terms + (size + step) * np.abs(states[:, slot.rates]).sum(axis=1))
+            moved = self.equations.residual(d.advance(x, step * w), z, self._given) - here
+            error = np.abs(moved - step * (states @ w))
+            return np.where(error > noise, error / step, 0.0)
+
+        for slot in d.states:
+            size = float(np.abs(x[slot.point]).max(initial=0.0))
+            steps = [size * share for share in BESIDE] if size else BESIDE_ZERO
+            for place, side in product(range(slot.rates.start, slot.rates.stop), (1.0, -1.0)):
+                w = np.where(np.arange(self.n_w) == place, side, 0.0)
+                far, near = (off(slot, w, step, size) for step in steps)
+                if np.any((near > 0.9 * far) & (near > 0.0)):
+                    expected = "one at which energies and flows have derivatives"
+                    raise OptionError("state", f"{slot.path} at a kink", expected)
 
     def algebraic(self, parts: DescriptorParts) -> tuple[Array, Array, Array]:
         """The equations without rates: (rows on efforts, multipliers and outer flows; their right-hand sides by the

@@ -54,7 +54,9 @@ def linear_system(
     if problem.descriptor.strikes is not None and (model := mechanism_of(problem)) is not None:
         model.loading.hard.check_open(model.state0.q, model.state0.r)
     with failing_at(0.0):
-        return LinearSystem(problem, problem.point).whole(outputs)
+        found = LinearSystem(problem, problem.point)
+        found.pencil.require_derivatives(found.x, found.z)
+        return found.whole(outputs)
 
 
 @final

@@ -17,6 +17,8 @@ from ephs.semantics.stage.numbers import Real
 
 NEAR: Final = 0.5
 """Up to this size of the argument series serve."""
+STEEP: Final = 1e75
+"""Slope of roots at zero in place of ∞: a finite one times the zero beside it, as in x·√|x|, is zero."""
 Value = Callable[[Evaluator, Real], Real]
 
 
@@ -154,6 +156,62 @@ def _of_absolute(on: Evaluator, a: Real, b: Real) -> Real:
     below = on.absolute(a) + on.absolute(b)
     kink = below <= 0.0
     return on.select(kink, 0.0, (a + b) / on.select(kink, 1.0, below))
+
+
+def _from_zero(on: Evaluator, x: Real, root: Callable[[Real], Real]) -> Real:
+    """A root of x, which is vertical at 0."""
+    zero = on.absolute(x) <= 0.0
+    return on.select(zero, STEEP * x, root(on.select(zero, 1.0, x)))
+
+
+def _fourth(on: Evaluator, x: Real) -> Real:
+    return on.sqrt(on.sqrt(x))
+
+
+def _of_roots(on: Evaluator, below: Real, above: Real = 1.0) -> Real:
+    zero = below <= 0.0
+    return on.select(zero, STEEP, above / on.select(zero, 1.0, below))
+
+
+def _of_three_fourths(on: Evaluator, a: Real, b: Real) -> Real:
+    """(v³ − u³)/(v⁴ − u⁴) of the fourth roots u, v."""
+    u, v = _fourth(on, a), _fourth(on, b)
+    squares = u * u + v * v
+    return _of_roots(on, squares * (u + v), squares + u * v)
+
+
+ROOTS: Final[Mapping[int, SlopeRule]] = MappingProxyType(
+    {
+        1: SlopeRule(
+            lambda on, x: _from_zero(on, x, lambda x: _fourth(on, x)),
+            lambda on, a, b: _of_roots(on, (on.sqrt(a) + on.sqrt(b)) * (_fourth(on, a) + _fourth(on, b))),
+        ),
+        2: SlopeRule(lambda on, x: _from_zero(on, x, on.sqrt), lambda on, a, b: _of_roots(on, on.sqrt(a) + on.sqrt(b))),
+        3: SlopeRule(lambda on, x: _from_zero(on, x, lambda x: on.sqrt(x) * _fourth(on, x)), _of_three_fourths),
+    }
+)
+"""Powers of 1/4, 1/2 and 3/4, by quarters: factors of powers above 1/2. The others have no derivative at 0, where the
+root of a square, a length, has no direction."""
+
+
+def real_power(p: Real) -> SlopeRule:
+    """xᵖ; at 0 as `ROOTS` for p > 1/2."""
+
+    def value(on: Evaluator, x: Real) -> Real:
+        zero = on.both(on.absolute(x) <= 0.0, p > 0.5)
+        return on.select(zero, on.select(p > 1.0, 0.0, STEEP) * x, on.exp(p * on.log(on.select(zero, 1.0, x))))
+
+    def slope(on: Evaluator, a: Real, b: Real) -> Real:
+        """√(aᵖ bᵖ) 2 sinh(p l/2)/(b − a) with l = ln b − ln a, where a and b are of one size."""
+        zero, near = on.absolute(a + b) <= 0.0, on.absolute(b - a) < NEAR * (a + b)
+        one, two = on.select(near, a, 1.0), on.select(near, b, 1.0)
+        log = _of_logarithm(on, one, two)
+        close = p * log * on.exp(0.5 * p * (on.log(one) + on.log(two))) * sinhc(on, 0.5 * p * log * (two - one))
+        far = (value(on, b) - value(on, a)) / on.select(zero, 1.0, on.select(near, 1.0, b - a))
+        steep = on.select(p > 0.5, STEEP, math.inf)
+        return on.select(zero, on.select(p > 1.0, 0.0, steep), on.select(near, close, far))
+
+    return SlopeRule(value, slope)
 
 
 def _half_turn_series() -> tuple[float, ...]:

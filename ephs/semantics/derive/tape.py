@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar, final
 
 import numpy as np
 
-from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS, turn
+from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS, ROOTS, SlopeRule, real_power, turn
 from ephs.semantics.derive.roots import root
 from ephs.semantics.derive.slopes import Entries, Slope, Slopes, combined, lifted
 from ephs.semantics.stage.duals import Duals
@@ -127,11 +127,19 @@ def over_step(on: Slopes, tape: Tape, inputs: Sequence[Real], parameters: Sequen
 
 def _function(name: str) -> Callable[[Evaluator, Real], Real]:
     rule = FUNCTIONS[name]
+    return lambda on, x: _ruled(on, x, rule)
 
-    def function(on: Evaluator, x: Real) -> Real:
-        return on.along(x, rule) if isinstance(on, Slopes) and isinstance(x, Slope) else rule.value(on, x)
 
-    return function
+def _ruled(on: Evaluator, x: Real, rule: SlopeRule) -> Real:
+    return on.along(x, rule) if isinstance(on, Slopes) and isinstance(x, Slope) else rule.value(on, x)
+
+
+def _exponential(on: Evaluator, a: Real, b: Real) -> Real:
+    if isinstance(b, Slope):
+        if b.slopes:
+            return on.exp(b * on.log(a))
+        b = b.start
+    return _ruled(on, a, real_power(b))
 
 
 def _whole(x: Real, n: int) -> Real:
@@ -152,9 +160,10 @@ def _power(on: Evaluator, x: Real, exponent: float) -> Real:
     quarters = round(4.0 * abs(exponent))
     whole, rest = divmod(quarters, 4)
     out: Real | None = _whole(x, whole) if whole else None
-    if rest:
-        root = on.sqrt(x)
-        part = {1: lambda: on.sqrt(root), 2: lambda: root, 3: lambda: root * on.sqrt(root)}[rest]()
+    if quarters <= 2:
+        out = on.sqrt(x) if rest == 2 else on.sqrt(on.sqrt(x))
+    elif rest:
+        part = _ruled(on, x, ROOTS[rest])
         out = part if out is None else out * part
     assert out is not None
     return out if exponent > 0.0 else 1.0 / out
@@ -221,7 +230,7 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
         "-": lambda _, a, b: a - b,
         "*": lambda _, a, b: a * b,
         "/": lambda _, a, b: a / b,
-        "exponential": lambda on, a, b: on.exp(b * on.log(a)),
+        "exponential": _exponential,
         "atan2": lambda on, a, b: on.atan2(a, b),
     }
     power: dict[str, Callable[[Evaluator, Real, float], Real]] = {"power": _power}

@@ -1,6 +1,7 @@
 """Bounds and signs of a term from those of its symbols: interval arithmetic, rounded outwards; rules of signs."""
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from itertools import product
@@ -88,7 +89,10 @@ def _bounds(term: Term, box: Bounds) -> Interval:
     if isinstance(term, str) or (isinstance(term, tuple) and term[0] == "entry"):
         return box[term]
     if not isinstance(term, tuple):
-        value = float(term)
+        try:
+            value = float(term)
+        except OverflowError:  # a whole number beyond all floats
+            return (sys.float_info.max, math.inf) if term > 0 else (-math.inf, -sys.float_info.max)
         return (value, value) if value == term else _out(value, value)
     word, *arguments = term
     parts = [_bounds(part, box) for part in arguments]

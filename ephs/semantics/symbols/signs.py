@@ -4,10 +4,11 @@ What is found is evidence for `verdicts.replay`, which decides: here nothing nee
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 
 from ephs.semantics.symbols.algebra import Expr, sp
 from ephs.semantics.symbols.bounds import Bounds, signs
-from ephs.semantics.symbols.terms import OPERATIONS, Term
+from ephs.semantics.symbols.terms import OPERATIONS, Term, rational_term
 
 LARGE = 300
 """Largest number of operations in an expression to rewrite; beyond it rewriting may take minutes."""
@@ -51,9 +52,7 @@ class Signs:
         if expression in self._terms:
             return self._terms[expression]
         if expression.is_Rational:
-            number = float(expression)
-            p, q = int(expression.p), int(expression.q)
-            return number if sp.Rational(number) == expression else p if q == 1 else ("/", p, q)
+            return rational_term(Fraction(int(expression.p), int(expression.q)))
         if expression.is_Number or expression.is_NumberSymbol:
             return float(expression)
         word = _WORDS[expression.func]

@@ -6,7 +6,9 @@ A term is a number, the name of a scalar port, or a tuple of an operation's name
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import reduce
 from operator import add, mul
 from types import MappingProxyType
@@ -20,6 +22,15 @@ from ephs.semantics.derive.recording import Recorded, Recording, Untraceable
 Term: TypeAlias = "float | str | tuple[Any, ...]"
 DEPTH, NODES = 50, 10_000
 """Limits on the depth of a term and on its numbers, names and operations."""
+
+
+def rational_term(number: Fraction) -> Term:
+    """The term of a rational number: a float, where one has its value, else a whole number or a quotient."""
+    with suppress(OverflowError):
+        if (found := float(number)) == number:
+            return found
+    p, q = number.numerator, number.denominator
+    return p if q == 1 else ("/", p, q)
 
 
 def _sum(*terms: Any) -> Any:

@@ -235,33 +235,36 @@ def _check_irreversible(irreversible: "Irreversible", trial: Trial) -> None:
     _require_finite(irreversible, trial, "the matrix M", matrix)
     weight = _scaled(matrix)
     even = weight[:, None] * matrix * weight
-    scale = float(np.abs(even).max(initial=0.0))
+    allowed = TOLERANCE * float(np.abs(even).max(initial=0.0)) + float(
+        (weight[:, None] * TINY * weight).max(initial=0.0)
+    )
     defect = even - even.T
-    if not np.abs(defect).max(initial=0.0) <= TOLERANCE * scale:
+    if not np.abs(defect).max(initial=0.0) <= allowed:
         entry = _worst(defect)
         raise _fail("symmetry", irreversible, trial, float(matrix[entry] - matrix[entry[::-1]]), entry=entry)
     energy_effort = e + bundle.intensive(reference)
     least = float(symmetric_eigenvalues(even).min(initial=0.0))
-    if not least >= -TOLERANCE * scale:
+    if not least >= -allowed:
         raise _fail("definite", irreversible, trial, float(symmetric_eigenvalues(matrix).min(initial=0.0)))
     terms = np.abs(matrix) @ np.abs(energy_effort)
     defect = matrix @ energy_effort
-    if not np.all(np.abs(defect) <= TOLERANCE * terms):
+    if not np.all(np.abs(defect) <= np.maximum(TOLERANCE * terms, TINY)):
         entry = _worst(defect / np.maximum(terms, TINY))
         raise _fail("energy", irreversible, trial, float(defect[entry]), entry=entry)
     for kind in bundle.charges:
         one = bundle.indicator(kind)
         defect = matrix @ one
-        if kind != "entropy" and not np.all(np.abs(defect) <= TOLERANCE * (np.abs(matrix) @ np.abs(one))):
+        terms = np.abs(matrix) @ np.abs(one)
+        if kind != "entropy" and not np.all(np.abs(defect) <= np.maximum(TOLERANCE * terms, TINY)):
             entry = _worst(defect)
             raise _fail("conservation", irreversible, trial, float(defect[entry]), quantity=kind, entry=entry)
     mirrored = irreversible.matrix(_reversed(bundle, x), parity * e, reference)
     there = weight[:, None] * (parity[:, None] * mirrored * parity) * weight
     found = float(np.abs(there - even).max(initial=0.0)) if _finite(mirrored) else 0.0
-    if not irreversible.one_sided and not found <= TOLERANCE * scale:
+    if not irreversible.one_sided and not found <= allowed:
         raise _fail("parity", irreversible, trial, found, flag=FLAGS["irreversible"])
     for port, opposite in _opposite(bundle, x):
         other = weight[:, None] * irreversible.matrix({**x, port: opposite}, e, reference) * weight
         found = float(np.abs(other - even).max(initial=0.0))
-        if not found <= TOLERANCE * scale:
+        if not found <= allowed:
             raise _fail("rotation-sign", irreversible, trial, found, what="the matrix M tells", port=port)

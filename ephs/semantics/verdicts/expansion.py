@@ -11,7 +11,7 @@ from functools import reduce
 from math import floor
 from typing import Any, TypeAlias, final
 
-from ephs.semantics.symbols.terms import OPERATIONS, Term
+from ephs.semantics.symbols.terms import OPERATIONS, Term, rational_term
 from ephs.semantics.verdicts.sums import (
     Expanded,
     Number,
@@ -222,8 +222,7 @@ class Expander:
         return products[0] if len(products) == 1 else ("+", *products) if products else 0.0
 
     def _product_term(self, number: Fraction, factors: list[Term]) -> Term:
-        plain = float(number) if Fraction(float(number)) == number else ("/", number.numerator, number.denominator)
-        factors = factors if number == 1 and factors else [plain, *factors]
+        factors = factors if number == 1 and factors else [rational_term(number), *factors]
         return factors[0] if len(factors) == 1 else ("*", *factors)
 
     def _factor_term(self, atom: int, power: Number) -> Term:

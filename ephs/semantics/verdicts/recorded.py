@@ -17,6 +17,7 @@ from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.recording import Recording, Untraceable, record
 from ephs.semantics.primitives.forms import own_tape, run_tape, stacked
 from ephs.semantics.spaces import manifold
+from ephs.semantics.stage.elementary import WHOLE_TURNS
 from ephs.semantics.verdicts.rounding import ROUNDED, Factor, exactly, rounding, steps_of
 from ephs.semantics.verdicts.trials import (
     NEAR,
@@ -67,7 +68,7 @@ def require_recorded(primitive: "Primitive") -> tuple[Condition, ...]:
         recording = record(function, _arguments(primitive))
     except Untraceable:
         return ()
-    gap, offset = "", None
+    gap, offset, beside = "", None, 0.0
     for number, (numbers, reference) in enumerate(_points(primitive, recording)):
         trial = trial_of(primitive, numbers, reference)
         given = _given(primitive, trial)
@@ -85,7 +86,8 @@ def require_recorded(primitive: "Primitive") -> tuple[Condition, ...]:
         if own is not None and np.all(np.isfinite(own)):
             if offset is None:  # an energy is known up to a constant
                 offset = own - expected if primitive.kind == "storage" else np.zeros(1)
-            _require_alike(primitive, recording, trial, own - offset, expected)
+                beside = ROUNDED * float(np.abs([own, expected]).max()) if primitive.kind == "storage" else 0.0
+            _require_alike(primitive, recording, trial, own - offset, expected, beside)
     return (Condition(DEFINED, False, ("off", f"it has none at {gap}")),) if gap else ()
 
 
@@ -248,12 +250,14 @@ def _own(primitive: "Primitive", trial: Trial) -> Array | None:
         return None
 
 
-def _require_alike(primitive: "Primitive", recording: Recording, trial: Trial, found: Array, expected: Array) -> None:
-    """Refuse a number that is not the record's, by more than both may be rounded."""
+def _require_alike(
+    primitive: "Primitive", recording: Recording, trial: Trial, found: Array, expected: Array, beside: float = 0.0
+) -> None:
+    """Refuse a number that is not the record's, by more than both may be rounded, and by more than ``beside``."""
     if found.shape != expected.shape:
         raise _unlike("unlike", primitive, trial, 0, found.shape, expected.shape)
     with np.errstate(all="ignore"):
-        apart = np.abs(found - expected) > ROUNDED * np.maximum(np.abs(found), np.abs(expected))
+        apart = np.abs(found - expected) > beside + ROUNDED * np.maximum(np.abs(found), np.abs(expected))
         apart |= np.isnan(found) != np.isnan(expected)
     if not apart.any():
         return
@@ -261,10 +265,17 @@ def _require_alike(primitive: "Primitive", recording: Recording, trial: Trial, f
     outputs = list(recording.tape.outputs)
     allowed = rounding(lambda factor: steps_of(recording, numbers, factor)[outputs], expected)
     with np.errstate(all="ignore"):
-        apart &= ~(np.abs(found - expected) <= allowed)
-    if apart.any() and not np.any(np.isinf(steps_of(recording, numbers))):  # what overflows may do so elsewhere
+        apart &= ~(np.abs(found - expected) <= beside + allowed)
+    if apart.any() and not _overflows(recording, numbers):  # what overflows may do so elsewhere
         i = int(np.argmax(apart))
         raise _unlike("unlike", primitive, trial, i, found[i], expected[i])
+
+
+def _overflows(recording: Recording, numbers: list[float]) -> bool:
+    """Whether an operation's result is infinite, or an angle too large for a sine."""
+    found = steps_of(recording, numbers)
+    turned = [i for name, places, _ in recording.tape.operations if name in ("sin", "cos", "tan") for i in places]
+    return bool(np.any(np.isinf(found)) or np.any(np.abs(found[turned]) > WHOLE_TURNS))
 
 
 def _gap(primitive: "Primitive", recording: Recording, numbers: list[float], reference: Reference) -> str:
@@ -282,7 +293,7 @@ def _gap(primitive: "Primitive", recording: Recording, numbers: list[float], ref
         moved = [x * (1.0 + shift) if x else shift for x, shift in zip(numbers, shifts, strict=True)]
         if np.all(np.isfinite(_of_record(recording, _given(primitive, trial_of(primitive, moved, reference))))):
             return str(trial.witness(primitive))
-    if np.any(np.isinf(steps_of(recording, _flat(_given(primitive, trial))))):
+    if _overflows(recording, _flat(_given(primitive, trial))):
         return ""
     what = {"storage": "the energy", "reversible": "the structure"}.get(primitive.kind, "the matrix M")
     raise StructureError("no-value", primitive.name, what=what, witness=trial.witness(primitive))

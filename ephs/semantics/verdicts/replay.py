@@ -5,6 +5,7 @@ its parts and expands to the same; or that of a matrix, a sum of squares with fa
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 from typing import Any, final
@@ -24,6 +25,10 @@ READINGS: Mapping[str, Callable[[float], Fraction]] = {"as given": Fraction, "as
 """Rational number of a float, by the name of the reading; the first one is exact."""
 EXPANSION: Evidence = ("expansion", "as given")
 JUMPS = ("sign", "choose")
+LEAPS = ("sign", "atan2")
+"""Those of which an energy with them has no derivative somewhere."""
+SIGNS = 3
+"""Signs in a claim, at most."""
 KINKS = (*JUMPS, "abs", "sqrt", "root")
 """Operations that are not analytic, or do not even have to be continuous."""
 
@@ -53,9 +58,18 @@ class Replay:
         self._n = len(claim.parity) or 1  # there are no rows where there are no ports
         self._given = {symbol: self._symbol(symbol, *ends) for symbol, ends in claim.bounds.items()}
         self.rows = self._formulas({})
+        signs = dict.fromkeys(_terms_of(claim.outputs, ("sign",)))
+        if len(signs) > SIGNS:
+            raise Unexpandable
+        # sign x is |x|/x beside x = 0, and there it is 0
+        zero = [replace(claim, outputs=tuple(_without(term, each) for term in claim.outputs)) for each in signs]
+        self._there = [Replay(each, read) for each in zero]
 
     def proves(self, statement: str, form: str, data: Sequence[Any]) -> bool:
-        """Whether evidence of a form proves a statement."""
+        """Whether evidence of a form proves a statement, beside the zeros of signs and at them."""
+        return self._proves(statement, form, data) and all(on.proves(statement, form, data) for on in self._there)
+
+    def _proves(self, statement: str, form: str, data: Sequence[Any]) -> bool:
         place = STATEMENTS[self.claim.kind].index(statement)
         if form == "rounding":
             return not data and self.claim.kind == "reversible" and place < 2 and self._rounded(place)
@@ -159,6 +173,8 @@ class Replay:
 
     def _derived(self) -> bool:
         given = self.claim.gradient
+        if _terms_of(self.claim.outputs, LEAPS):
+            return False
         return given is None or self._same([self.value(term) for term in given], self.derivative())
 
     def sign_shown(self, of: Expanded, term: Term, *, strict: bool) -> bool:
@@ -232,9 +248,25 @@ class Replay:
             return True
         word, *arguments = term
         below = arguments[1] if word == "/" else arguments[0] if word == "^" else 1.0
-        smooth = not _has(below, KINKS) and not any(_has(each, JUMPS) for each in self.claim.outputs)
+        smooth = not _terms_of([below], KINKS) and not _terms_of(self.claim.outputs, JUMPS)
         return (smooth or 0 not in signs(below, self.claim.bounds)) and all(map(self._thin, arguments))
 
 
-def _has(term: Term, words: Sequence[str]) -> bool:
-    return isinstance(term, tuple) and (term[0] in words or any(_has(each, words) for each in term[1:]))
+def _terms_of(terms: Sequence[Term], words: Sequence[str]) -> list[Term]:
+    """Terms of some operations within others; terms share parts, each of which is looked at once."""
+    left, seen, found = list(terms), set[int](), list[Term]()
+    while left:
+        term = left.pop()
+        if not isinstance(term, tuple) or id(term) in seen:
+            continue
+        seen.add(id(term))
+        found += [term] * (term[0] in words)
+        left += term[1:]
+    return found
+
+
+def _without(term: Term, zero: Term) -> Term:
+    """A term with another one's value 0."""
+    if term == zero:
+        return 0.0
+    return (term[0], *(_without(each, zero) for each in term[1:])) if isinstance(term, tuple) else term

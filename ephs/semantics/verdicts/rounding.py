@@ -22,6 +22,8 @@ from ephs.semantics.stage.plain import PLAIN
 
 ROUNDED = 64.0 * float(np.finfo(float).eps)
 """Relative error of an operation: functions are good to a few roundings, and sums may be taken in another order."""
+NORMAL = float(np.finfo(float).tiny)
+"""Below it numbers are rounded by as much as there."""
 SPREAD = 8.0
 """Largest error that roundings add up to, relative to what random ones do in `RUNS` runs."""
 RUNS = 4
@@ -67,7 +69,11 @@ def slopes_of(
 
 def _run(on: Evaluator, tape: Tape, inputs: Sequence[Real], parameters: Sequence[float], factor: Factor) -> list[Real]:
     def scaled(operation: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda *arguments: operation(on, *arguments) * factor()
+        def rounded(*arguments: Any) -> Any:
+            share, found = factor(), operation(on, *arguments)
+            return found * share + (share - 1.0) * NORMAL
+
+        return rounded
 
     names = {name for name, _, _ in tape.operations if name in OPERATIONS}
     table: Mapping[str, Callable[..., Any]] = {name: scaled(OPERATIONS[name]) for name in names}

@@ -7,6 +7,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import spans
 from ephs.semantics.primitives.primitives import Storage
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.equations.heats import Heats
 from ephs.solve.equations.model import Model
 from ephs.solve.methods.conduction import ConductionMatrix
@@ -39,7 +40,7 @@ class Passages:
         self._effort, self._intensive = int(t.counts[0]) + effort, t.intensive[effort]
         self._conducting = np.searchsorted(self._flows, conduction.ports) if conduction is not None else None
         self.called = chosen.size > (0 if conduction is None else conduction.ports.size)
-        at = stores.at[effort]
+        self._at = at = stores.at[effort]
         self._heats = Heats(
             tuple(d.components[number].path for number in stores.components.tolist()),
             np.where(stores.hot, stores.components, -1), lambda: (stores.c1, stores.c2),
@@ -66,7 +67,7 @@ class Passages:
         return np.array([entropies * (found.unknowns[self._effort] + self._intensive), entropies])
 
     def booked(
-        self, y: Array, passed: Array | None, conducted: tuple[Array, float], missed: Array | None,
+        self, y: Array, passed: Array | None, stages: tuple[Array, Array], missed: Array | None,
         energies: Array | None, work: float,
     ) -> tuple[Array, Array, float, float]:  # fmt: skip
         """The heat of a step from the numbers y.
@@ -76,8 +77,8 @@ class Passages:
         passed, missed
             (2, passages) heat in J and entropy in J/K by a quadrature, conduction aside, (passages,) differences of
             heat to an embedded one; None: nothing, and where there is no friction.
-        conducted
-            (states,) integral of the numbers over the step, and its length in s.
+        stages
+            (stages,) weights in s, and (stages, states) numbers there.
         energies
             (2, components) stored before and after, in J, where there is friction.
         work
@@ -96,16 +97,28 @@ class Passages:
             More heat was carried away than there is.
         """
         heat, entropy = np.zeros((2, self._makers.size)) if passed is None else passed
+        stores, frictions, lost, counted = self._stores, self._heats.frictions, None, entropy.copy()
         if self._conduction is not None:
-            conduction, (integral, h) = self._conduction, conducted
-            heat[self._conducting] = conduction.powers @ integral + h * conduction.rest
-        stores, frictions, lost = self._stores, self._heats.frictions, None
+            conduction, (weights, ys) = self._conduction, stages
+            powers = (conduction.powers @ ys.T).T + conduction.rest
+            theta = self._heats.temperatures(ys[:, stores.states] * stores.units)[:, self._at[self._conducting]]
+            heat[self._conducting], entropy[self._conducting] = weights @ powers, weights @ (powers / theta)
         if self._whole and energies is not None:
             others = float(heat.sum()) - float(heat[frictions].sum())
             lost = work - float((energies[1] - energies[0]) @ self._rest) - others
         flows = self._heats.booked(heat, missed, lost)
         before = y[stores.states] * stores.units
         change, made = self._heats.taken(before, flows)
-        out = np.bincount(self._makers, made - entropy, self._rest.size).astype(float)
+        made = self._shared(made, entropy * np.divide(flows, heat, out=np.ones(heat.size), where=heat != 0.0))
+        out = np.bincount(self._makers, made - counted, self._rest.size).astype(float)
         more = float((flows - heat)[frictions].sum())
         return (before + change) / stores.units, out, more, float(flows.sum())
+
+    def _shared(self, whole: Array, parts: Array) -> Array:
+        """(passages,) entropies in J/K by a quadrature, so moved that each store has the sum of the whole ones.
+
+        A heat over its store's mean temperature has the wrong sign where the heat turns around within the step.
+        """
+        sizes, at = np.abs(parts), self._at
+        total, rest = np.bincount(at, sizes), np.bincount(at, whole - parts)
+        return np.where(total[at] > 0.0, parts + rest[at] * sizes / np.maximum(total[at], TINY), whole)

@@ -275,7 +275,7 @@ class Radau:
                 missed = self.scheme.gamma * totals.passed[0, 0] + self.scheme.defect @ totals.passed[1:, 0]
                 missed = theta * h * missed
             y[stored], made, friction, heat = passages.booked(
-                state.y, passed, (weights @ totals.numbers, theta * h), missed, energies, sums[1] - state.sums[1]
+                state.y, passed, (weights, totals.numbers), missed, energies, sums[1] - state.sums[1]
             )
             sums[0] += friction
             sums[3] += made.sum()

@@ -183,3 +183,21 @@ def test_double_real_eigenvalues_are_not_oscillations():
     assert [mode.frequency for mode in found] == [0.0, 0.0]
     swinging = modes_of(np.array([[-1.0, 1e-3], [-1e-3, -1.0]]), {})
     assert [mode.frequency > 0.0 for mode in swinging] == [True]
+
+
+@pytest.mark.parametrize("place", [0.0, 0.75])
+@pytest.mark.parametrize("power", [1.0, 1.3, 1.5, 1.9, 2.25, 2.6, 3.0])
+def test_a_state_at_a_kink_has_no_linear_system(power, place):
+    """|q − c|ᵖ at c: its effort jumps for p = 1, its stiffness is infinite for p < 2, and 0 beyond."""
+    spring = ephs.storage({"q": quantity.displacement}, lambda q: abs(q - place) ** power)
+    system = Pattern.from_text("q: displacement; p: momentum; spring(q); mass(p); turn(q, p)")(
+        spring=spring, mass=lib.point_mass(m=1.0), turn=lib.pkc()
+    )
+    beside = ephs.linearize(system, {"spring.q": place + 0.25}).A
+    stiffness = power * (power - 1.0) * 0.25 ** (power - 2.0)
+    np.testing.assert_allclose(beside, [[0.0, 1.0], [-stiffness, 0.0]], atol=1e-12 * power**2)
+    if power > 2.0:
+        assert np.abs(ephs.linearize(system, {"spring.q": place}).A - [[0.0, 1.0], [0.0, 0.0]]).max() < 1e-12
+    else:
+        with pytest.raises(ephs.OptionError, match=r"spring\.q at a kink"):
+            ephs.linearize(system, {"spring.q": place})

@@ -14,7 +14,7 @@ from ephs.semantics.derive.functions import COMPOSED, FUNCTIONS
 from ephs.semantics.derive.recording import Untraceable, record
 from ephs.semantics.derive.relations import compiled, program, sizes
 from ephs.semantics.derive.slopes import Slope, Slopes
-from ephs.semantics.derive.tape import OPERATIONS
+from ephs.semantics.derive.tape import OPERATIONS, evaluate, over_step
 from ephs.semantics.primitives.primitives import midpoint
 from ephs.semantics.primitives.special import root
 from ephs.semantics.spaces import codes, manifold
@@ -167,6 +167,45 @@ def test_slopes_of_functions_are_difference_quotients_without_cancellation(name,
     if expected is not None:
         assert abs(found.slopes[0] - expected) <= 100 * EPS * max(1.0, abs(expected)) / (1.0 - a)
     assert abs(found.start - float(one)) <= 20 * EPS * (1.0 + abs(float(one))) / (1.0 - a)
+
+
+POWERS = st.sampled_from([k / 4.0 for k in range(1, 16)]) | st.floats(0.1, 4.0)
+
+
+@given(POWERS, st.floats(-8.0, 8.0), st.just(0.0) | st.floats(-14.0, 1.0))
+def test_slopes_of_powers_are_difference_quotients_without_cancellation(power, decade, apart):
+    """Over steps from any positive number, and from 0, where a root is vertical."""
+    end = np.float64(10.0**decade)
+    start = end / (1.0 + 10.0**apart) if apart else np.float64(0.0)
+    recording = record(lambda x: x**power, {"x": None})
+    parameters = [np.float64(number) for number in recording.parameters]
+    found = over_step(Slopes(PLAIN), recording.tape, [Slope(start, end, {0: 1.0})], parameters)
+    with mpmath.workdps(60):
+        a, b, p = (mpmath.mpf(float(x)) for x in (start, end, power))
+        expected = (b**p - a**p) / (b - a) if a != b else p * a ** (p - 1)
+        assert abs(float(found.slopes[0] / expected) - 1.0) <= 200 * EPS / min(power, 1.0)
+
+
+RESTS = (
+    (lambda x, a: abs(x) ** a, True),
+    (lambda x, a: (x * x) ** (0.5 * a), True),
+    (lambda x, a: x * abs(x) ** a, True),
+    (lambda x, a: abs(x) ** (1.0 - a), False),
+    (lambda x, a: a * np.sqrt(x * x), False),
+    (lambda x, a: (x * x) ** (0.5 / a), False),
+)
+
+
+@pytest.mark.parametrize(("function", "flat"), RESTS)
+@given(st.sampled_from([1.25, 1.5, 1.75, 2.5, 3.25]) | st.floats(1.1, 4.0))
+def test_what_grows_as_a_power_above_one_is_flat_at_zero(function, flat, power):
+    """Values and derivatives there are those of springs and frictions at rest; a length has none."""
+    on, recording, zero = Duals(PLAIN, 1), record(lambda x: function(x, power), {"x": None}), np.float64(0.0)
+    parameters = [np.float64(number) for number in recording.parameters]
+    with np.errstate(all="ignore"):
+        found = on.dual(evaluate(on, recording.tape, [on.along(zero, 0)], parameters)[0])
+        step = over_step(Slopes(PLAIN), recording.tape, [Slope(zero, zero, {0: 1.0})], parameters)
+    assert ((found.value, found.slopes[0], step.slopes.get(0, 0.0)) == (0.0, 0.0, 0.0)) == flat
 
 
 SMALL = ["sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "expm1", "log1p", "cos", "cosh", "acos", "exp"]

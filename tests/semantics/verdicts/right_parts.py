@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 import ephs
+from ephs import library
 from ephs import quantity as Q
 from ephs.operad import Quantity, Space
 from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, friction, gyrator, large, stored
@@ -198,8 +199,32 @@ def sheared(source):
     return lambda: ephs.irreversible({"p": Quantity("momentum", Space("real", 3, 3), -1), "s": Q.entropy}, matrix)
 
 
+def frozen(source):
+    """A process that stops in the cold: its matrix is below the smallest normal number there."""
+    size, activation = source.uniform(0.1, 3.0), source.uniform(735.0, 743.0)
+    return friction(lambda p, s: size * math.exp(-activation * 273.15 / float(s)), domain={"s": (270.0, math.inf)})
+
+
+def small_store(source):
+    """An energy that a shift of its zero takes all digits from, at a state of many heat capacities."""
+    capacity = source.uniform(2.0, 9.0) * 1e-3
+    return lambda: library.thermal_capacity(c1=10.0 ** source.uniform(100.0, 150.0), c2=capacity)
+
+
+def large_beside_a_sine(source):
+    """A number of the formula is an angle, too, whose sine says nothing."""
+    size = 10.0 ** source.uniform(17.0, 150.0)
+    return gyrator({**QP, **X}, lambda x: size * np.cos(x) * TURN)
+
+
+def faint(source):
+    """A process whose matrix is below the smallest normal number."""
+    size = source.uniform(0.1, 3.0)
+    return friction(lambda p, s: 1e-160 * s * (size * 1e-160))
+
+
 PROVED = (
     motor, circulator, lorentz, two_units, turned, lever, rolling, rotated_pair, several_states, warm, valve,
-    conductor, friction_of_two, sheared,
+    conductor, friction_of_two, sheared, faint, small_store, large_beside_a_sine,
 )  # fmt: skip
-RIGHT = (*PROVED, skew_of_states, written_in_two_ways, convex, convex_hidden, damper)
+RIGHT = (*PROVED, skew_of_states, written_in_two_ways, convex, convex_hidden, damper, frozen)

@@ -335,6 +335,19 @@ def no_value(source):
     return stored(energy)
 
 
+def cold_of_extreme_numbers(source):
+    """Quotients of the expansion are of whole numbers beyond all floats."""
+    small = 10.0 ** source.uniform(-305.0, -297.0)
+    return stored(lambda s: s**3 / 3.0 + small * s - 1e-3 * s, ports={"s": Q.entropy})
+
+
+def energy_that_jumps(source):
+    """By a turn where the angle's cut is passed: it has no gradient there."""
+    size, other = source.uniform(0.1, 3.0), source.uniform(0.1, 3.0)
+    ports = {"a": Q.displacement, "b": Q.displacement}
+    return stored(lambda a, b: other * a**2 + size * np.arctan2(a, b), ports=ports)
+
+
 BREAKS = {
     "isotropy": (energy_of_constants, energy_inside_a_port, energy_of_a_function, not_skew_in_a_window),
     "conservation": (
@@ -350,13 +363,15 @@ BREAKS = {
         negative_in_a_window, negative_in_a_recorded_window, negative_at_speeds, negative_between_two_temperatures,
         negative_by_a_polynomial,
     ),
-    "cold": (cold_beyond,),
+    "cold": (cold_beyond, cold_of_extreme_numbers),
     "gradient": (gradient_off, gradient_off_hidden, gradient_off_along_a_direction, gradient_off_in_a_window),
     "even": (odd_energy,),
     "no-value": (no_value,),
     # at 1e-13 of a number, or in a window whose place is the root of a number, a search may find nothing
     "symmetry or searched": (symmetry_of_friction,),
     "definite or searched": (negative_in_a_computed_window,),
+    # a search looks at single states, and a jump is between two
+    "gradient or searched": (energy_that_jumps,),
 }  # fmt: skip
 WRONG = {kind: conditions.split(" or ") for conditions, kinds in BREAKS.items() for kind in kinds}
 """Kind -> the conditions of which one is named."""
