@@ -32,7 +32,7 @@ SHIPPED: Final = (
     "ephs.solve.methods.newton:natural_programs",
     "ephs.solve.methods.integral:integral_program",
     "ephs.solve.methods.settling:settling_program",
-    "ephs.exporting.outputs:outputs_program",
+    "ephs.exporting.image:outputs_program",
 )
 """Module and name of each program, or of a function that returns one or several. To ship a program, list it here."""
 

@@ -10,16 +10,16 @@ from tests.rooms import ROOT, SOURCES, size_of
 CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
-    "ephs/exporting": 13_500,
-    "ephs/mechanics": 419_700,
+    "ephs/exporting": 13_400,
+    "ephs/mechanics": 419_500,
     "ephs/modelica": 11_300,
     "ephs/operad": 30_600,
-    "ephs/semantics": 191_000,
+    "ephs/semantics": 192_200,
     "ephs/show": 64_500,
-    "ephs/solve": 125_300,
+    "ephs/solve": 124_200,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 570_400,
+    "tests": 562_800,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

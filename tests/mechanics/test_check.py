@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from ephs.mechanics.runs import check
-from ephs.mechanics.runs.check import check_model
+from ephs.mechanics.runs.check import check_model, run_of_touching, stays_open
 from ephs.mechanics.runs.running import by_constant_steps
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.runs.touching import run_of_touching, stays_open
 from ephs.semantics.systems import report
 from ephs.semantics.systems.laws import SystemLaw, Verdict, system_law
 from tests.numerics import largest

@@ -59,6 +59,19 @@ number = st.floats(-3.0, 3.0)
 times = st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=5, unique=True).map(sorted)
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_a_rate_beside_a_motion_is_the_motion_s_to_the_digits_of_files(form):
+    rate = FORMS[form].rate(0.0)
+
+    def text(given):
+        return CART.replace("motion = {motion}", f"motion = {form}\nrate = {given}")
+
+    for written in (rate, float(np.nextafter(rate, 9.0)) if rate else 0.0, float(f"{rate:.9g}")):
+        assert scene_of_text(text(written)).joint("rail").rate[0] == pytest.approx(rate, rel=1e-8, abs=0.0)
+    with pytest.raises(ephs.SceneError, match="the prescribed initial rate"):
+        scene_of_text(text(rate + 1e-6))
+
+
 @st.composite
 def laws(draw):
     """Motion laws of each form."""

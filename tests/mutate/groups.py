@@ -53,7 +53,7 @@ DERIVATIVES = (
     "ephs/mechanics/tree/sweeps/expanding.py",
     "ephs/mechanics/road/inverse.py",
     "ephs/mechanics/tree/engine/tangents.py",
-    "ephs/mechanics/tree/equations/slopes.py",
+    "ephs/mechanics/tree/equations/residual.py",
     "ephs/mechanics/sensitivity/explicit.py",
     "ephs/semantics/stage/duals.py",
 )
@@ -146,7 +146,7 @@ GROUPS = {
     ),
     "kernels": Group(
         (
-            "ephs/solve/methods/corrections.py",
+            "ephs/solve/methods/stages.py",
             "ephs/solve/methods/guesses.py",
             "ephs/solve/methods/moves.py",
             "ephs/solve/methods/newton.py",

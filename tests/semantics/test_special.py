@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ephs.semantics.primitives.special import SHORT, log_mean, sinhc
-from ephs.semantics.symbols.functions import Sinhc, SinhcSlope
-from ephs.semantics.symbols.tracing import trace
+from ephs.semantics.symbols.tracing import Sinhc, SinhcSlope, trace
 from tests.numerics import EPS
 
 Z = sp.Symbol("z", real=True)

@@ -33,7 +33,7 @@ from ephs.mechanics.shapes.impact import Impact
 from ephs.mechanics.shapes.law import ConstitutiveLaw
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
-from ephs.semantics.spaces.rank import ALIGNED
+from ephs.semantics.spaces.rank import ALIGNED, ASSEMBLY
 from ephs.solve.posing.motion_law import MotionLaw
 
 if TYPE_CHECKING:
@@ -276,7 +276,7 @@ def _motion(table: Checked[JointEntry], d: int, drive: Array) -> MotionLaw | Non
     rate = found.rate(0.0)
     if d != 1:
         table.fault("motion freedoms", "motion", f"a motion of a {entry.type} joint", d=d)
-    elif entry.rate is not None and np.asarray(entry.rate).ravel().tolist() not in ([rate], [0.0]):
+    elif entry.rate is not None and np.any(entry.rate) and not np.allclose(entry.rate, rate, ASSEMBLY, 0.0):
         table.fault("motion rate", "rate", motion=shown(rate))
     if drive.any():
         table.fault("motion and drive", found="motion and drive")

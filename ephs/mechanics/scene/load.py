@@ -31,8 +31,8 @@ from ephs.mechanics.scene.errors import (
 )
 from ephs.mechanics.scene.joints import Asked, resolve_joint
 from ephs.mechanics.scene.meant import as_meant
-from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, Scene, World, frozen, with_sections
-from ephs.mechanics.scene.moving import moved
+from ephs.mechanics.scene.model import ATTACHED, ENVIRONMENT, GROUND, KINDS, Scene, World, frozen, mapped, with_sections
+from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.resolve_elements import (
     ReferableNames,
     placed_faults,
@@ -45,6 +45,31 @@ from ephs.mechanics.scene.stops import beyond, with_stops
 from ephs.mechanics.scene.text import file_inside, file_text, lost
 from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.operad.collector import paused_collector
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces import SE3
+
+# A scene displaced as a whole: placement of a part in the world of its scene.
+
+
+def moved(scene: Scene, pose: Array, world: World) -> Scene:
+    """The scene with its ground moved by a pose (7,), in another world.
+
+    Body-frame twists stay, so velocities turn with it; what is fixed to the ground moves along.
+    """
+
+    def frame(body: str, offset: Array) -> Array:
+        return frozen(SE3.compose(pose, offset)) if body == GROUND else offset
+
+    def carried(there: Array) -> Array:
+        return frozen(SE3.normalise(SE3.compose(pose, there)))
+
+    changes = {
+        **dict.fromkeys((*KINDS, *REGISTERED), lambda _, x: x.moved(pose)),
+        "bodies": lambda _, b: replace(b, pose=carried(b.pose)),
+        "joints": lambda _, j: replace(j, frame1=frame(j.body1, j.frame1), frame2=frame(j.body2, j.frame2)),
+    }
+    return mapped(scene, changes, world, origin=carried)
+
 
 MODELS = (".urdf", ".xml", ".sdf")
 """Endings of files in other formats, which are imported."""

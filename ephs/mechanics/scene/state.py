@@ -1,6 +1,6 @@
 """A scene in another state: along its joint coordinates, adjusted to close, or taken from a solution."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ephs.mechanics.scene.adjust import close_loops, mass_roots, project_velocities
 from ephs.mechanics.scene.adjustment import Adjustment, Changed, Displacement
 from ephs.mechanics.scene.assembly import gyration, measure
-from ephs.mechanics.scene.continuing import inner_states, lost_states
+from ephs.mechanics.scene.build import component_path, initial_state, scene_system
 from ephs.mechanics.scene.custom import Element
 from ephs.mechanics.scene.errors import Fault, SceneError, fault, unknown_name
 from ephs.mechanics.scene.following import stretched, tied
@@ -24,10 +24,46 @@ from ephs.mechanics.scene.shells import ShellSheet
 from ephs.mechanics.scene.site import moved
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.primitives.primitives import Storage
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces import rotations as so3
 from ephs.semantics.spaces.rank import ASSEMBLY
 from ephs.semantics.systems.initial import saved_at
+
+# Elements of registered sections in the states of a solution.
+
+NEAR = 1e-6
+"""Largest difference of an element's start from a state that it goes on from, relative to one plus its size."""
+
+
+def inner_states(section: str, name: str, states: Mapping[Path, Array]) -> dict[str, Array]:
+    """States of an element's boxes, by their paths below its own."""
+    at = tuple(component_path(section, name))
+    return {".".join(path[len(at) :]): value for path, value in states.items() if tuple(path[: len(at)]) == at}
+
+
+def lost_states(scene: Scene, states: Mapping[Path, Array]) -> Iterator[Fault]:
+    """Faults of elements that do not start in the states of a solution."""
+    own = [*scene.all_elements(), *(("shells", name, of) for name, of in scene.all_shells())]
+    if not own:
+        return
+    start, system = initial_state(scene), scene_system(scene)
+    counted = {path for path, of in system.leaves() if isinstance(of, Storage) and of.environment}
+    for section, name, _ in own:
+        at = component_path(section, name)
+        for inner, value in inner_states(section, name, states).items():
+            path = Path([*at, *inner.split(".")])
+            given = start[path]
+            apart = _apart(given, value)
+            if Path(path[:-1]) not in counted and apart > NEAR * (1.0 + float(np.abs(value).max(initial=0.0))):
+                yield fault("not continued", f"{section}.{name}", f"the state {inner} = {value.tolist()}")
+
+
+def _apart(given: Array, value: Array) -> float:
+    """Largest difference; the quaternions q and −q are one rotation."""
+    other = np.concatenate([-value[:4], value[4:]]) if value.size in (4, 7) else value
+    return min(float(np.abs(given - each).max(initial=0.0)) for each in (value, other))
+
 
 MOVED = 1e-12
 """Least reported change of a body's state in m, rad, m/s, rad/s: rounding of poses of size one."""

@@ -1,10 +1,10 @@
 """The relation of an irreversible element, and its Onsager matrix, from their tape."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
 from ephs.semantics.derive.arguments import Arguments
-from ephs.semantics.derive.conduction import conducted
 from ephs.semantics.derive.maps import Maps
 from ephs.semantics.derive.relating import (
     DOMAIN,
@@ -23,6 +23,21 @@ from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.evaluator import Evaluator
 from ephs.semantics.stage.numbers import Integer, Real, Truth
+
+# Flows of entropy between temperatures, by the differences of these.
+
+
+def conducted(row: Sequence[Real], warmth: Sequence[Real], i: int) -> Real:
+    """Flow of entropy at a place among others of given temperatures: Σ Mᵢⱼ (θⱼ − θᵢ)/θᵢ.
+
+    That is Σ Mᵢⱼ (θⱼ − θ₀)/θ₀, as Σ Mᵢⱼ θⱼ = 0, without the difference of large numbers which that is between nearly
+    equal temperatures: what such flows produce is a square of what these differ by.
+    """
+    total: Real = 0.0
+    for j, (weight, theta) in enumerate(zip(row, warmth, strict=True)):
+        if j != i:
+            total = total + weight * (theta - warmth[i])
+    return total / warmth[i]
 
 
 @final

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any, final, overload
 
 import numpy as np
 
-from ephs.operad import ROOT, Path, PatternError
+from ephs.operad import ROOT, Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.systems.system import System
 from ephs.solve.auditing.findings import Audit
@@ -19,6 +18,7 @@ from ephs.solve.result.dataset import DatasetVariable, sampled_inputs
 from ephs.solve.result.entries import LedgerEntry, entry_of
 from ephs.solve.result.labels import Labels
 from ephs.solve.result.ledger import Ledgers
+from ephs.solve.result.states import near_states
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +89,7 @@ class Solution:
             return self._at(path)
         key = Path.of(path)
         if key not in self.states:
-            raise KeyError(f"{path}: no such state; {_hint(key, list(self.states))}")
+            raise KeyError(f"{path}: no such state; {near_states(key, list(self.states))}")
         return self.states[key]
 
     def _at(self, where: slice) -> "Solution":
@@ -111,10 +111,7 @@ class Solution:
 
     def __contains__(self, path: str | Path) -> bool:
         """Whether there is a state at this path."""
-        try:
-            return Path.of(path) in self.states
-        except PatternError:
-            return False
+        return path in self.states or str(path) in map(str, self.states)
 
     def __iter__(self) -> Iterator[Path]:
         return iter(self.states)
@@ -395,11 +392,3 @@ class Solution:
             read = "states are read as sol['path'], temperatures as sol.temperature('path')"
             raise TypeError(f"{self.name} is not a scene, it has no {what}; {read}")
         return self.motion
-
-
-def _hint(path: Path, known: list[Path]) -> str:
-    below = [str(each) for each in known if each[: len(path)] == path]
-    near = get_close_matches(str(path), [str(each) for each in known], n=3, cutoff=0.7)
-    if below:
-        return f"below it lie {', '.join(below)}"
-    return f"did you mean {' or '.join(near)}?" if near else f"the states are {', '.join(map(str, known))}"

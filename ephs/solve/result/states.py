@@ -1,6 +1,7 @@
 """States of a record by path, as users read them, each made when it is asked for."""
 
 from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from typing import final
 
 from ephs.operad import Path, Quantity
@@ -39,3 +40,12 @@ def coordinates(quantity: Quantity, x: Array) -> Array:
         pair = Pair.from_space(quantity.space)
         return x if pair.manifold.code == VECTOR else pair.coordinates(x)
     return x[:, 0] if x.shape[1] == 1 else x
+
+
+def near_states(path: Path, known: list[Path]) -> str:
+    """The states that a wrong path may mean, in words: those below it, those of like names, or all."""
+    below = [str(each) for each in known if each[: len(path)] == path]
+    near = get_close_matches(str(path), [str(each) for each in known], n=3, cutoff=0.7)
+    if below:
+        return f"below it lie {', '.join(below)}"
+    return f"did you mean {' or '.join(near)}?" if near else f"the states are {', '.join(map(str, known))}"

@@ -16,7 +16,6 @@ from ephs import quantity as Q
 from ephs.mechanics import Element, key, register_element, rule
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.build import initial_state
-from ephs.mechanics.scene.continuing import lost_states
 from ephs.mechanics.scene.custom import ElementError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
 from ephs.mechanics.scene.own_units import OwnUnits, mobility_of
@@ -26,6 +25,7 @@ from ephs.mechanics.scene.registry import REGISTERED
 from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.scene.schema import json_schema
 from ephs.mechanics.scene.soundness import check_scene
+from ephs.mechanics.scene.state import lost_states
 from ephs.show.motions.lines import lines_of
 from ephs.solve.equations.mobility import Mobility
 from tests.mechanics.own_elements import Pump, Push

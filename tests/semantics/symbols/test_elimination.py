@@ -3,7 +3,7 @@
 import pytest
 
 from ephs.semantics.symbols.algebra import sp
-from ephs.semantics.symbols.elimination import settled
+from ephs.semantics.symbols.equations import settled
 
 SYMBOLS = sp.symbols("x0:6")
 

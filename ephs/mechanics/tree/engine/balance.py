@@ -8,7 +8,7 @@ Where momenta are kept, too, islands are first moved rigidly to those that they 
 `ephs.mechanics.road.rigid`; n is then without the rigid motions, and positions are also moved along these, as
 the momenta turn them by themselves.
 
-What is then still missing is left to what is attached, see `ephs.mechanics.tree.engine.storing`.
+What is then still missing is left to what is attached, see `ephs.mechanics.tree.engine.balance`.
 """
 
 from dataclasses import dataclass, replace
@@ -17,16 +17,41 @@ from typing import TYPE_CHECKING, Annotated, final
 from ephs.mechanics.tree.engine.attachment import attached_energy
 from ephs.mechanics.tree.engine.forces import strain
 from ephs.mechanics.tree.engine.heats import entropies
-from ephs.mechanics.tree.engine.storing import store_attached
 from ephs.mechanics.tree.sweeps.acting import PushedBody
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
 from ephs.solve.march.account import BEYOND, MOST, ROUNDING, WORTH, RunAccount, rounding, stretch
-from ephs.solve.march.storing import Missing
+from ephs.solve.march.storing import Missing, Moved, store
 
 if TYPE_CHECKING:
     from ephs.mechanics.tree.engine.motion import Mechanism
+
+
+# Attached states moved to the energy that a step leaves to them, where the motion of bodies does not take it.
+
+
+def store_attached(run: "Correction") -> None:
+    """Move attached states along what the step changed, and what h ẋ at its end is beside that."""
+    on, motion, w, nodes, size = run.on, run.motion, run.motion.work, run.motion.tables.node, run.heats.size
+    along, beside, rest = w.idle.part(0, size), w.spare.part(0, size), w.spare.size - (size + 2)
+    found = motion.accelerate(
+        on, run.q, run.r, w.descent, beside, w.spare.part(size + 2, rest), w.spare.part(size, 2)
+    )  # fmt: skip
+    sound = on.same(found, 0)
+
+    def free(k: Integer) -> Real:
+        return on.real(nodes[k].free)
+
+    def part(k: Integer) -> None:
+        step = free(k) * (run.heats[k] - run.start[k])
+        left = on.select(sound, free(k) * (run.h * beside[k]) - step, 0.0)
+        along[k], beside[k] = step, left
+
+    on.loop(size, part)
+    allowed = run.allowed.part(2 * motion.freedoms, size)
+    store(run, Moved(run.heats, run.start, along, beside, w.temperature.part(0, size), allowed, free))
+
 
 ROUNDS = 8
 """Iterations that move positions."""

@@ -19,8 +19,7 @@ from ephs.mechanics.tree.engine import apart
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from ephs.semantics.spaces import SE3, pair
-from ephs.solve.methods.dissection import dissected
-from ephs.solve.methods.solvers import Solvers
+from ephs.solve.methods.solvers import Solvers, dissected
 from ephs.testing import mechanisms
 from tests.mechanics.tree.general import held_to_the_general_form
 from tests.numerics import EPS, generators, largest, seeds
