@@ -14,12 +14,12 @@ CEILINGS = {
     "ephs/mechanics": 419_500,
     "ephs/modelica": 11_300,
     "ephs/operad": 30_600,
-    "ephs/semantics": 192_200,
-    "ephs/show": 64_500,
-    "ephs/solve": 124_200,
+    "ephs/semantics": 192_300,
+    "ephs/show": 64_400,
+    "ephs/solve": 124_300,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 562_800,
+    "tests": 563_000,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

@@ -7,7 +7,7 @@ the same tape, and share what is made of it. What branches on its arguments, or 
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from types import MappingProxyType
 from typing import Any, Final, TypeVar, final
 
@@ -280,6 +280,17 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
 
 OPERATIONS: Final = _operations()
 """Operations on the numbers of an evaluator."""
+PIECEWISE: Final = frozenset({"absolute", "sign", "choose", "root"})
+"""Those that are not analytic: a derivative that vanishes somewhere may not elsewhere."""
+
+
+def has_pieces(relation: object) -> bool:
+    """Whether functions on the tapes of a relation are of several pieces."""
+    if isinstance(relation, Tape):
+        return any(name in PIECEWISE for name, _, _ in relation.operations)
+    if isinstance(relation, tuple):
+        return any(map(has_pieces, relation))
+    return is_dataclass(relation) and any(has_pieces(getattr(relation, field.name)) for field in fields(relation))
 
 
 def quarter(value: object) -> float | None:

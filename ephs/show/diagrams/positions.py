@@ -5,9 +5,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh
-from scipy.sparse.csgraph import shortest_path
 
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.show.diagrams.geometry import BETTER, POINT, Points, distances
 from ephs.show.diagrams.graph import Graph
 from ephs.show.shared.errors import ShowError
@@ -81,6 +80,9 @@ def _balanced(graph: Graph, start: int) -> Points:
     Gansner, Koren and North, *Graph Drawing by Stress Majorization*, LNCS 3383 (2005) 239-250. ``start`` counts places
     to begin from. Ports of the pattern itself are nodes of their own, which keeps room for wires to the outside.
     """
+    from scipy.linalg import cho_factor, cho_solve
+    from scipy.sparse.csgraph import shortest_path
+
     radii = graph.radii()
     ends = [(e.ends[0], e.ends[1] if e.role != "outer" else _OUTER + e.ends[0]) for e in graph.edges]
     index = {path: i for i, path in enumerate(dict.fromkeys([*radii, *(second for _, second in ends)]))}
@@ -115,7 +117,7 @@ def _balanced(graph: Graph, start: int) -> Points:
 def _scaled(wanted: Points, *axes: int) -> Points:
     """Classical scaling: two of the principal coordinates that distances (n, n) have."""
     centred = np.eye(len(wanted)) - 1.0 / len(wanted)
-    sizes, ways = eigh(-0.5 * centred @ wanted**2 @ centred, subset_by_index=[max(0, len(wanted) - 5), len(wanted) - 1])
+    sizes, ways = symmetric_eigen(-0.5 * centred @ wanted**2 @ centred)
     chosen = [max(-1 - axis, -len(sizes)) for axis in axes]
     return ways[:, chosen] * np.sqrt(np.maximum(sizes[chosen], 0.0))
 

@@ -12,6 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array, Reference
+from ephs.semantics.derive.tape import has_pieces
 from ephs.semantics.descriptor.kernel_table import Callback, address_of, prototype
 from ephs.semantics.descriptor.numbering import Index, spans, starts
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
@@ -135,8 +136,8 @@ def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, 
 def _local_pattern(entry: LayoutEntry, reference: Reference) -> Array:
     """Mask of the entries of a component's Jacobian that are not identically zero.
 
-    Compiled kernels are analytic in their arguments, so what vanishes at three random points vanishes. Callbacks may
-    have branches: all their entries count.
+    What is analytic and vanishes at three random points vanishes. Callbacks may have branches, and recorded functions
+    pieces: all their entries count.
     """
     primitive, (kind, _, n, k, _) = entry.primitive, entry.counts
     read = tuple(primitive.interface[port].quantity for port in primitive.reads)
@@ -149,7 +150,7 @@ def _local_pattern(entry: LayoutEntry, reference: Reference) -> Array:
     names = None if kernel is None else (kernel.name, kernel.relation)
     key = (names, numbers, read, kind, n, k)
     if key not in _patterns:
-        plain = entry.callback is not None or not shape[0]
+        plain = entry.callback is not None or not shape[0] or (kernel is not None and has_pieces(kernel.relation))
         _patterns[key] = np.ones(shape, dtype=bool) if plain else _sample_pattern(entry, reference, shape)
     return _patterns[key]
 

@@ -201,3 +201,21 @@ def test_a_state_at_a_kink_has_no_linear_system(power, place):
     else:
         with pytest.raises(ephs.OptionError, match=r"spring\.q at a kink"):
             ephs.linearize(system, {"spring.q": place})
+
+
+@pytest.mark.parametrize(
+    ("energy", "at", "stiffness"),
+    [
+        (lambda q: 25.0 * (abs(q - 1.0) + q - 1.0) ** 2, 1.5, 200.0),
+        (lambda q: (abs(q - 40.0) + q - 40.0) ** 3, 40.5, 24.0),
+        (lambda q: 3.0 * q**2 + 5.0 * (abs(q + 30.0) - q - 30.0) ** 2, -31.0, 46.0),
+    ],
+)
+def test_parts_that_act_on_one_side_have_their_stiffness_there(energy, at, stiffness):
+    """Wherever that is: what is flat at drawn states need not be flat at others."""
+    swing = Pattern.from_text("q: displacement; p: momentum; pe(q); pkc(q, p); ke(p)")
+    spring = ephs.storage({"q": quantity.displacement}, energy, name="one-sided")
+    system = swing(pe=spring, pkc=lib.pkc(), ke=lib.point_mass(m=2.0))
+    found = eigenvalues(ephs.linearize(system, {"pe.q": at}).A)
+    assert found.imag == pytest.approx(np.sqrt(0.5 * stiffness) * np.array([-1.0, 1.0]), rel=1e-9)
+    assert largest(found.real) <= 1e-9
