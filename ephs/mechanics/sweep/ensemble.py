@@ -36,6 +36,9 @@ from ephs.solve.running.control import ATOL, RTOL, Control, first_step
 from ephs.solve.running.stepping import Span
 
 # Members of an ensemble that may violate a law of their audit: they are run again individually, with the whole audit.
+#
+# What is looked at is cheap beside a member's run, and stricter than the audit: the balance of energy at a few of its
+# instants, the entropy made in its steps, and at constant steps the distance from a run with longer ones.
 
 LONGER = 4
 """Length of comparison steps in constant steps."""

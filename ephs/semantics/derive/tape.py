@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from types import MappingProxyType
-from typing import Any, Final, TypeVar, final
+from typing import Any, Final, TypeVar, cast, final
 
 import numpy as np
 
@@ -289,7 +289,7 @@ def has_pieces(relation: object) -> bool:
     if isinstance(relation, Tape):
         return any(name in PIECEWISE for name, _, _ in relation.operations)
     if isinstance(relation, tuple):
-        return any(map(has_pieces, relation))
+        return any(map(has_pieces, cast("tuple[object, ...]", relation)))
     return is_dataclass(relation) and any(has_pieces(getattr(relation, field.name)) for field in fields(relation))
 
 

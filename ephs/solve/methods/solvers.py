@@ -18,6 +18,9 @@ from ephs.semantics.descriptor.numbering import Index
 from ephs.solve.posing.errors import Outcome, SolveError
 
 # Order of the unknowns of a sparse system by nested dissection (George, 1973), at places in space.
+#
+# Unknowns are halved across their largest extent, and those of one half that meet the other half come last; both halves
+# alike. So factors of plane meshes of n unknowns have in the order of n log n entries, made by n^1.5 operations.
 
 LEAF = 48
 """Unknowns that are not halved."""
