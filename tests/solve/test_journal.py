@@ -18,7 +18,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.registry import METHODS
 from ephs.solve.posing.errors import Outcome
 from ephs.solve.running import journal
-from ephs.solve.running.journal import read_journal
+from ephs.solve.running.journal import FORMAT, read_journal
 from examples.failures import runs
 from tests.mechanics.ball import BALL
 from tests.scenes import ROOT, shipped
@@ -261,8 +261,8 @@ def test_a_file_that_is_no_journal_is_refused(tmp_path):
     [
         b"[" * 100_000,
         b"null",
-        json.dumps({"format": 1}).encode(),
-        json.dumps({"format": 1, "model": "", "run": {}, "note": {}}).encode(),
+        json.dumps({"format": FORMAT}).encode(),
+        json.dumps({"format": FORMAT, "model": "", "run": {}, "note": {}}).encode(),
         json.dumps({"format": 99}).encode(),
     ],
 )
