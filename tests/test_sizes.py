@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 124_300,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 563_000,
+    "tests": 563_100,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
