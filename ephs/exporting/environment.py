@@ -41,7 +41,7 @@ class Instances:
     made
         The mechanism.
     count
-        How many. Different instances may be advanced by different threads at once.
+        Number of instances. Different ones may be advanced by different threads at once.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ class ReducedMethod(ABC):
     exponent
         The power of the step with which its estimate of the error falls.
     share
-        How a step's part of the tolerance depends on its length, see `Steered`.
+        Exponent of a step's share of the tolerance by its length, see `Steered`.
     atol, rtol
         (counted,) of what counts in an error.
     hold

@@ -281,11 +281,11 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
 OPERATIONS: Final = _operations()
 """Operations on the numbers of an evaluator."""
 PIECEWISE: Final = frozenset({"absolute", "sign", "choose", "root"})
-"""Those that are not analytic: a derivative that vanishes somewhere may not elsewhere."""
+"""Operations that are not analytic: a derivative may vanish in one region and not in another."""
 
 
 def has_pieces(relation: object) -> bool:
-    """Whether functions on the tapes of a relation are of several pieces."""
+    """Whether a relation has a tape with a piecewise operation."""
     if isinstance(relation, Tape):
         return any(name in PIECEWISE for name, _, _ in relation.operations)
     if isinstance(relation, tuple):

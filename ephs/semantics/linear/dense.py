@@ -34,6 +34,11 @@ def dot(on: Evaluator, x: Vector, y: Vector) -> Real:
     return total.value
 
 
+def add_to(out: Vector, i: Integer, value: Real) -> None:
+    """The sum of an entry and a number."""
+    out[i] = out[i] + value
+
+
 def sum_of_squares(on: Evaluator, count: Integer, term: Callable[[Integer], Real]) -> Real:
     """Σ x_i² of so many numbers, added in order."""
     total = on.variable(0.0)

@@ -42,7 +42,7 @@ class DiagramWord:
 @final
 @dataclass(frozen=True, slots=True)
 class DiagramPart:
-    """What stands for a box, junction or wire: its title in words, its classes, its marks, and names over them."""
+    """Marks and names of one box, junction or wire, with its title and its SVG classes."""
 
     title: str
     classes: str

@@ -27,7 +27,7 @@ EACH, MOST = 60, 6
 
 
 def evenly_spread(size: int, count: int) -> list[int]:
-    """Numbers of so many things out of some, from the first on."""
+    """Indices of ``count`` of ``size`` items, at even intervals from the first on."""
     return np.unique(np.linspace(0, size, count, endpoint=False).astype(int)).tolist()
 
 
@@ -46,7 +46,7 @@ class Missed:
 
 
 class Indexed(Protocol[T_co]):
-    """Things that are had by their number."""
+    """Items by number."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, number: int, /) -> T_co: ...
@@ -54,14 +54,14 @@ class Indexed(Protocol[T_co]):
 
 @final
 class Spread(Generic[T]):
-    """Some of what is added one after the other, at even intervals: one in 2ᵏ, at most twice `MOST`.
+    """A sample of a sequence at even intervals: one item in 2ᵏ, at most twice `MOST`.
 
     Attributes
     ----------
     kept
-        These.
+        Items of the sample.
     count, stride
-        How many were added; one in so many is kept.
+        Number of items added; one in ``stride`` is kept.
     """
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class Spread(Generic[T]):
         self.count, self.stride = 0, 1
 
     def add(self, items: Indexed[T]) -> None:
-        """Those that come next."""
+        """Add the next items of the sequence."""
         at, first, self.count = self.count, self.count, self.count + len(items)
         while (at := at + -at % self.stride) < self.count:
             if len(self.kept) == 2 * MOST:
@@ -79,7 +79,7 @@ class Spread(Generic[T]):
                 at += 1
 
     def resume(self, kept: list[T], counts: Sequence[int]) -> None:
-        """Go on from these, and from the number of those added and the stride."""
+        """Go on from a sample, and from its count and stride."""
         self.kept, (self.count, self.stride) = kept, counts
 
 

@@ -136,8 +136,8 @@ def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, 
 def _local_pattern(entry: LayoutEntry, reference: Reference) -> Array:
     """Mask of the entries of a component's Jacobian that are not identically zero.
 
-    What is analytic and vanishes at three random points vanishes. Callbacks may have branches, and recorded functions
-    pieces: all their entries count.
+    An analytic function that vanishes at three random points is zero. Callbacks may branch, and recorded functions may
+    be piecewise: of these, all entries count.
     """
     primitive, (kind, _, n, k, _) = entry.primitive, entry.counts
     read = tuple(primitive.interface[port].quantity for port in primitive.reads)

@@ -86,14 +86,14 @@ def held_back(on: Evaluator, control: MarchControl) -> Truth:
 
 
 class Steered(Protocol):
-    """What a method says of the control of its steps, which may change from step to step.
+    """Properties of a method that control its steps; they may change from step to step.
 
     Attributes
     ----------
     exponent
         The power of the step with which the estimate falls.
     share
-        How a step's part of the tolerance depends on its length: a step of h in a run of T aims at (h/T)^share of it.
+        Exponent of a step's share of the tolerance by its length: a step of h in a run of T aims at (h/T)^share of it.
         With 0 errors add up over the steps, with 1 they make the tolerance together. What is accepted knows the share
         up to `STRICT` only: where rates jump, no step would be short enough.
     hold

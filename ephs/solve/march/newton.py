@@ -6,14 +6,13 @@ Hairer and Wanner, *Solving Ordinary Differential Equations II*, IV.8.
 from dataclasses import dataclass
 from typing import final
 
-from ephs.semantics.linear.dense import clear, copy, dot
+from ephs.semantics.linear.dense import add_to, clear, copy, dot
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Vector, staged
 from ephs.solve.march.evaluating import MarchStep, allow, evaluate, place
 from ephs.solve.march.iteration import BEYOND, FAST, iterate
 from ephs.solve.march.memory import Errors
 from ephs.solve.march.records import Status
 from ephs.solve.march.stiff import Solver, Stiff, whole
-from ephs.solve.methods.places import add_to
 
 
 @staged

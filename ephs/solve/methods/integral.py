@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.linear.dense import add_to
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -30,7 +31,7 @@ from ephs.solve.equations.layout import LINEAR
 from ephs.solve.equations.model import Model
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
-from ephs.solve.methods.places import Part, add_to, each_input
+from ephs.solve.methods.places import Part, each_input
 from ephs.solve.methods.records import (
     COMPONENT,
     REVERSIBLE,

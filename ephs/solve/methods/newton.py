@@ -5,7 +5,7 @@ from functools import cache
 from itertools import chain
 from typing import Any, Final
 
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import add_to, copy
 from ephs.semantics.linear.sparse import factorise, solve
 from ephs.semantics.spaces.vectors import dot
 from ephs.semantics.stage import (
@@ -20,7 +20,7 @@ from ephs.semantics.stage import (
 )
 from ephs.solve.methods.guesses import BEFORE, extrapolated, restrain
 from ephs.solve.methods.moves import move_states
-from ephs.solve.methods.places import add_to, each_row
+from ephs.solve.methods.places import each_row
 from ephs.solve.methods.records import (
     COMPONENT,
     DIVERGED,

@@ -13,11 +13,6 @@ def raise_to(on: Evaluator, out: Vector, i: Integer, value: Real) -> None:
     out[i] = on.maximum(out[i], value)
 
 
-def add_to(out: Vector, i: Integer, value: Real) -> None:
-    """The sum of an entry and a number."""
-    out[i] = out[i] + value
-
-
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:

@@ -4,7 +4,7 @@ from functools import cache
 from typing import Final
 
 from ephs.semantics.descriptor.kernel_table import SIGNATURE
-from ephs.semantics.linear.dense import clear, copy
+from ephs.semantics.linear.dense import add_to, clear, copy
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -16,7 +16,7 @@ from ephs.semantics.stage import (
     staged,
 )
 from ephs.semantics.stage.reaching import Reached
-from ephs.solve.methods.places import Part, add_to, each_component, each_input
+from ephs.solve.methods.places import Part, each_component, each_input
 from ephs.solve.methods.records import (
     COMPONENT,
     IRREVERSIBLE,

@@ -19,13 +19,13 @@ stages it is 4).
 from collections.abc import Callable
 from typing import Final
 
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import add_to, copy
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.staged_groups import STAGED
 from ephs.semantics.spaces.vectors import apply, dot
 from ephs.semantics.stage import Evaluator, Integer, Integers, Matrix, Real, Truth, Vector, staged
 from ephs.solve.methods.moves import retract, somewhere
-from ephs.solve.methods.places import Part, add_to, each_component, each_row
+from ephs.solve.methods.places import Part, each_component, each_row
 from ephs.solve.methods.records import STORING, Columns, Dims, Scratch, StateRecord, row_of
 from ephs.solve.methods.residuals import evaluated
 from ephs.solve.methods.scales import rest

@@ -19,9 +19,9 @@ Point = tuple[float, float]
 SPLIT = 0.5 * (3.0 - 5.0**0.5)
 """Where an interval is divided: by the golden section, so that points do not fall in with periods."""
 MARGIN = 3.0
-"""How many times as far as two points within say a function may bend."""
+"""Factor on the distance of two inner points from the chord, within which a function is taken to stay."""
 MOST_SPLITS, MOST_CALLS = 4, 100
-"""How often a step is divided, and how often a function is called within it, where it does not come to rest."""
+"""Bounds of the divisions of a step, and of the calls of a function within it."""
 
 
 @final
@@ -184,7 +184,7 @@ class _Look:
     inside: Callable[[float], Mapping[Path, Array]]
 
     def points(self, first: Point, last: Point) -> list[Point]:
-        """Times and values from the first to the last, between each two of which it crosses zero once at most.
+        """Times and values from the first to the last: as far as bends tell, one zero at most between each two.
 
         Two points within say how far the function bends from its chord. Where more than that could lead it to zero and
         back, or make it turn where it crosses, there are more points.

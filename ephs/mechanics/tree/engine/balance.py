@@ -8,7 +8,7 @@ Where momenta are kept, too, islands are first moved rigidly to those that they 
 `ephs.mechanics.road.rigid`; n is then without the rigid motions, and positions are also moved along these, as
 the momenta turn them by themselves.
 
-What is then still missing is left to what is attached, see `ephs.mechanics.tree.engine.balance`.
+The remaining difference of energy goes to attached states, see `store_attached`.
 """
 
 from dataclasses import dataclass, replace
