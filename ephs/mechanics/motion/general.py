@@ -12,12 +12,11 @@ from ephs.mechanics.scene.geometry import JointCoupling
 from ephs.mechanics.tree.finding.frames import GROUND, Frames, Link, LinkJoint
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.descriptor import Input
 from ephs.semantics.spaces import SE3
 from ephs.semantics.spaces.decompositions import pseudoinverse, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT
-from ephs.solve.equations.instant import instant
 from ephs.solve.posing.motion_law import MotionLaw
+from ephs.solve.result.ports import rates_at
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.threads import in_one_thread
 
@@ -60,11 +59,9 @@ class GeneralMotion:
             for link, twist in zip(self._frames.links, self._projected[0], strict=True)
             if link.momentum is not None
         ]
-        d, given = problem.descriptor, self._solution.inputs
+        d = problem.descriptor
         for k in range(len(self._solution)):
-            state = self._solution.state_at(k) | {path: rows[k] for path, rows in momenta}
-            inputs = {port: Input(given[port].values[k], one.effort) for port, one in problem.signals.items()}
-            found = instant(d, problem.reference, d.pack(state), inputs)
+            found = rates_at(self._solution, k, self._solution.state_at(k) | {path: rows[k] for path, rows in momenta})
             out[:, k] = [found.multiplier(d.components[joint.relation].path) for joint in joints]
         return out
 

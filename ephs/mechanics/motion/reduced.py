@@ -25,7 +25,6 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
 from ephs.solve.posing.errors import OptionError, SolveError
-from ephs.solve.posing.motion_law import MotionLaw
 from ephs.solve.posing.problem import Problem, Signal
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.threads import in_one_thread
@@ -190,12 +189,15 @@ def motion_of(solution: Solution) -> ByPath:
 
 
 def _at_rest(problem: Problem) -> Problem:
-    """The problem with zeros for other inputs that change: their values are known at the kept instants alone."""
+    """The problem with zeros for flows that change: their values are known at the kept instants alone.
+
+    Efforts stay, since a rate that follows a function has no form in joint coordinates.
+    """
     return replace(
         problem,
         signals={
             path: one
-            if one.constant or isinstance(one.value, MotionLaw)
+            if one.constant or one.effort
             else Signal(np.zeros(problem.system.interface[path].quantity.space.dim), one.effort)
             for path, one in problem.signals.items()
         },

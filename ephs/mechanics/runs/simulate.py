@@ -90,7 +90,7 @@ def simulate(
         Limits of chosen steps in s, and of the number of steps.
     save_at
         Times at which to save the solution, each reached by a shorter step from the same start (radau on systems: by
-        its collocation polynomial); None saves every step.
+        its collocation polynomial, where no prescribed effort changes); None saves every step.
     form
         ``"paper"``: the flat system, for natural methods; ``"folded"``: the same without transformers and the
         junctions behind them, for natural methods; ``"reduced"``, the default: the smallest form of the method.

@@ -10,25 +10,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias, final
 
-import numpy as np
-
 from ephs.operad import Path
-from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.derive import relations
-from ephs.semantics.derive.charts import moved
-from ephs.semantics.derive.tape import evaluate
+from ephs.semantics.descriptor.curvature import curvature
 from ephs.semantics.meaning.base import BasePoint
 from ephs.semantics.meaning.components import efforts_of, largest, rates_of
 from ephs.semantics.meaning.elimination import eliminated
 from ephs.semantics.meaning.fields import ROUNDED, Row
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import ONE, RelationVariable
-from ephs.semantics.primitives.differences import slope
-from ephs.semantics.primitives.primitives import Point, Primitive, Storage
+from ephs.semantics.primitives.primitives import Primitive, Storage
 from ephs.semantics.spaces.rank import DIFFERENCE
-from ephs.semantics.stage.duals import Duals
-from ephs.semantics.stage.numbers import Real
-from ephs.semantics.stage.plain import PLAIN
 
 Labelled: TypeAlias = "tuple[str, Path, Row[Any]]"
 """Origin of an equation (``flow`` or ``effort`` of a junction, or ``component``), its path, and the row."""
@@ -149,8 +140,10 @@ def _lasting(fibre: Fibre, point: BasePoint) -> LinearRelation:
 def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[RelationVariable, Row[Any]]:
     """H″ by rows: of each effort at a storage's ports, minus its change with the rates of the states."""
     rates, efforts = rates_of(storage, path, point.names), efforts_of(storage, path)
-    hessian, error = curvature(storage, point.read(path, storage))
-    beside = error * largest(storage.bundle, largest(storage.bundle, hessian).T).T
+    hessian = curvature(storage, point.read(path, storage))
+    beside = (DIFFERENCE if storage.kernel is None else ROUNDED) * largest(
+        storage.bundle, largest(storage.bundle, hessian).T
+    ).T
     return {
         name: {
             rate: point.field.number(-entry, bound)
@@ -159,32 +152,3 @@ def _slopes(storage: Storage, path: Path, point: BasePoint) -> dict[RelationVari
         }
         for name, row, bounds in zip(efforts, hessian.tolist(), beside.tolist(), strict=True)
     }
-
-
-def curvature(storage: Storage, x: Point) -> tuple[Array, float]:
-    """H″ (n, n) in trivialised directions, of E(x exp(v) exp(w)) by w and v, with the relative error of its entries.
-
-    Exact derivatives of the recorded energy; else differences of the efforts.
-    """
-    kernel, n = storage.kernel, storage.bundle.size
-    if kernel is not None and isinstance(kernel.relation, relations.StorageStep):
-        tape, parameters = kernel.relation.energy, kernel.parameters[len(kernel.potentials) :]
-        first = Duals(PLAIN, n)
-        second = Duals(first, n)
-        along = [second.dual(first.along(0.0, i)) for i in range(n)]
-        by = [second.along(first.dual(0.0), i) for i in range(n)]
-        inputs: list[Real] = []
-        for port, (name, where, _) in zip(kernel.relation.ports, storage.bundle.items(), strict=True):
-            there = [second.dual(first.dual(value)) for value in x[name].tolist()]
-            span = slice(where.start, where.stop)
-            inputs += moved(second, port.code, moved(second, port.code, there, along[span]), by[span])
-        constants = [second.dual(first.dual(value)) for value in parameters[: tape.parameters]]
-        with np.errstate(all="ignore"):
-            (energy,) = evaluate(second, tape, inputs, constants)
-        slopes = [first.dual(each).slopes for each in second.dual(energy).slopes]
-        return np.array(slopes, dtype=float).reshape(n, n), ROUNDED
-
-    def effort(v: Array) -> Array:
-        return storage.effort(storage.retract(x, v), Reference())
-
-    return slope(effort, np.zeros(n)), DIFFERENCE

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from ephs.operad import Path
+from ephs.semantics.descriptor.curvature import curvature
 from ephs.solve.auditing.resolution import STILL
 from ephs.solve.auditing.rounding import trembling
-from ephs.solve.equations.instant import compliance_of
 from ephs.solve.equations.oscillations import oscillations
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _may_be(solution: "Solution", h: float) -> bool:
     stiff = light = 0.0
     for slot, storage in d.storages:
         if not storage.environment and slot.efforts:
-            size = float(np.abs(compliance_of(slot, storage, d, x, problem.reference)).sum(axis=1).max())
+            size = float(np.abs(curvature(storage, d.point(slot, x), problem.reference)).sum(axis=1).max())
             if all(parity[i] < 0 for i in slot.efforts):
                 light = max(light, size)
             else:

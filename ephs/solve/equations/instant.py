@@ -12,10 +12,10 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.bundles.extents import room
+from ephs.semantics.descriptor.curvature import curvature
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.linear.sums import uncancelled
-from ephs.semantics.primitives.primitives import Irreversible, Reversible, Storage
+from ephs.semantics.primitives.primitives import Irreversible, Reversible
 from ephs.semantics.spaces.decompositions import least_squares, svd
 from ephs.semantics.spaces.rank import ELIMINATION, IMPLICIT, SPANNED, TINY, rank_of
 
@@ -123,7 +123,7 @@ def instant(
     for slot, storage in d.storages:
         rates = np.array(rates_read(slot), dtype=int)
         balance[list(slot.efforts), rates] += 1.0
-        growth[np.ix_(rates, rates)] -= compliance_of(slot, storage, d, x, reference)
+        growth[np.ix_(rates, rates)] -= curvature(storage, d.point(slot, x), reference)
         growth[rates, [rise.start + i for i in slot.efforts]] += 1.0
     for slot in d.outer:
         if not given[slot.path].effort:
@@ -213,26 +213,6 @@ def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Arr
             np.add.at(out, list(slot.efforts), slot.primitive.flow(point, e, reference))
         elif isinstance(slot.primitive, Reversible):
             np.add.at(out, list(slot.efforts), slot.primitive.structure(point)[0] @ e)
-    return out
-
-
-def compliance_of(slot: ComponentSlot, storage: Storage, d: Descriptor, x: Array, reference: Reference) -> Array:
-    """∂(effort)/∂(state) of a storage, left-trivialised, by differences of fourth order within the states' domain."""
-    n = storage.bundle.size
-    if storage.kernel is not None and storage.kernel.name == "quadratic":
-        return np.array(storage.kernel.parameters).reshape(n, n)
-    point = d.point(slot, x)
-    out = np.zeros((n, n))
-    for port, where, quantity in storage.bundle.items():
-        h = 1e-3 * min(1.0, room(quantity, point[port]))
-        for i in range(where.start, where.stop):
-            along = np.zeros(n)
-            along[i] = h
-
-            def effort(steps: float, along: Array = along) -> Array:
-                return storage.effort(storage.retract(point, steps * along), reference)
-
-            out[:, i] = _difference(effort, h)
     return out
 
 

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.descriptor.curvature import curvature
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.spaces.decompositions import pseudoinverse, svd, symmetric_eigen
 from ephs.semantics.spaces.rank import CONSTRAINT, ELIMINATION, TINY, rank_of
-from ephs.solve.equations.instant import compliance_of, constraints_of, stored_efforts
+from ephs.solve.equations.instant import constraints_of, stored_efforts
 from ephs.solve.equations.sparse import Index
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.posing.problem import Problem
@@ -99,9 +100,9 @@ def _storages(
         if not storage.environment and slot.efforts:
             at = np.array(slot.efforts, dtype=np.int64)
             if moving[at].all():
-                kinetic.append((at, compliance_of(slot, storage, d, x, problem.reference)))
+                kinetic.append((at, curvature(storage, d.point(slot, x), problem.reference)))
             elif not moving[at].any():
-                springs.append((slot.path, at, compliance_of(slot, storage, d, x, problem.reference)))
+                springs.append((slot.path, at, curvature(storage, d.point(slot, x), problem.reference)))
     return kinetic, springs
 
 

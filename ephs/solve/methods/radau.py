@@ -11,6 +11,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import PLAIN
 from ephs.solve.equations.model import model_of
 from ephs.solve.march.iteration import FAST, iterate
@@ -100,11 +101,13 @@ class Radau:
         self.stores = HeatStores(self.model)
         self.equations = EnergyEquations(self.model, self.stores)
         self._given = self.model.input_values()
+        self._led = any(one.effort and not one.constant for one in problem.signals.values())
         self._passages = Passages(self.model, self.stores, self.equations.conduction)
         self._settling = Settling(self.model, self.stores.components)
         self._chosen = control.step is None
         self.scheme = radau_for(control.rtol.value if self._chosen else None)
         self.exponent = self.scheme.nodes.size + 1.0
+        self._tolerance = control.rtol.value
         self.rtol, self.atol = control.rtol.rates(problem.descriptor), control.atol.rates(problem.descriptor)
         self.counts: dict[str, Any] = dict.fromkeys(("iterations", "evaluations", "factorisations"), 0)
         self._rates = int(self.model.tables.counts[0])
@@ -170,6 +173,8 @@ class Radau:
         totals = self._totals(state, h, stages)
         error = self._error(state, h, stages, y)
         end, missed = self._end(state, h, 1.0, y, stages[-1].copy(), totals)
+        if self._led and state.h != 0.0:  # rates at a start are known to few digits
+            error = max(error, self._supplied_error(state, end, h, totals.powers[:, :4]))
         end = replace(end, stages=stages, h=h)
         made = (end.sums - state.sums)[4:][self._makers]
         self.counts["iterations"] += iterations
@@ -177,7 +182,9 @@ class Radau:
         return Attempt(state, end, h, max(error, missed), least, (stages, totals))
 
     def inside(self, attempt: Attempt[RadauState], t: float) -> RadauState:
-        """The state at a time within the step, by its collocation polynomial."""
+        """The state at a time within the step, by its collocation polynomial; by a step where efforts are led."""
+        if self._led:
+            return self.step(attempt.start, t - attempt.start.t).end
         stages, totals = attempt.detail
         start, h = attempt.start, attempt.h
         theta = (t - start.t) / h
@@ -337,6 +344,16 @@ class Radau:
         """The difference to the embedded method, filtered by the equations as the stiff part of it must be."""
         raw = h * (self.scheme.gamma * state.z[: self._rates] + self.scheme.defect @ stages[:, : self._rates])
         return _size(self._filtered(h, raw), self._allowed(state.y, y))
+
+    def _supplied_error(self, state: RadauState, end: RadauState, h: float, powers: Array) -> float:
+        """The same of heat, supply and entropy, relative to them or to what a step passes.
+
+        Of states that are led nothing else is an error: they are as they must be, however long the step.
+        """
+        raw = h * (self.scheme.gamma * self._known(state).sums[:4] + self.scheme.defect @ powers)
+        return _size(
+            raw, self._tolerance * np.maximum(np.abs(end.sums[:4]), abs(h) * np.abs(powers).max(axis=0)) + TINY
+        )
 
     def _filtered(self, h: float, changes: Array) -> Array:
         """Changes (…, states) with their stiff parts damped, so that what is algebraic allows them."""

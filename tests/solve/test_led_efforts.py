@@ -1,0 +1,120 @@
+"""Efforts that a function of time or of states leads: motion, heat and what flows at their ports, by closed forms."""
+
+import numpy as np
+import pytest
+
+import ephs
+from ephs import Pattern, junction, quantity
+from ephs import library as lib
+from ephs.solve.result import ports
+from tests.written import scene_of_text
+
+ROUNDED = 1e-9
+COIL = Pattern(
+    junctions={"b": junction(quantity.flux_linkage, exposed=True), "s": junction(quantity.entropy)},
+    boxes={"coil": {"b": "b"}, "wire": {"b": "b", "s": "s"}, "room": {"s": "s"}},
+)
+ARM = """
+format = 1
+name = "arm"
+[bodies.arm]
+mass = 2.0
+inertia = [0.1, 0.2, 0.3]
+position = [0.5, 0.0, 0.0]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "arm"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+motion = { amplitude = 0.7, frequency = 0.5 }
+"""
+
+
+def led(coil, current, until, **options):
+    """A coil with a wire of 1 Ω under a current that a function of time leads."""
+    system = COIL(coil=coil, wire=lib.resistor(r=1.0), room=lib.environment())
+    return ephs.simulate(system, until, inputs={"b": {"effort": current}}, method="radau", **options)
+
+
+@pytest.mark.parametrize("every", ["steps", "instants"])
+@pytest.mark.parametrize("omega", [1.0, 10.0, 100.0])
+def test_a_led_current_has_its_linkage_heat_and_voltage_whatever_its_frequency(omega, every):
+    rtol = 1e-6
+    save_at = None if every == "steps" else np.linspace(0.0, 5.0, 38)
+    sol = led(lib.inductor(l=2.0), lambda t: np.sin(omega * t), 5.0, rtol=rtol, save_at=save_at)
+    t, here = sol.t, sol.port("b")
+    heat = 0.5 * (t - np.sin(2.0 * omega * t) / (2.0 * omega))
+    assert np.allclose(sol["coil.b"].ravel(), 2.0 * np.sin(omega * t), atol=ROUNDED)
+    assert np.allclose(sol.heat, heat, rtol=rtol, atol=rtol * heat[-1])
+    assert np.allclose(sol.work, heat + 2.0 * 0.5 * np.sin(omega * t) ** 2, rtol=rtol, atol=rtol * heat[-1])
+    voltage = 2.0 * omega * np.cos(omega * t) + np.sin(omega * t)
+    assert np.allclose(here.flow[:, 0], voltage, atol=ports.DOUBTED * np.abs(voltage).max())
+    assert np.allclose(here.power, voltage * np.sin(omega * t), atol=ports.DOUBTED * np.abs(voltage).max())
+
+
+def voltage_error(knee):
+    """Error of the voltage of a coil that saturates at a linkage, relative; the current reaches it."""
+    rtol, most = 1e-8, 0.5 * knee
+    sol = led(lib.saturating_inductor(l=2.0, knee=knee), lambda t: most * np.sin(t), 3.0, rtol=rtol, atol=1e-10 * knee)
+    current, linkage = most * np.sin(sol.t), knee * np.arcsinh(np.sin(sol.t))
+    exact = most * np.cos(sol.t) * 2.0 / np.cosh(linkage / knee) + current
+    return np.abs(sol.port("b").flow[:, 0] - exact).max() / np.abs(exact).max()
+
+
+@pytest.mark.parametrize("knee", [1e2, 1.0, 1e-2, 1e-4])
+def test_the_voltage_of_a_coil_that_saturates_is_right_at_every_size(knee):
+    assert voltage_error(knee) < 1e-6
+
+
+def test_another_curvature_of_its_energy_would_show(monkeypatch):
+    from ephs.solve.equations import instant
+
+    exact = instant.curvature
+    monkeypatch.setattr(instant, "curvature", lambda *given: 1.01 * exact(*given))
+    assert voltage_error(1.0) > 1e-3
+
+
+def test_an_effort_that_reads_states_rises_with_them():
+    """The current of one coil leads that of another: b₁ = e^{−t/2}, b₂ = 3 b₁²."""
+    pattern = Pattern(
+        junctions={
+            "a": junction(quantity.flux_linkage), "b": junction(quantity.flux_linkage, exposed=True),
+            "s": junction(quantity.entropy),
+        },
+        boxes={"one": {"b": "a"}, "wire": {"b": "a", "s": "s"}, "two": {"b": "b"}, "room": {"s": "s"}},
+    )  # fmt: skip
+    system = pattern(one=lib.inductor(l=2.0), wire=lib.resistor(r=1.0), two=lib.inductor(l=3.0), room=lib.environment())
+    sol = ephs.simulate(
+        system, 2.0, initial={"one.b": 1.0, "two.b": 3.0}, method="radau", rtol=1e-9, atol=1e-9,
+        inputs={"b": {"effort": lambda t, state: state["one.b"] ** 2}},
+    )  # fmt: skip
+    assert np.allclose(sol["two.b"].ravel(), 3.0 * np.exp(-sol.t), atol=1e-8)
+    assert np.allclose(sol.port("b").flow[:, 0], -3.0 * np.exp(-sol.t), atol=1e-6)
+
+
+def test_an_effort_that_turns_at_an_instant_has_no_voltage_there():
+    sol = led(
+        lib.inductor(l=2.0),
+        lambda t: abs(t - 0.5),
+        1.0,
+        save_at=np.linspace(0.0, 1.0, 5),
+        initial={"coil.b": 1.0},
+        jumps=[0.5],
+    )
+    flow = sol.port("b").flow[:, 0]
+    assert np.isnan(flow[2])
+    assert np.allclose(flow[[0, 1, 3, 4]], [-1.5, -1.75, 2.25, 2.5], atol=1e-6)
+
+
+def test_a_joint_that_a_function_leads_has_the_rates_and_wrenches_of_its_law():
+    scene = scene_of_text(ARM)
+    law, inertia = scene.joint("pin").motion, 0.3 + 2.0 * 0.5**2
+    errors = []
+    for step in (0.02, 0.01):
+        given = {"drives.pin": {"effort": lambda t: [law.rate(t)]}}
+        sol = ephs.simulate(scene.system(), 2.0, method="natural", step=step, inputs=given)
+        joint = sol.joint("joints.pin")
+        rate, moment = np.array([[law.rate(t), inertia * law.acceleration(t)] for t in sol.t]).T
+        errors.append(np.abs(joint.rate[:, 0] - rate).max())
+        assert np.allclose(joint.wrench[:, 2], moment, atol=ports.DOUBTED * np.abs(moment).max())
+    assert errors[1] < 0.3 * errors[0] < 0.01  # of order two
