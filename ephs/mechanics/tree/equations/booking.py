@@ -52,7 +52,7 @@ class Booking:
         work: float,
         *,
         missed: Array | None = None,
-        refused: bool = True,
+        stages: tuple[Array, Array, Array] | None = None,
     ) -> "ReducedState":
         """The end of a step with heats and totals, see `Heats`, by sums that lose nothing to rounding.
 
@@ -65,8 +65,8 @@ class Booking:
             than is lost.
         work
             By what drives, in J over the step.
-        refused
-            Whether a step is refused in which a component loses entropy.
+        stages
+            As of `Heats.taken`.
 
         Raises
         ------
@@ -76,9 +76,8 @@ class Booking:
         eq, heats = self._equations, self._equations.heats
         start = eq.accounts.opened(start)
         flows = heats.booked(flows, missed, self._lost(start, end, flows, work))
-        change, made = heats.taken(start.heats, flows)
-        if refused:
-            self._refuse(made, flows, start, end)
+        change, made = heats.taken(start.heats, flows, stages)
+        self._refuse(made, flows, start, end)
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
         change = np.where(heats.plain, end.heats - start.heats, change)
         sums, at = np.concatenate([start.heats, start.totals]), start.heats.size
