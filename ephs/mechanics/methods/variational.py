@@ -73,6 +73,8 @@ class Variational(ReducedMethod):
         self._rows = equations.dense.residual.m + int(t.driven.sum())
         self._matrix: Array | None = None
         self._guess: tuple[Array, Array] | None = None
+        self._bounds: tuple[Attempt[ReducedState], Attempt[ReducedState]] | None = None  # of a part of a step
+        self._low: Attempt[ReducedState] | None = None  # the last part
         self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0, "keep": keep}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
@@ -101,7 +103,11 @@ class Variational(ReducedMethod):
             second = least_squares(rows.T, impulse, part=CONSTRAINT)[: self._driven.size]
             first = push[: self._driven.size]
             work += float(first @ state.r[self._driven] + second @ closed.r[self._driven])
-        closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
+        passed, between = h * flows, None
+        if self._bounds is not None:
+            passed = eq.heats.between(passed, *(each.detail for each in self._bounds))
+            between = self._bounds[0].end, self._bounds[1].end
+        closed = eq.booking.step(state, closed, passed, work, missed=np.zeros(passed.size), between=between)
         if self._keep == "momentum":
             eq.row(closed)  # which refuses an end without an energy: steps ask for forces in their middle
         else:
@@ -109,7 +115,28 @@ class Variational(ReducedMethod):
                 state, closed, h, np.full(eq.counted.size, np.inf), chosen=False, alone=True
             )
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
-        return Attempt(state, closed, h, 0.0, eq.least(state, closed))
+        return Attempt(state, closed, h, 0.0, eq.least(state, closed), passed)
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """A shorter step from the same start, in which heat is between that of the instant before and of the whole.
+
+        Its matrix is larger as it is shorter; that of the steps stays.
+        """
+        start, h, kept = attempt.start, t - attempt.start.t, (self._matrix, self._guess)
+        low = Attempt(start, start, 0.0, 0.0, 0.0, np.zeros(attempt.detail.size))
+        if self._low is not None and self._low.start is start and abs(self._low.h) <= abs(h):
+            low = self._low
+        self._bounds = low, attempt
+        if self._matrix is not None:
+            self._matrix = self._matrix * (attempt.h / h)
+        try:
+            self._low = self.step(start, h)
+        except SolveError:
+            self._bounds = None
+            return super().inside(attempt, t)
+        finally:
+            self._bounds, (self._matrix, self._guess) = None, kept
+        return self._low.end
 
     def taken(self, state: ReducedState) -> Snapshot:
         """The matrix, and the guess of the next step."""

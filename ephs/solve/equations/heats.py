@@ -183,6 +183,15 @@ class Heats:
             out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
         return out
 
+    def between(self, flows: Array, low: Array, high: Array) -> Array:
+        """Flows of a part of a step, those of friction and conduction between what a shorter part and the whole pass.
+
+        So heat does not fall from instant to instant within a step.
+        """
+        held = self._source >= 0
+        held[self.frictions] = True
+        return np.where(held, np.clip(flows, np.minimum(low, high), np.maximum(low, high)), flows)
+
     def most(self, heats: Array, flows: Array) -> Array:
         """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
         cold = 1.0 / self.temperatures(heats)
@@ -243,6 +252,19 @@ class Heats:
         rest, size = float((whole - parts)[stored].sum()), float(np.abs(parts[stored]).sum())
         shared = parts + np.abs(parts) * rest / max(size, TINY)
         return np.where(stored, shared, whole) if abs(rest) < TRUSTED * size else whole
+
+
+def held_between(made: Array, low: Array, high: Array) -> Array:
+    """Entropies (components,) made in a part of a step, with their sum, each between those of a shorter part and of the
+    whole, if their sums allow that."""
+    held = np.clip(made, np.minimum(low, high), np.maximum(low, high))
+    rest = float((made - held).sum())
+    room = (high if rest * float((high - low).sum()) > 0.0 else low) - held
+    whole = float(room.sum())
+    share = rest / whole if whole else np.inf
+    if rest == 0.0:
+        return held
+    return held + room * share if 0.0 < share <= 1.0 else made
 
 
 def _end_values(values: Array, ends: Index) -> Array:
