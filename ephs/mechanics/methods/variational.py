@@ -71,7 +71,8 @@ class Variational(ReducedMethod):
         read = equations.reduced.attaching.bent >= equations.n
         self._bent = bool(np.any((t.kind == CUT) & (np.maximum(t.spring, t.several) >= 0)) or np.any(read))
         self._rows = equations.dense.residual.m + int(t.driven.sum())
-        self._matrix: Array | None = None
+        self._matrix: Array | None = None  # of a step of this length in s: it is larger as a step is shorter
+        self._length = 0.0
         self._guess: tuple[Array, Array] | None = None
         self._bounds: tuple[Attempt[ReducedState], Attempt[ReducedState]] | None = None  # of a part of a step
         self._low: Attempt[ReducedState] | None = None  # the last part
@@ -81,6 +82,9 @@ class Variational(ReducedMethod):
         """One step of h seconds."""
         eq = self.equations
         n = eq.n
+        if self._matrix is not None and self._length not in (0.0, h):
+            self._matrix = self._matrix * (self._length / h)
+        self._length = h
         momentum = eq.mass(state.q, state.r) @ state.r
         before = eq.rows() if self._rows else np.zeros((0, n))
         xi = h * (self._guess[1] if self._guess is not None and self._guess[0] is state.q else state.r)
@@ -120,32 +124,30 @@ class Variational(ReducedMethod):
     def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
         """A shorter step from the same start, in which heat is between that of the instant before and of the whole.
 
-        Its matrix is larger as it is shorter; that of the steps stays.
+        The matrix of the steps stays.
         """
-        start, h, kept = attempt.start, t - attempt.start.t, (self._matrix, self._guess)
+        start, h, kept = attempt.start, t - attempt.start.t, (self._matrix, self._length, self._guess)
         low = Attempt(start, start, 0.0, 0.0, 0.0, np.zeros(attempt.detail.size))
         if self._low is not None and self._low.start is start and abs(self._low.h) <= abs(h):
             low = self._low
         self._bounds = low, attempt
-        if self._matrix is not None:
-            self._matrix = self._matrix * (attempt.h / h)
         try:
             self._low = self.step(start, h)
         except SolveError:
             self._bounds = None
             return super().inside(attempt, t)
         finally:
-            self._bounds, (self._matrix, self._guess) = None, kept
+            self._bounds, (self._matrix, self._length, self._guess) = None, kept
         return self._low.end
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """The matrix, and the guess of the next step."""
+        """The matrix and the length of its step, and the guess of the next step."""
         guess = self._guess[1] if self._guess is not None and self._guess[0] is state.q else None
-        return {"matrix": self._matrix, "guess": guess}
+        return {"matrix": self._matrix, "length": self._length, "guess": guess}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        self._matrix = own["matrix"]
+        self._matrix, self._length = own["matrix"], own.get("length", 0.0)
         self._guess = None if own["guess"] is None else (state.q, own["guess"])
 
     def _solved(

@@ -190,10 +190,10 @@ def test_within_steps_of_the_variational_method_no_component_loses_heat_or_entro
 
 
 def test_parts_of_a_step_alone_may_lose_what_the_whole_has_not(monkeypatch):
-    """The control; the matrix of steps is none of those that are twenty times shorter."""
+    """The control."""
     monkeypatch.delattr(Variational, "inside")
-    sol, steps = within("energy")
-    assert np.diff(sol.heat).min() < -1e-5 and largest(sol.heat - np.interp(sol.t, steps.t, steps.heat)) > 1e3
+    sol, _ = within("energy")
+    assert np.diff(sol.heat).min() < -1e-5
 
 
 @given(st.lists(st.tuples(*[st.floats(0.01, 1.0)] * 3), min_size=1, max_size=4))
