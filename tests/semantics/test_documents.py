@@ -24,7 +24,10 @@ from ephs.mechanics import (
     stabilised,
     tendon,
 )
+from ephs.mechanics.elements.beam import hinge_damper
 from ephs.mechanics.elements.catalogue import PARTS
+from ephs.mechanics.elements.components import pair_spring
+from ephs.mechanics.elements.joints import between_frames
 from ephs.mechanics.elements.shell.system import shell_system
 from ephs.operad import Path
 from ephs.operad.documents import SCHEMA_FILE as PATTERN_SCHEMA
@@ -34,6 +37,7 @@ from ephs.semantics.derive.recording import record as recording
 from ephs.semantics.documents.catalogue import find_part, part_of
 from ephs.semantics.documents.primitives import AGREEMENT, _evaluations
 from ephs.semantics.documents.systems import SCHEMA_FILE
+from ephs.semantics.spaces import SE3, pair
 from ephs.semantics.symbols.terms import DEPTH, OPERATIONS, WrittenFunction, record, recorded, term_from
 from ephs.testing import systems
 from tests.numerics import largest
@@ -188,6 +192,13 @@ MECHANICS = [
         rest=[0.1, 0.0, 0.2, 1.0, 0.0, 0.1],
         damping=0.1,
         expands=True,
+    ),
+    between_frames(
+        SE3.identity(),
+        SE3.identity(),
+        pair_spring(pair("spherical"), np.array([0.8, 1.0, 2.0]), np.zeros(3)),
+        hinge_damper(np.diag([0.1, 0.2, 0.4])),
+        kind="spherical",
     ),
     shell_system(Shell.of(SQUARE, [[0, 1, 2, 3]], ShellSection.isotropic(0.1, E=1e3, rho=1.0)), damping=0.1),
     *(tendon([([0, 0, 0], [0, 0, 1.0])], 3.0, 1.0, slack=slack) for slack in (False, True)),

@@ -7,11 +7,23 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.explicit import tableau
-from ephs.semantics.stage import Entry, Evaluator, Integer, Program, Real, Vector, integer, kind_of, table, vector
+from ephs.semantics.stage import (
+    Entry,
+    Evaluator,
+    Integer,
+    Matrix,
+    Program,
+    Real,
+    Vector,
+    integer,
+    kind_of,
+    table,
+    vector,
+)
 from ephs.solve.march.account import RunAccount
 from ephs.solve.march.control import DAMPING, STRICT
 from ephs.solve.march.march import march
-from ephs.solve.march.memory import Memory
+from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.records import Ending, MarchControl, Motion, TableauRecord
 
 
@@ -63,7 +75,7 @@ class Field(Motion):
     def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
         return 0.0
 
-    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
+    def book(self, on: Evaluator, tableau: TableauRecord, k: Matrix, h: Real, totals: Totals) -> Integer:
         return 0
 
     def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:

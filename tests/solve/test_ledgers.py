@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 import ephs
+from ephs import Pattern, junction, library, quantity
+from ephs.operad import Path
 from ephs.show.plots.flows import exergy_bands
 from examples import oscillator, physics
 from examples.failing import pendulum
-from tests.numerics import largest
+from tests.numerics import EPS, largest
+from tests.scenes import shipped
 
 START = {"stator.tc.s": 1.0, "rotor.tc.s": 1.0, "stator.coil.b": 0.3}
 
@@ -121,3 +124,41 @@ def test_the_defect_of_steps_is_no_supply():
     parts = np.sum([part.energy_supplied for part in whole.parts.values()], axis=0)
     assert np.allclose(parts, whole.energy_supplied + whole.defect, atol=1e-12)
     assert "defect" in str(whole)
+
+
+def test_fields_of_permanent_magnets_are_not_kinetic():
+    """A motor that starts from rest has no kinetic energy; its magnet's field, which stays, is potential."""
+    sol = ephs.simulate(shipped("motor-four-bar"), 0.02, method="rk54")
+    storages = sol.ledgers.storages
+    field = storages[Path.of("motors.drive.field")]
+    assert sol.kinetic[0] == 0.0 and field[0] > 0.0 and np.array_equal(field, np.full(len(sol), field[0]))
+    moving = sum(values for path, values in storages.items() if {"ke", "coil", "rotor", "armatures"} & set(path))
+    assert np.allclose(sol.kinetic, moving, rtol=4.0 * EPS, atol=0.0)
+    assert sol.energy_error.max() < 1e-13
+
+
+@pytest.mark.parametrize("exposed", [False, True])
+@pytest.mark.parametrize("beside", [{}, {"load": library.resistor(r=1.0)}], ids=["alone", "with a load"])
+def test_a_flux_that_something_acts_on_is_kinetic(beside, exposed):
+    """The control; what stores momentum moves, even if nothing acts on it."""
+    held = {
+        "coil": (library.inductor(l=2.0), quantity.flux_linkage),
+        "mass": (library.point_mass(m=2.0), quantity.momentum),
+    }
+    found = {}
+    for name, (storage, kind) in held.items():
+        loads = beside if name == "coil" else {}
+        (port,) = storage.interface
+        boxes = {name: {port: "j"}} | {load: {"b": "j", "s": "s"} for load in loads}
+        outer = {"s": junction(quantity.entropy)} if loads else {}
+        heat = {"env": library.environment()} if loads else {}
+        boxes |= {env: {"s": "s"} for env in heat}
+        pattern = Pattern({"j": junction(kind, exposed=exposed)} | outer, boxes)
+        given = {"j": {"flow": 0.0}} if exposed else None
+        system = pattern(**{name: storage}, **loads, **heat)
+        sol = ephs.simulate(
+            system, 0.1, step=0.05, initial={f"{name}.{port}": 2.0}, method="radau", audit="off", inputs=given
+        )
+        found[name] = sol.kinetic[0], sol.potential[0]
+    assert found["mass"] == (1.0, 0.0)
+    assert found["coil"] == ((1.0, 0.0) if beside or exposed else (0.0, 1.0))

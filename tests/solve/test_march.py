@@ -67,7 +67,7 @@ class Pendulum(Motion):
     def rounding(self, on, anchor, y):
         return 0.0
 
-    def book(self, on, y0, change, size, sign):
+    def book(self, on, tableau, k, h, totals):
         return 0
 
     def hold(self, on, change, low, high):

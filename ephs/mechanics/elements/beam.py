@@ -18,7 +18,7 @@ import numpy as np
 
 from ephs.mechanics.elements import components, notation
 from ephs.mechanics.elements.joints import between_frames
-from ephs.mechanics.elements.strain import ORDERS, strain_energy, strain_resistance, stretching
+from ephs.mechanics.elements.strain import ORDERS, strain_energy, strain_resistance, stretching, turning_resistance
 from ephs.operad import Directory, Path, PortType, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import StructureError
@@ -160,6 +160,28 @@ def beam_damper(length: float, stiffness: Array, rest: Array, damping: float, or
         shown=lambda: structures.dissipation_proof(ports, None),
         trusted=True,
     )
+    return replace(made, notation=notation.friction)
+
+
+def hinge_damper(friction: Array) -> Irreversible:
+    """Friction D (3, 3) of a spherical joint on the rate of its rotation vector; ports p_r, s, reads q_r.
+
+    With a multiple of the stiffness it is the Kelvin–Voigt damping of a rod whose pieces meet there. On the angular
+    velocity, in the axes of one body, it would depend on which body is named first where D differs by axis.
+    """
+    d, q_r, of = np.asarray(friction, dtype=float).reshape(3, 3), Path.of("q_r"), "spherical"
+    ports = Directory(
+        {
+            "p_r": PortType(quantity.joint_momentum(of), True),
+            "s": PortType(quantity.entropy, True),
+            "q_r": PortType(quantity.relative_pose(of), False),
+        }
+    )
+    made = structures.dissipation(
+        "hinge_damper", ports, lambda x, _u, _theta: turning_resistance(x[q_r], d),
+        parameters=(("mu", tuple(d.ravel().tolist())),), shown=lambda: structures.dissipation_proof(ports, None),
+        trusted=True,
+    )  # fmt: skip
     return replace(made, notation=notation.friction)
 
 

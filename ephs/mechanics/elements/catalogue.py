@@ -114,6 +114,7 @@ PARTS: tuple[LibraryPart, ...] = (
     LibraryPart("frame_change", "frame_change", _frame_change),
     LibraryPart("gravity", "gravity", lambda ports, numbers: components.gravity(numbers["weight"], _group(ports))),
     LibraryPart("ground", "ground", lambda ports, _: components.ground(next(iter(ports.values())).quantity)),
+    LibraryPart("hinge_damper", "hinge_damper", lambda _, n: beam.hinge_damper(np.array(n["mu"]))),
     LibraryPart("holonomic", "holonomic", lambda ports, _: components.holonomic(_pair(ports, "q_r"))),
     LibraryPart("joint_friction", "joint_friction", _friction),
     LibraryPart("kinematic_coupling", "pkc", _coupling),

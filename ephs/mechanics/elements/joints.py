@@ -195,19 +195,21 @@ def between_frames(
     *,
     heat: bool = False,
     stretch: Reversible | None = None,
+    kind: str = "free",
+    driven: bool = False,
 ) -> System:
-    """Energy and loss of the relative pose of two frames: a free joint with this storage and this friction.
+    """Energy and loss of the relative pose of two frames: a joint, free unless said, with this storage and friction.
 
     Parameters
     ----------
     frame1, frame2
         (7,) poses in bodies 1 and 2.
     energy, loss
-        Ports q_r, and p_r, s and perhaps q_r, of the free pair.
+        Ports q_r, and p_r, s and perhaps q_r, of the joint's pair.
     stretch
         Ports p_r, e and state port q_r: of a length that leaves through the port e.
     """
-    return _joint(pair("free"), frame1, frame2, energy, loss, heat, False, stretch)
+    return _joint(pair(kind), frame1, frame2, energy, loss, heat, driven, stretch)
 
 
 def universal_joint(

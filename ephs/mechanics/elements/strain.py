@@ -19,6 +19,7 @@ import numpy as np
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.special import squared_turn, turn_curve, turn_curve_slope, turn_ratio
 from ephs.semantics.spaces import SE3
+from ephs.semantics.spaces.decompositions import symmetric_eigen
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 
 ORDERS = (2, 4)
@@ -51,6 +52,17 @@ def strain_resistance(pose: Any, length: float, stiffness: Array, rest: Array, d
         [scale * _sum(a * b / pivot for a, b, pivot in zip(one, other, pivots, strict=True)) for other in columns]
         for one in columns
     ]
+
+
+def turning_resistance(turn: Any, friction: Array) -> Any:
+    """(3, 3) resistance T⁻ᵀ D T⁻¹ of a rotation to its angular velocity: D (3, 3) to the rate of its rotation vector,
+    which is the same, but for its sign, from both sides.
+    """
+    sizes, axes = symmetric_eigen(friction)
+    rate = [row[:3] for row in logarithm_rate([*(turn[i] for i in range(4)), 0.0, 0.0, 0.0])[:3]]
+    weighed = np.sqrt(np.maximum(sizes, 0.0)) * axes
+    rows = [[_sum(weighed[i, k] * rate[i][j] for i in range(3) if weighed[i, k]) for j in range(3)] for k in range(3)]
+    return [[_sum(row[i] * row[j] for row in rows) for j in range(3)] for i in range(3)]
 
 
 def stretching(pose: Any, length: float, rest: Array) -> list[Any]:

@@ -85,8 +85,10 @@ class Implicit(ReducedMethod):
         y1[: stages.shape[1]] += stages[-1]
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
-        passed, allowed = h * (self.scheme.coefficients[-1] @ passed), self._stages.allowed(y0, y1)
-        closed = eq.booking.step(state, closed, passed[2:], float(passed[1]))
+        weights, allowed = h * self.scheme.coefficients[-1], self._stages.allowed(y0, y1)
+        energies = state.heats + stages[:, self._stages.heat]
+        (_, work), flows = np.split(weights @ passed, [2])
+        closed = eq.booking.step(state, closed, flows, work, stages=(weights, energies, passed[:, 2:]))
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))

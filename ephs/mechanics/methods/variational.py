@@ -71,14 +71,20 @@ class Variational(ReducedMethod):
         read = equations.reduced.attaching.bent >= equations.n
         self._bent = bool(np.any((t.kind == CUT) & (np.maximum(t.spring, t.several) >= 0)) or np.any(read))
         self._rows = equations.dense.residual.m + int(t.driven.sum())
-        self._matrix: Array | None = None
+        self._matrix: Array | None = None  # of a step of this length in s: it is larger as a step is shorter
+        self._length = 0.0
         self._guess: tuple[Array, Array] | None = None
+        self._bounds: tuple[Attempt[ReducedState], Attempt[ReducedState]] | None = None  # of a part of a step
+        self._low: Attempt[ReducedState] | None = None  # the last part
         self.counts: dict[str, Any] = {"iterations": 0, "jacobians": 0, "keep": keep}
 
     def step(self, state: ReducedState, h: float) -> Attempt[ReducedState]:
         """One step of h seconds."""
         eq = self.equations
         n = eq.n
+        if self._matrix is not None and self._length not in (0.0, h):
+            self._matrix = self._matrix * (self._length / h)
+        self._length = h
         momentum = eq.mass(state.q, state.r) @ state.r
         before = eq.rows() if self._rows else np.zeros((0, n))
         xi = h * (self._guess[1] if self._guess is not None and self._guess[0] is state.q else state.r)
@@ -101,7 +107,11 @@ class Variational(ReducedMethod):
             second = least_squares(rows.T, impulse, part=CONSTRAINT)[: self._driven.size]
             first = push[: self._driven.size]
             work += float(first @ state.r[self._driven] + second @ closed.r[self._driven])
-        closed = eq.booking.step(state, closed, h * flows, work, missed=np.zeros(flows.size))
+        passed, between = h * flows, None
+        if self._bounds is not None:
+            passed = eq.heats.between(passed, *(each.detail for each in self._bounds))
+            between = self._bounds[0].end, self._bounds[1].end
+        closed = eq.booking.step(state, closed, passed, work, missed=np.zeros(passed.size), between=between)
         if self._keep == "momentum":
             eq.row(closed)  # which refuses an end without an energy: steps ask for forces in their middle
         else:
@@ -109,16 +119,35 @@ class Variational(ReducedMethod):
                 state, closed, h, np.full(eq.counted.size, np.inf), chosen=False, alone=True
             )
         self._guess = closed.q, closed.r + (closed.r - state.r) * 0.5
-        return Attempt(state, closed, h, 0.0, eq.least(state, closed))
+        return Attempt(state, closed, h, 0.0, eq.least(state, closed), passed)
+
+    def inside(self, attempt: Attempt[ReducedState], t: float) -> ReducedState:
+        """A shorter step from the same start, in which heat is between that of the instant before and of the whole.
+
+        The matrix of the steps stays.
+        """
+        start, h, kept = attempt.start, t - attempt.start.t, (self._matrix, self._length, self._guess)
+        low = Attempt(start, start, 0.0, 0.0, 0.0, np.zeros(attempt.detail.size))
+        if self._low is not None and self._low.start is start and abs(self._low.h) <= abs(h):
+            low = self._low
+        self._bounds = low, attempt
+        try:
+            self._low = self.step(start, h)
+        except SolveError:
+            self._bounds = None
+            return super().inside(attempt, t)
+        finally:
+            self._bounds, (self._matrix, self._length, self._guess) = None, kept
+        return self._low.end
 
     def taken(self, state: ReducedState) -> Snapshot:
-        """The matrix, and the guess of the next step."""
+        """The matrix and the length of its step, and the guess of the next step."""
         guess = self._guess[1] if self._guess is not None and self._guess[0] is state.q else None
-        return {"matrix": self._matrix, "guess": guess}
+        return {"matrix": self._matrix, "length": self._length, "guess": guess}
 
     def take(self, own: Snapshot, state: ReducedState) -> None:
         """Restore from a value of `taken`."""
-        self._matrix = own["matrix"]
+        self._matrix, self._length = own["matrix"], own.get("length", 0.0)
         self._guess = None if own["guess"] is None else (state.q, own["guess"])
 
     def _solved(

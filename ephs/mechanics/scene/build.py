@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.elements import components
-from ephs.mechanics.elements.beam import beam_stretch, elastic, thermoelastic
+from ephs.mechanics.elements.beam import beam_stretch, elastic, hinge_damper, thermoelastic
 from ephs.mechanics.elements.bodies import rigid_body
 from ephs.mechanics.elements.joints import between_frames, joint, universal_joint
 from ephs.mechanics.elements.motor import armature
@@ -25,6 +25,7 @@ from ephs.mechanics.scene.thermal import ThermalNode
 from ephs.operad import Junction, Path, Pattern, Quantity, junction, quantity
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.primitives.primitives import Storage
+from ephs.semantics.spaces import pair
 from ephs.semantics.systems.kept import once
 from ephs.semantics.systems.system import System
 from ephs.solve.posing.problem import Signal
@@ -246,14 +247,16 @@ def _level(scene: Scene, demands: Demands, *, top: bool) -> System:
 
     for name, body in scene.bodies.items():
         b.add(Path(["bodies", name]), made.body(body, scene.world.gravity), {"p": b.momentum(name)})
+    hinges = {name for beam in scene.beams.values() if beam.lengths for name in beam.joints}
     for name, j in scene.joints.items():
         ports = {"p1": b.momentum(j.body1), "p2": b.momentum(j.body2)}
         if j.heat != ENVIRONMENT:
             ports["s"] = b.entropy(j.heat)
         driven, expands = name in inner.joints, _expands(scene, j)
+        hinged = name in hinges and bool(np.any(j.friction))
         if expands:
             ports["e"] = b.join("lengthenings", j.heat, quantity.displacement)
-        system = made.joint(j, driven=driven, expands=expands)
+        system = made.joint(j, driven=driven, expands=expands, hinged=hinged)
         for port, (path, _) in zip(_RATES[j.middle is not None], drive_ports(j), strict=True) if driven else ():
             ports[port] = b.join("drives", str(Path(path[1:])), system.interface[Path.of(port)].quantity)
         b.add(Path(["joints", name]), system, ports)
@@ -306,12 +309,15 @@ class _SystemCache:
             self.systems[key] = rigid_body(of.mass, of.inertia, gravity, strict=False)
         return self.systems[key]
 
-    def joint(self, of: Joint, *, driven: bool, expands: bool = False) -> System:
-        """A joint's system; ``driven`` exposes its momentum, ``expands`` the lengthening of a beam's element."""
+    def joint(self, of: Joint, *, driven: bool, expands: bool = False, hinged: bool = False) -> System:
+        """A joint's system; ``driven`` exposes its momentum, ``expands`` the lengthening of a beam's element.
+
+        ``hinged``: it joins pieces of a rod, of which its friction is the damping.
+        """
         names = (each.name for each in fields(of) if each.name not in _NOT_OF_SYSTEM)
-        key = driven, expands, of.heat != ENVIRONMENT, *(_hashable(getattr(of, name)) for name in names)
+        key = driven, expands, hinged, of.heat != ENVIRONMENT, *(_hashable(getattr(of, name)) for name in names)
         if key not in self.systems:
-            self.systems[key] = _joint(of, driven=driven, expands=expands)
+            self.systems[key] = _joint(of, driven=driven, expands=expands, hinged=hinged)
         return self.systems[key]
 
 
@@ -321,7 +327,7 @@ def _hashable(value: Any) -> Hashable:
     return tuple(_hashable(getattr(value, each.name)) for each in fields(value)) if isinstance(value, Strain) else value
 
 
-def _joint(j: Joint, *, driven: bool, expands: bool) -> System:
+def _joint(j: Joint, *, driven: bool, expands: bool, hinged: bool) -> System:
     heat = j.heat != ENVIRONMENT
     if j.middle is not None:
         return universal_joint(j.frame1, j.middle, j.frame2, j.friction, j.stiffness, j.rest, heat=heat, driven=driven)
@@ -330,6 +336,9 @@ def _joint(j: Joint, *, driven: bool, expands: bool) -> System:
         parts = elastic(of.length, of.stiffness, of.rest, of.damping, of.order)
         stretch = beam_stretch(float(of.length), tuple(of.rest.tolist())) if expands else None
         return between_frames(j.frame1, j.frame2, *parts, heat=heat, stretch=stretch)
+    if hinged:
+        parts = components.pair_spring(pair(j.kind), j.stiffness, j.rest), hinge_damper(j.friction)
+        return between_frames(j.frame1, j.frame2, *parts, heat=heat, kind=j.kind, driven=driven)
     return joint(
         j.kind, j.frame1, j.frame2, j.friction, j.stiffness, j.rest, pitch=j.pitch, heat=heat, driven=driven,
         limits=j.limits, stop=j.stop, dry=j.dry,

@@ -186,6 +186,7 @@ class ExplicitTangent:
                 rates[part].append(tangent.stage[part].copy())
         for part in range(2):
             y[part][:], start[part][:] = start[part], first[part]
+            tangent.pairs["k"][part][:count] = rates[part]
         return tangent.settle(h)
 
     def _of_time(self, t: float) -> None:

@@ -1,8 +1,9 @@
 """Heat as energy: thermal storages advance by energy, and friction's heat is the energy lost by the motion.
 
 **Energies.** A storage of heat is advanced by the energy that it takes up, E = c1 (exp(s/c2) − 1); its entropy
-follows, with it the mean temperature θ̄ = ΔE/Δs of the step. A component makes flow · (1/θ̄ at its sink − 1/θ̄ at its
-source), so entropies change by what is made, to rounding, and friction never makes less than nothing.
+follows, with it the mean temperature θ̄ = ΔE/Δs of the step. With it components make flow · (1/θ̄ at the sink − 1/θ̄ at
+the source), so entropies change by what all make, to rounding, and friction never makes less than nothing. Of this sum
+each has the part that the temperatures at the method's stages say, see `Heats.taken`.
 
 **Friction.** The heat H of a step is a quadrature of powers, which says nothing of a motion that decays in the step.
 There D = E⁰ + W − E¹ of all that is not heat is right, where Radau IIA finds a hundredth of it at hλ = 2000 and the
@@ -22,6 +23,7 @@ from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.numbering import Index
 from ephs.semantics.primitives.primitives import Primitive, Storage
+from ephs.semantics.spaces.rank import TINY
 from ephs.solve.posing.errors import Outcome, SolveError
 
 EXPONENTIAL = 1e-12
@@ -31,6 +33,9 @@ LITTLE = 0.1
 rates instead would leave the slow motion of what friction holds."""
 LINEAR = 1e-8
 """Change of a temperature, relative, below which a series is taken: its square is below rounding."""
+TRUSTED = 0.5
+"""Part of what stages say that components made by which it may differ from the entropy of the stores: a step beyond
+that has other errors."""
 PLAIN = -2
 """In place of a component: a state of an attachment, which is integrated directly and not as energy."""
 
@@ -178,15 +183,34 @@ class Heats:
             out[k] = np.maximum(flows[k] - made, flows[k] + room * (np.sign(short) * min(1.0, abs(short) / whole)))
         return out
 
+    def between(self, flows: Array, low: Array, high: Array) -> Array:
+        """Flows of a part of a step, those of friction and conduction between what a shorter part and the whole pass.
+
+        So heat does not fall from instant to instant within a step.
+        """
+        held = self._source >= 0
+        held[self.frictions] = True
+        return np.where(held, np.clip(flows, np.minimum(low, high), np.maximum(low, high)), flows)
+
     def most(self, heats: Array, flows: Array) -> Array:
         """(components,) entropies in J/K that flows in J carry in and out of components, by their sizes."""
         cold = 1.0 / self.temperatures(heats)
         carried = np.abs(flows) * (_end_values(cold, self._sink) + _end_values(cold, self._source) + self._loose)
         return np.bincount(self._owners, carried, flows.size).astype(float)
 
-    def taken(self, heats: Array, flows: Array) -> tuple[Array, Array]:
+    def taken(
+        self, heats: Array, flows: Array, stages: tuple[Array, Array, Array] | None = None
+    ) -> tuple[Array, Array]:
         """Changes of energies in J by the flows of a step, those of other states not at all; and the entropy that each
         component made in J/K.
+
+        By mean temperatures of the step these sum up to the change of entropies, but each is of order two in the step.
+        Stages say each to the order of the method; what that misses in the sum is shared in proportion.
+
+        Parameters
+        ----------
+        stages
+            (stages,) weights in s, (stages, entropies) energies in J and (stages, flows) in W there.
 
         Raises
         ------
@@ -205,10 +229,44 @@ class Heats:
         small = np.abs(share) < LINEAR  # θ̄/θ = x / log(1 + x)
         ratio = np.where(small, 1.0 + 0.5 * share, share / np.log1p(np.where(small, 1.0, share)))
         cold = 1.0 / (theta * ratio)
-        made = flows * (_end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose)
+        made = flows * self._factors(cold)
+        if stages is not None:
+            made = self._shared(made, flows, *stages)
         return change, np.bincount(self._owners, made, flows.size).astype(float)
+
+    def _factors(self, cold: Array) -> Array:
+        """(..., flows) entropy that a flow makes by its energy, in 1/K, of 1/θ of the entropies."""
+        return _end_values(cold, self._sink) - _end_values(cold, self._source) + self._loose
+
+    def _shared(self, whole: Array, flows: Array, weights: Array, energies: Array, powers: Array) -> Array:
+        """(flows,) entropies made in J/K by stages, with the sum of those by mean temperatures."""
+        passed, parts = weights @ powers, weights @ (powers * self._factors(1.0 / self.temperatures(energies)))
+        k = self.frictions
+        same = passed[k] * flows[k] > 0.0  # friction's heat follows what the motion lost
+        parts[k] = np.where(same, parts[k] * flows[k] / np.where(same, passed[k], 1.0), whole[k])
+        alone = self._source >= 0  # else it may be one of several flows of a component
+        alone[k] = True
+        parts = np.where(alone & (parts * weights.sum() < 0.0), whole, parts)
+        nodes = self._nodes.astype(float)
+        stored = _end_values(nodes, self._sink) + _end_values(nodes, self._source) > 0.0
+        rest, size = float((whole - parts)[stored].sum()), float(np.abs(parts[stored]).sum())
+        shared = parts + np.abs(parts) * rest / max(size, TINY)
+        return np.where(stored, shared, whole) if abs(rest) < TRUSTED * size else whole
+
+
+def held_between(made: Array, low: Array, high: Array) -> Array:
+    """Entropies (components,) made in a part of a step, with their sum, each between those of a shorter part and of the
+    whole, if their sums allow that."""
+    held = np.clip(made, np.minimum(low, high), np.maximum(low, high))
+    rest = float((made - held).sum())
+    room = (high if rest * float((high - low).sum()) > 0.0 else low) - held
+    whole = float(room.sum())
+    share = rest / whole if whole else np.inf
+    if rest == 0.0:
+        return held
+    return held + room * share if 0.0 < share <= 1.0 else made
 
 
 def _end_values(values: Array, ends: Index) -> Array:
-    """Values of the entropies at ends of flows, zero where there is none."""
-    return np.append(values, 0.0)[ends]
+    """(..., ends) values of the entropies at ends of flows, zero where there is none."""
+    return np.where(ends < 0, 0.0, values[..., ends]) if values.shape[-1] else np.zeros((*values.shape[:-1], ends.size))

@@ -17,6 +17,7 @@ from ephs.semantics.stage import (
     real,
 )
 from ephs.solve.march.account import RunAccount
+from ephs.solve.march.memory import Totals
 
 
 class Ending(IntEnum):
@@ -106,10 +107,10 @@ class Motion(ABC):
         """Return the rounding in J of the energy at y, where the anchor is that of an account."""
 
     @abstractmethod
-    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
-        """Make of a step's sums of rates, with sums of sizes, what changes from y0 on; return a status.
+    def book(self, on: Evaluator, tableau: "TableauRecord", k: Matrix, h: Real, totals: Totals) -> Integer:
+        """Make of a step's sums of rates, with sums of sizes, what changes from its start on; return a status.
 
-        Sums of rates are h Σ b k of what is summed; ``sign`` is that of h.
+        Sums of rates are h Σ b k of what is summed, of the rates k at its stages.
         """
 
     @abstractmethod

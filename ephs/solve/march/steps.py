@@ -145,7 +145,7 @@ def book(
 
     on.loop(totals.change.size, each_entry)
     on.when(hold, part, entire)
-    status = motion.book(on, totals.start, totals.change, totals.size, on.select(h >= 0.0, 1.0, -1.0))
+    status = motion.book(on, tableau, k, h, totals)
     on.loop(totals.change.size, grow)
     return status
 

@@ -1,7 +1,9 @@
 """Ledgers of a motion: stored energy, supply, heat, and entropy production."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import final
 
 import numpy as np
@@ -14,6 +16,8 @@ from ephs.semantics.primitives.primitives import Irreversible, Reversible, Stora
 from ephs.solve.posing.problem import Problem
 from ephs.solve.result.record import RunRecord
 
+FIELDS = ("flux_linkage", "magnetic_flux")
+"""Kinds of fluxes: where nothing acts on one, it is the field of a permanent magnet, which no motion exchanges."""
 STILL = 1e-9
 """Least fraction of the energies that counts as exchanged, above the rounding of systems at rest."""
 
@@ -26,7 +30,8 @@ class Ledgers:
     Parameters
     ----------
     kinetic, potential, thermal
-        Energies in J of storages with momenta, with entropies or volumes, and of the others.
+        Energies in J of storages with momenta or fluxes, of the others, and of those with entropies or volumes. Fields
+        of permanent magnets are potential.
     environment
         θ₀ s − π₀ v + Σ μ₀ n of the reference environment, in J.
     exergy
@@ -129,7 +134,7 @@ def ledgers(problem: Problem, record: RunRecord, *, by_energy: bool = False) -> 
     entropies: dict[Path, Array] = {}
     amounts: dict[str, dict[Path, Array]] = {"entropy": entropies, "volume": {}, "momentum": {}}
     exergies: dict[Path, Array] = {}
-    engines = False
+    engines, acted = False, _acting(problem)
     for number, slot in enumerate(problem.descriptor.components):
         primitive = slot.primitive
         if isinstance(primitive, Irreversible):
@@ -160,7 +165,7 @@ def ledgers(problem: Problem, record: RunRecord, *, by_energy: bool = False) -> 
         charged = [{ENTROPY, VOLUME} & dict(state.quantity.charges).keys() for state in slot.reads]
         if any(charged):
             thermal, engines = thermal + energy, engines or len(charged) > 1
-        elif any(state.quantity.parity < 0 for state in slot.reads):
+        elif any(state.quantity.parity < 0 for state in slot.reads) and not _permanent(slot, acted):
             kinetic = kinetic + energy
         else:
             potential = potential + energy
@@ -172,6 +177,18 @@ def ledgers(problem: Problem, record: RunRecord, *, by_energy: bool = False) -> 
         storages, makers, workers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
         engines,
     )  # fmt: skip
+
+
+def _acting(problem: Problem) -> Counter[int]:
+    """How many components and outer ports act on each effort."""
+    d = problem.descriptor
+    ports = (range(j.efforts.start, j.efforts.stop) for j in d.junctions if j.exposed)
+    return Counter(chain.from_iterable((*(slot.efforts for slot in d.components), *ports)))
+
+
+def _permanent(slot: ComponentSlot, acted: Counter[int]) -> bool:
+    """Whether a storage is a flux that only it has a flow of: a field that stays as it is."""
+    return all(state.quantity.kind in FIELDS for state in slot.reads) and all(acted[e] == 1 for e in slot.efforts)
 
 
 def _carried(problem: Problem, record: RunRecord, makers: Mapping[Path, Array]) -> Array:

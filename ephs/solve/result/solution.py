@@ -178,12 +178,12 @@ class Solution:
 
     @property
     def kinetic(self) -> Array:
-        """(n,) energy in J of the storages that hold momenta (or fluxes)."""
+        """(n,) energy in J of the storages that hold momenta, or fluxes other than those of permanent magnets."""
         return self.ledgers.kinetic
 
     @property
     def potential(self) -> Array:
-        """(n,) energy in J of the storages that hold neither momenta nor entropies."""
+        """(n,) energy in J of the storages that hold neither momenta nor entropies, and of permanent magnets."""
         return self.ledgers.potential
 
     @cached_property

@@ -6,7 +6,12 @@ from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
 import ephs
-from ephs.semantics.spaces import SE3
+from ephs.mechanics.elements import components
+from ephs.mechanics.elements.beam import hinge_damper
+from ephs.mechanics.elements.strain import turning_resistance
+from ephs.mechanics.scene import build
+from ephs.semantics.spaces import SE3, SO3, pair
+from ephs.testing import check_primitive
 from tests.mechanics.elements.test_beam import flight_is_lawful
 from tests.mechanics.linear.test_beam_statics import PRINCETON, along, elastica, princeton_force
 from tests.methods import OF_SCENES
@@ -166,3 +171,57 @@ def test_a_rod_tells_its_strain_and_what_holds_its_pieces():
         assert np.linalg.norm(moment) == pytest.approx(np.linalg.norm(np.cross(arm, [0.3, 0.0, 2.0])), abs=1e-6)
     assert found.strain[..., :3] * np.array([0.8, 1.0, 2.0]) == pytest.approx(found.moment, abs=1e-9)
     assert not found.strain[..., 3:].any() and found.energy[-1].sum() > 0.1
+
+
+# ---- damping --------------------------------------------------------------------------------------------------------
+
+BENT = "{ GJ = 0.8, EI = [1.0, 2.0], rhoA = 1.0, rhoI = [2e-2, 1e-2, 1e-2] }"
+
+
+def heat(elements, turned, method="radau", **options):
+    """Heat of a damped rod, clamped at the origin, under its weight and a moment at its tip, named from either end."""
+    points, ends, tip = along(1.0), '["ground"]', elements
+    if turned:
+        points, ends, tip = points[::-1], '["free", "ground"]', 0
+    text = rod(points, elements, section=BENT, more=f"ends = {ends}\ndamping = 0.05", gravity=-9.81)
+    text += f'[loads.tip]\nbody = "rod.{tip}"\nmoment = [0.5, 0.7, 0.0]\n'
+    return ephs.simulate(scene_of_text(text), 0.3, method=method, audit="off", **options).heat[-1]
+
+
+TAKEN = [("radau", {"rtol": 1e-8}), ("rk54", {"rtol": 1e-8}), ("semi", {"step": 2e-3}), ("natural", {"step": 0.01})]
+
+
+@pytest.mark.parametrize(("method", "options"), TAKEN, ids=[name for name, _ in TAKEN])
+def test_damping_is_the_same_from_either_end(method, options):
+    """Though the stiffness differs by axis, so that friction on an angular velocity would differ by its axes."""
+    one, other = (heat(4, turned, method, **options) for turned in (False, True))
+    if method == "semi":  # its stages are not even, but its steps of 2e-3 s err by more
+        allowed = abs(heat(4, False, method, step=1e-3) / one - 1.0)
+        assert allowed < 1e-4
+    else:
+        allowed = 10.0 * options.get("rtol", 1e-9)
+    assert one == pytest.approx(other, rel=allowed)
+
+
+def test_friction_on_an_angular_velocity_is_not(monkeypatch):
+    """The control, which is of order one in the elements: the mean of both ends is of order two."""
+    monkeypatch.setattr(build, "hinge_damper", lambda mu: components.joint_friction(pair("spherical"), mu))
+    off = [abs(heat(n, True, rtol=1e-8) / heat(n, False, rtol=1e-8) - 1.0) for n in (4, 8)]
+    assert off[0] > 4e-3 and off[0] / off[1] == pytest.approx(2.0, rel=0.2)
+
+
+def test_the_heat_of_damping_is_of_order_2():
+    found = [heat(n, False, rtol=1e-8) for n in (4, 8, 16)]
+    assert (found[1] - found[0]) / (found[2] - found[1]) == pytest.approx(4.0, rel=0.15)
+
+
+def test_the_damping_of_a_hinge_resists_the_rate_of_its_rotation_vector():
+    """By its structure, and as differences of rotation vectors say."""
+    d, turn = np.diag([0.8, 1.0, 2.0]), np.array([0.4, -0.9, 0.5])
+    check_primitive(hinge_damper(d), max_examples=20)
+    q, u, step = SO3.exp(turn), np.array([0.3, 0.2, -0.7]), 1e-5
+    ahead, behind = (SO3.log(SO3.compose(q, SO3.exp(sign * step * u))) for sign in (1.0, -1.0))
+    rate = (ahead - behind) / (2.0 * step)
+    power = u @ np.array(turning_resistance(q, d)) @ u
+    assert power == pytest.approx(rate @ d @ rate, rel=1e-8)
+    assert abs(u @ d @ u - power) > 1e-2 * power

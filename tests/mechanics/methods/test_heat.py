@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import ephs
 from benchmarks.hard.brakes import ENERGY, brake
 from ephs.mechanics.methods import radau as implicit
-from ephs.solve.equations.heats import Heats
+from ephs.mechanics.methods.variational import Variational
+from ephs.solve.equations.heats import Heats, held_between
 from ephs.solve.methods.collocation import radau
 from examples.failing import scene
 from tests.numerics import EPS, largest
@@ -158,3 +159,51 @@ def test_natural_solves_for_small_capacities(friction, step, capacity):
     assert ledgers.thermal[-1] == pytest.approx(lost, rel=1e-12)
     assert ledgers.made[-1] == pytest.approx(capacity * math.log1p(lost / (capacity * 300.0)), rel=1e-11)
     assert np.diff(ledgers.made).min() >= 0.0
+
+
+INSTANTS = np.linspace(0.0, 0.6, 241)
+"""Twenty to a step of 0.05 s; some differ from the ends of steps by rounding."""
+
+
+def within(keep):
+    """Two arms that exchange heat, at instants within long steps."""
+    model = arms((0.1, 0.3), (0.05, 0.02), 0.1, (2.0, -3.0))
+    options = {"keep": keep}
+    return run(model, 0.6, "variational", 0.05, save_at=INSTANTS, options=options), run(
+        model, 0.6, "variational", 0.05, options=options
+    )
+
+
+@pytest.mark.parametrize("keep", ["momentum", "energy", "energy and momenta"])
+def test_within_steps_of_the_variational_method_no_component_loses_heat_or_entropy(keep):
+    sol, steps = within(keep)
+    ledgers = sol.ledgers
+    assert np.diff(ledgers.heat).min() >= -EPS * ledgers.heat[-1]
+    for made in ledgers.makers.values():
+        assert np.diff(made).min() >= -EPS * made[-1]
+    change = sum(values - values[0] for values in ledgers.entropies.values())
+    assert largest(change - ledgers.made) <= 64.0 * EPS * sum(largest(v) for v in ledgers.entropies.values())
+    same = np.isin(sol.t, steps.t), np.isin(steps.t, sol.t)
+    assert same[0].sum() > 6 and np.array_equal(sol.heat[same[0]], steps.heat[same[1]])  # instants leave the steps
+    if keep != "momentum":
+        assert sol.energy_error.max() < 64.0 * EPS
+
+
+def test_parts_of_a_step_alone_may_lose_what_the_whole_has_not(monkeypatch):
+    """The control."""
+    monkeypatch.delattr(Variational, "inside")
+    sol, _ = within("energy")
+    assert np.diff(sol.heat).min() < -1e-5
+
+
+@given(st.lists(st.tuples(*[st.floats(0.01, 1.0)] * 3), min_size=1, max_size=4))
+def test_entropies_held_between_those_of_two_parts_keep_their_sum(rows):
+    """Where the bounds allow their sum; else they are as they were."""
+    low, more, made = np.array(rows).T
+    high = low + more
+    made *= float(low.sum() + 0.5 * more.sum()) / float(made.sum())
+    held = held_between(made, low, high)
+    assert abs(held.sum() - made.sum()) <= 32.0 * EPS * (high.sum() + made.sum())
+    rounding = 8.0 * EPS * high.max()
+    assert np.all((held >= low - rounding) & (held <= high + rounding))
+    assert np.array_equal(held_between(high + 1.0, low, high), high + 1.0)  # a sum that they do not

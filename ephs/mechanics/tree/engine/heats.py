@@ -1,9 +1,13 @@
 """Storages of heat: entropies of energies, and the entropy that a step made."""
 
+from dataclasses import dataclass
+from typing import final
+
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
-from ephs.semantics.stage import Evaluator, Integer, Real, Vector
-from ephs.solve.equations.heats import LITTLE, PLAIN
+from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector
+from ephs.solve.equations.heats import LITTLE, PLAIN, TRUSTED
+from ephs.solve.march.records import TableauRecord
 
 ROUNDING = 100.0 * 2.220446049250313e-16
 """Part of what a sum of flows adds up by which it may be off: 10 κ ε with a condition κ of 10."""
@@ -81,37 +85,130 @@ def heat_rates(on: Evaluator, tables: Tables, work: Work, rates: Vector, made: V
     on.loop(tables.conduction.size, conduction)
 
 
-def count(on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vector, size: Vector) -> None:
+@final
+@dataclass(frozen=True, slots=True)
+class StageRates:
+    """Rates of (heats, heat, work, flows) at the stages of a step of h seconds: the columns of k from ``at`` on."""
+
+    tableau: TableauRecord
+    k: Matrix
+    h: Real
+    at: Integer
+
+    def cold(self, on: Evaluator, tables: Tables, before: Vector, s: Integer, node: Integer) -> Real:
+        """1/θ of an entropy at a stage; 0 where there is none."""
+        cold, a = on.variable(0.0), self.tableau.a
+
+        def stored() -> None:
+            row, energy = tables.node[node], on.variable(before[node])
+
+            def add(j: Integer) -> None:
+                energy.value = energy.value + self.h * a[s, j] * self.k[j, self.at + node]
+
+            on.loop(a.columns, add)
+            cold.value = row.c2 / (row.c1 + energy.value)
+
+        def outside() -> None:
+            cold.value = _cold_outside(on, tables, node)
+
+        on.when(node >= 0, lambda: on.when(_stores(on, tables, node), stored, outside))
+        return cold.value
+
+    def made(
+        self, on: Evaluator, tables: Tables, before: Vector, maker: Integer, ends: tuple[Integer, Integer]
+    ) -> tuple[Real, Real]:
+        """What a component passed on in J, and the entropy that it made in J/K, by the method's weights."""
+        passed, made, a = on.variable(0.0), on.variable(0.0), self.tableau.a
+
+        def stage(s: Integer) -> None:
+            weight = self.h * a[a.columns, s]
+
+            def add() -> None:
+                flow = weight * self.k[s, self.at + (tables.node.size + 2 + maker)]
+                source, sink = (self.cold(on, tables, before, s, end) for end in ends)
+                passed.value, made.value = passed.value + flow, made.value + flow * (sink - source)
+
+            on.when(on.negate(on.absolute(weight) <= 0.0), add)
+
+        on.loop(a.columns, stage)
+        return passed.value, made.value
+
+
+def _stores(on: Evaluator, tables: Tables, node: Integer) -> Truth:
+    """Whether an entropy is that of a store, whose temperature changes; −1: of nothing."""
+    return on.both(node >= 0, tables.node[on.select(node < 0, 0, node)].component >= 0)
+
+
+def _warms(on: Evaluator, tables: Tables, ends: tuple[Integer, Integer]) -> Truth:
+    """Whether one of two entropies is that of a store."""
+    return on.either(_stores(on, tables, ends[0]), _stores(on, tables, ends[1]))
+
+
+def _cold_outside(on: Evaluator, tables: Tables, node: Integer) -> Real:
+    """1/θ of an entropy that is not that of a store."""
+    return on.select(on.same(tables.node[node].component, PLAIN), 1.0, 1.0 / tables.scal[1])
+
+
+def count(
+    on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vector, size: Vector | None,
+    stages: StageRates | None = None,
+) -> None:  # fmt: skip
     """Put what components made in a step in place of what they passed on, in the changes of (heats, heat, work, flows).
 
-    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. ``before``: (heats, …) at the start.
-    ``size``: sums of the sizes of what the changes add up; those of flows become rounding of what was made.
+    Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. See
+    `ephs.solve.equations.heats.Heats.taken`, also for what stages say of each component's part.
+
+    Parameters
+    ----------
+    before
+        (heats, …) at the start.
+    size
+        Sums of the sizes of what the changes add up; those of flows become rounding of what was made.
     """
-    cold, nodes = work.temperature, tables.node.size
+    cold, nodes, parts = work.temperature, tables.node.size, work.spare
+    rest, whole = on.variable(0.0), on.variable(0.0)
 
     def node(k: Integer) -> None:
         row = tables.node[k]
 
         def outside() -> None:
-            cold[k] = on.select(on.same(row.component, PLAIN), 1.0, 1.0 / tables.scal[1])
+            cold[k] = _cold_outside(on, tables, k)
 
-        def stored() -> None:
+        def inside() -> None:
             held = row.c1 + before[k]
             cold[k] = _log_ratio(on, change[k] / held) * row.c2 / held
 
-        on.when(row.component < 0, outside, stored)
+        on.when(row.component < 0, outside, inside)
 
-    def passed(maker: Integer, factor: Real, most: Real) -> None:
+    def produced(maker: Integer, ends: tuple[Integer, Integer], rubs: Truth, factor: Real, most: Real) -> None:
         at = nodes + 2 + maker
-        change[at], size[at] = change[at] * factor, ROUNDING * size[at] * most
+        flow = change[at]
+        change[at] = flow * factor
+        if size is not None:
+            size[at] = ROUNDING * size[at] * most
+
+        def by_stages() -> None:
+            if stages is None:
+                return
+            passed, made = stages.made(on, tables, before, maker, ends)
+            same = passed * flow > 0.0
+            scaled = on.select(same, made * (flow / on.select(same, passed, 1.0)), change[at])
+            made = on.select(rubs, scaled, made)
+            lawful = on.either(made * stages.h >= 0.0, on.negate(on.either(rubs, ends[0] >= 0)))
+            made = parts[at] = on.select(lawful, made, change[at])
+            rest.value, whole.value = rest.value + (change[at] - made), whole.value + on.absolute(made)
+
+        on.when(_warms(on, tables, ends), by_stages)
 
     def friction(i: Integer) -> None:
         sink = tables.sink[i]
+        factor = on.variable(1.0)
 
         def heated() -> None:
-            passed(sink.maker, cold[sink.entropy], cold[sink.entropy])
+            factor.value = cold[sink.entropy]
 
-        on.when(sink.entropy >= 0, heated, lambda: passed(sink.maker, 1.0, 1.0))
+        on.when(sink.entropy >= 0, heated)
+        produced(sink.maker, (-1, sink.entropy), sink.rubs > 0, factor.value, factor.value)
 
     def gather(i: Integer) -> None:
         """Add what a component makes at its further places to its first."""
@@ -119,20 +216,39 @@ def count(on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vec
         at, first = nodes + 2 + sink.maker, nodes + 2 + sink.owner
 
         def move() -> None:
-            change[first], size[first] = change[first] + change[at], size[first] + size[at]
-            change[at], size[at] = 0.0, 0.0
+            change[first], change[at] = change[first] + change[at], 0.0
+            if size is not None:
+                size[first], size[at] = size[first] + size[at], 0.0
 
         on.when(on.negate(on.same(at, first)), move)
 
     def conduction(i: Integer) -> None:
         row = tables.conduction[i]
         one, two = cold[row.one], cold[row.two]
-        passed(tables.component[row.component].made, two - one, one + two)
+        produced(tables.component[row.component].made, (row.one, row.two), False, two - one, one + two)
+
+    def share(maker: Integer, ends: tuple[Integer, Integer]) -> None:
+        at = nodes + 2 + maker
+
+        def spread() -> None:
+            change[at] = parts[at] + on.absolute(parts[at]) * (rest.value / whole.value)
+
+        on.when(_warms(on, tables, ends), spread)
+
+    def share_conducted(i: Integer) -> None:
+        row = tables.conduction[i]
+        share(tables.component[row.component].made, (row.one, row.two))
+
+    def share_all() -> None:
+        on.loop(tables.sink.size, lambda i: share(tables.sink[i].maker, (-1, tables.sink[i].entropy)))
+        on.loop(tables.conduction.size, share_conducted)
 
     on.loop(nodes, node)
     on.loop(tables.sink.size, friction)
-    on.loop(tables.sink.size, gather)
     on.loop(tables.conduction.size, conduction)
+    if stages is not None:
+        on.when(on.absolute(rest.value) < TRUSTED * whole.value, share_all)
+    on.loop(tables.sink.size, gather)
 
 
 def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sign: Real) -> Integer:

@@ -7,7 +7,7 @@ from ephs.mechanics.road.records import LinkConstants
 from ephs.mechanics.road.rows import SIZE
 from ephs.mechanics.tree.engine.balance import correct, measure, stored_energies
 from ephs.mechanics.tree.engine.forces import act
-from ephs.mechanics.tree.engine.heats import absorb, count, entropies, heat_rates, hold, lawless, warm
+from ephs.mechanics.tree.engine.heats import StageRates, absorb, count, entropies, heat_rates, hold, lawless, warm
 from ephs.mechanics.tree.engine.shutting import close
 from ephs.mechanics.tree.sweeps.acting import Tables, Work
 from ephs.mechanics.tree.sweeps.expanding import About
@@ -15,7 +15,8 @@ from ephs.semantics.linear.dense import clear, subtract
 from ephs.semantics.spaces.rank import GAP
 from ephs.semantics.stage import Argument, Evaluator, Integer, Matrix, Real, Truth, Vector
 from ephs.solve.march.account import BEYOND, RunAccount, rounding
-from ephs.solve.march.records import Motion, Status
+from ephs.solve.march.memory import Totals
+from ephs.solve.march.records import Motion, Status, TableauRecord
 from ephs.solve.march.stiff import whole
 
 if TYPE_CHECKING:
@@ -232,19 +233,16 @@ class Mechanism(Motion):
         at = self.summed + self.tables.node.size
         return rounding(on, anchor, y[at + 1], y[at])
 
-    def book(self, on: Evaluator, y0: Vector, change: Vector, size: Vector, sign: Real) -> Integer:
-        count(on, self.tables, self.work, y0.part(self.summed, change.size), change, size)
-        lost = lawless(on, self.tables, change, size, sign)
-
-        def blame() -> None:
-            self.work.fault[0] = lost - 1
-
-        on.when(lost > 0, blame)
+    def book(self, on: Evaluator, tableau: TableauRecord, k: Matrix, h: Real, totals: Totals) -> Integer:
+        before, stages = totals.start.part(self.summed, totals.change.size), StageRates(tableau, k, h, self.summed)
+        count(on, self.tables, self.work, before, totals.change, totals.size, stages)
+        lost = lawless(on, self.tables, totals.change, totals.size, on.select(h >= 0.0, 1.0, -1.0))
+        self.work.fault[0] = on.select(lost > 0, lost - 1, self.work.fault[0])
         return on.select(lost > 0, int(Status.LAWLESS), 0)
 
-    def count(self, on: Evaluator, start: Vector, y: Vector) -> None:
+    def count(self, on: Evaluator, start: Vector, y: Vector, stages: StageRates | None = None) -> None:
         """Put what components made in a step in place of what they passed on, at its end y."""
-        at, change, size = self.summed, self.work.idle, self.work.spare
+        at, change = self.summed, self.work.idle
 
         def each_entry(j: Integer) -> None:
             change[j] = y[at + j] - start[at + j]
@@ -253,7 +251,7 @@ class Mechanism(Motion):
             y[at + j] = start[at + j] + change[j]
 
         on.loop(change.size, each_entry)
-        count(on, self.tables, self.work, start.part(at, change.size), change, size)
+        count(on, self.tables, self.work, start.part(at, change.size), change, None, stages)
         on.loop(change.size, each_number)
 
     def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:

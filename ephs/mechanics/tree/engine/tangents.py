@@ -12,6 +12,7 @@ import numpy as np
 
 from ephs.mechanics.tree.engine.attachment import laws_in
 from ephs.mechanics.tree.engine.engine import Engine
+from ephs.mechanics.tree.engine.heats import StageRates
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.programs import of_motion
 from ephs.mechanics.tree.engine.shutting import close
@@ -65,7 +66,7 @@ def step_program(*, looped: bool) -> Program:
             status.value = attempt(on, taken, None, last)
 
         def end() -> None:
-            status.value = settle_step(on, motion, account, allowed, base, start, y, q, h)
+            status.value = settle_step(on, motion, tableau, account, allowed, base, start, k, y, q, h)
 
         on.when(on.same(status.value, 0), stages)
         on.when(on.same(status.value, 0), end)
@@ -75,9 +76,10 @@ def step_program(*, looped: bool) -> Program:
         return motion.rates(on, base, start, q, k)[0]
 
     def settle_step(
-        on: Evaluator, motion: Mechanism, account: Table[RunAccount], allowed: Vector, base: Vector, start: Vector,
-        y: Vector, q: Vector, h: Real,
+        on: Evaluator, motion: Mechanism, tableau: TableauRecord, account: Table[RunAccount], allowed: Vector,
+        base: Vector, start: Vector, k: Matrix, y: Vector, q: Vector, h: Real,
     ) -> Integer:  # fmt: skip
+        motion.count(on, start, y, StageRates(tableau, k, h, motion.summed))
         return _settled(on, motion, account[0], allowed, base, start, y, q, h)
 
     functions = {"step": step, "rates": rates, "settle": settle_step, "close": _closed}
@@ -93,7 +95,6 @@ def _settled(
 
     The account's anchor is made anew, of the start, unless it is not a number.
     """
-    motion.count(on, start, y)
     status = on.counter(motion.settle(on, base, y, q))
 
     def close() -> None:

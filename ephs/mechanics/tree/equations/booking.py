@@ -15,6 +15,7 @@ from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import Table
 from ephs.semantics.stage.calling import Bound
 from ephs.semantics.systems.kept import once
+from ephs.solve.equations.heats import held_between
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.records import STORING
 from ephs.solve.posing.errors import Outcome, SolveError
@@ -52,7 +53,8 @@ class Booking:
         work: float,
         *,
         missed: Array | None = None,
-        refused: bool = True,
+        stages: tuple[Array, Array, Array] | None = None,
+        between: tuple["ReducedState", "ReducedState"] | None = None,
     ) -> "ReducedState":
         """The end of a step with heats and totals, see `Heats`, by sums that lose nothing to rounding.
 
@@ -65,8 +67,10 @@ class Booking:
             than is lost.
         work
             By what drives, in J over the step.
-        refused
-            Whether a step is refused in which a component loses entropy.
+        stages
+            As of `Heats.taken`.
+        between
+            Ends of a shorter step from the same start and of a longer one, between which components make their entropy.
 
         Raises
         ------
@@ -76,9 +80,10 @@ class Booking:
         eq, heats = self._equations, self._equations.heats
         start = eq.accounts.opened(start)
         flows = heats.booked(flows, missed, self._lost(start, end, flows, work))
-        change, made = heats.taken(start.heats, flows)
-        if refused:
-            self._refuse(made, flows, start, end)
+        change, made = heats.taken(start.heats, flows, stages)
+        if between is not None:
+            made = held_between(made, *(each.totals[2:] - start.totals[2:] for each in between))
+        self._refuse(made, flows, start, end)
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
         change = np.where(heats.plain, end.heats - start.heats, change)
         sums, at = np.concatenate([start.heats, start.totals]), start.heats.size
