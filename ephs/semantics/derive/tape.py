@@ -297,7 +297,7 @@ def quarter(value: object) -> float | None:
     """An exponent that shapes the formula: a whole number of quarters."""
     if isinstance(value, int | float | np.integer):
         number = float(value)  # pyright: ignore[reportUnknownArgumentType]
-        if math.isfinite(number) and (4.0 * number).is_integer() and abs(number) <= 64.0:
+        if math.isfinite(number) and (4.0 * number).is_integer():
             return number
     return None
 
