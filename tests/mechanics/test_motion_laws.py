@@ -190,6 +190,62 @@ def crank():
     return scene_of_text(text.replace("[joints.bearing]", "[joints.bearing]\n" + motion))
 
 
+TOWED = """
+format = 1
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.cart]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[bodies.trailer]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "cart"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+motion = {motion}
+[joints.tow]
+type = "prismatic"
+bodies = ["cart", "trailer"]
+frame1 = { position = [0.0, 0.0, 0.0] }
+frame2 = { position = [0.0, 0.0, 0.0] }
+stiffness = 5.0
+"""
+WAITING = ephs.TabulatedMotion((0.2, 0.5, 0.8, 1.1), (0.1, 0.3, 0.2, 0.5))
+
+
+@pytest.mark.parametrize(("method", "bound"), [("rk87", 1e-8), ("radau", 1e-8), ("natural4", 1e-7)])
+def test_chosen_steps_end_at_the_times_of_a_table(method, bound):
+    """All is at rest until the first: what is towed moves as its equation says from there, in the tolerance."""
+    table = f"{{ times = {list(WAITING.times)}, displacements = {list(WAITING.displacements)} }}"
+    scene = scene_of_text(TOWED.replace("{motion}", table))
+    run = ephs.simulate(scene, 1.5, method=method, rtol=1e-8, atol=1e-10)
+    assert set(WAITING.times) <= set(run.t.tolist())
+    state, ends = [0.0, 0.0], [*WAITING.times, 1.5]
+    for one, other in pairwise(ends):
+
+        def rates(t, y):
+            return [y[1], -2.5 * y[0] - WAITING.acceleration(t)]
+
+        state = solve_ivp(rates, (one, other), state, rtol=1e-11, atol=1e-13).y[:, -1]
+    assert abs(run.joint("tow").coordinate[-1, 0] - state[0]) < 10.0 * bound
+    constant = ephs.simulate(scene, 0.37, method=method, step=0.037, audit="off")
+    assert not set(WAITING.times) & set(constant.t.tolist()), "steps of a given length stay as they are"
+
+
+@pytest.mark.parametrize("method", ["rk87", "rk54", "radau"])
+def test_a_harmonic_motion_begins_at_rest(method):
+    """Its rate is 0 but for rounding, which is no measure of time: runs take the steps of one that begins later."""
+    counts = []
+    for phase in (0.5 * np.pi, 0.5 * np.pi + 0.1):
+        motion = f"{{ amplitude = 0.3, frequency = 0.7, phase = {phase!r} }}"
+        run = ephs.simulate(scene_of_text(TOWED.replace("{motion}", motion)), 1.5, method=method, rtol=1e-6, atol=1e-8)
+        counts.append(len(run.t))
+    assert counts[0] < 2 * counts[1]
+
+
 def test_loop_from_rest_to_rest(crank):
     """Work is what the energies gain, and heat; it is so by methods that share no code."""
     first = ephs.simulate(crank, 0.6, method="rk87", rtol=1e-10)
