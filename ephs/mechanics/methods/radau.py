@@ -86,7 +86,8 @@ class Implicit(ReducedMethod):
         end = eq.state(state, y1, state.t + h)
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
         passed, allowed = h * (self.scheme.coefficients[-1] @ passed), self._stages.allowed(y0, y1)
-        closed = eq.booking.step(state, closed, passed[2:], float(passed[1]))
+        led = float(closed.totals[1] - state.totals[1])  # the work of following motions
+        closed = eq.booking.step(state, closed, passed[2:], float(passed[1]) + led)
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))

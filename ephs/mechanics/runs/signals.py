@@ -104,13 +104,6 @@ def times_of(save_at: "ArrayLike | None", t0: float, until: float) -> Array | No
     return times
 
 
-def pieces_of(problem: Problem, t0: float, until: float) -> Array:
-    """(n,) times in s within a run at which motion laws of a problem change from piece to piece."""
-    laws = [signal.value for signal in problem.signals.values() if isinstance(signal.value, MotionLaw)]
-    times = problem.seconds * np.array([t for law in laws for t in law.pieces], dtype=float)
-    return times[(times > min(t0, until)) & (times < max(t0, until))]
-
-
 def check_mappings(**options: object) -> None:
     """Refuse options that are no mappings from names to values."""
     for key, found in options.items():

@@ -11,7 +11,7 @@ from ephs.mechanics.methods.registry import METHODS, MethodEntry, chosen
 from ephs.mechanics.runs.journaling import journaled
 from ephs.mechanics.runs.pace import longest_step
 from ephs.mechanics.runs.running import Course, seen_from
-from ephs.mechanics.runs.signals import asked_of, check_mappings, jumps_of, pieces_of, times_of
+from ephs.mechanics.runs.signals import asked_of, check_mappings, jumps_of, times_of
 from ephs.mechanics.runs.system_problem import problem_of_system
 from ephs.operad import Pattern
 from ephs.semantics.bundles.bundle import Reference
@@ -161,8 +161,7 @@ def simulate(
     told_apart(start / unit, end / unit, control.step)
     own = options_of(chosen_method, problem, options)
     times, watched = times_of(save_at, start, end), events_of(events)
-    known = [jumps_of(jumps, inputs, start, end), *(one.times for one in held)]
-    declared = np.unique(np.concatenate(known if step is not None else [*known, pieces_of(problem, start, end)]))
+    declared = np.unique(np.concatenate([jumps_of(jumps, inputs, start, end), *(one.times for one in held)]))
     asked = {
         "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,

@@ -44,8 +44,7 @@ class OwnUnits:
 
     @staticmethod
     def of(scene: Scene) -> "OwnUnits":
-        """Those of a scene: of its length and rate, and its mass as a whole. Motions that begin at rest, but for
-        rounding of their rate, have the rate at which they cross the length by their acceleration.
+        """Those of a scene: of its length and rate, and its mass as a whole.
 
         Of one with elements of unknown quantities, those are m, kg and s: only their maker knows other units.
         """
@@ -56,8 +55,7 @@ class OwnUnits:
                 return SI
         scale = Snapshot.of(scene).scale(scene.world.gravity)
         mass = sum(body.mass for _, body in scene.all_bodies()) or 1.0
-        driven = (_pace(j, scale.length) for _, j in scene.all_joints() if j.motion is not None)
-        sizes = scale.length, mass, 1.0 / max(scale.rate, *driven, 0.0)
+        sizes = scale.length, mass, 1.0 / scale.rate
         return OwnUnits(*(2.0 ** (near * round(np.log2(x) / near)) for x, near in zip(sizes, NEAR, strict=True)))
 
     @property
@@ -134,13 +132,6 @@ def mobility_of(problem: Problem) -> Mobility:
     own = in_own_units(problem)
     d, x = own.descriptor, own.descriptor.pack(own.initial)
     return once(d, ("mobility", x.tobytes(), own.prescribed), lambda: mobility(d, x, own.prescribed))
-
-
-def _pace(j: Any, length: float) -> float:
-    """Rate in 1/s at which the acceleration of a joint's motion at the start takes it by 1 rad, or by a length."""
-    coupling = coupling_of(j)
-    turns = bool(np.any(coupling.basis(coupling.identity())[:3]))
-    return float(np.sqrt(abs(j.motion.acceleration(0.0)) / (1.0 if turns else length)))
 
 
 def _ports(j: Any, units: OwnUnits) -> list[tuple[Path, Array]]:

@@ -51,11 +51,6 @@ class MotionLaw(ABC):
         """Whether the rate never changes."""
         return False
 
-    @property
-    def pieces(self) -> tuple[float, ...]:
-        """Ascending times in s between which it is one analytic function; none where it is so for all times."""
-        return ()
-
     def __call__(self, t: float, state: "State | None" = None) -> Array:
         """Return the rate (1,) at t s: the value of a signal."""
         return np.array([self.rate(t)])
@@ -198,10 +193,6 @@ class TabulatedMotion(MotionLaw):
     def _derivative(self, order: int, t: float) -> float:
         within = self.times[0] < t < self.times[-1]
         return float(_splines(self.times, self.displacements)[order](t)) if within else 0.0
-
-    @property
-    def pieces(self) -> tuple[float, ...]:
-        return self.times
 
     @property
     def numbers(self) -> tuple[tuple[str, float], ...]:
