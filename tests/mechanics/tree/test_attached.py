@@ -270,13 +270,13 @@ def _led(ratio):
 def test_what_holds_a_rate_is_decided_on_all_pieces():
     """A ratio that is 0 on one side and its mirror image: both move alike; one that is 0 everywhere holds a rate."""
 
-    def end(side, ratio):
+    def last(side, ratio):
         start = {"angle.q": 0.8 * side, "rotor.p": 0.002 * side, "spring.q": 0.01 * side}
         run = ephs.simulate(_led(ratio), 0.1, initial=start, method="rk87", step=0.02)
         return np.array([run["angle.q"][-1], run["spring.q"][-1]])
 
-    one, other = end(1.0, lambda q: np.abs(q) + q), end(-1.0, lambda q: np.abs(q) - q)
+    one, other = last(1.0, lambda q: np.abs(q) + q), last(-1.0, lambda q: np.abs(q) - q)
     assert largest(one + other) <= 1e-14 * largest(one)
     assert abs(one[1]) > 1e-4, "the spring moves"
     with pytest.raises(ephs.OptionError, match="lead holds a rate"):
-        end(1.0, lambda q: 0.0 * q)
+        last(1.0, lambda q: 0.0 * q)
