@@ -190,6 +190,58 @@ def crank():
     return scene_of_text(text.replace("[joints.bearing]", "[joints.bearing]\n" + motion))
 
 
+TOWED = """
+format = 1
+[world]
+gravity = [0.0, 0.0, 0.0]
+[bodies.cart]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+[bodies.trailer]
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+[joints.rail]
+type = "prismatic"
+bodies = ["ground", "cart"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+motion = {motion}
+[joints.tow]
+type = "prismatic"
+bodies = ["cart", "trailer"]
+frame1 = { position = [0.0, 0.0, 0.0] }
+frame2 = { position = [0.0, 0.0, 0.0] }
+stiffness = 5.0
+"""
+TABLE = ephs.TabulatedMotion((0.2, 0.5, 0.8, 1.1), (0.1, 0.3, 0.2, 0.5))
+FROM_REST = {
+    "{ times = [0.2, 0.5, 0.8, 1.1], displacements = [0.1, 0.3, 0.2, 0.5] }": TABLE,
+    f"{{ amplitude = 0.3, frequency = 0.7, phase = {0.5 * np.pi!r} }}": ephs.HarmonicMotion(0.3, 0.7, 0.5 * np.pi),
+    "{ polynomial = [0.0, 0.0, 0.0, 1.0] }": ephs.PolynomialMotion((0.0, 0.0, 0.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+@pytest.mark.parametrize("method", ["rk87", "rk54", "radau", "natural4"])
+@pytest.mark.parametrize("form", FROM_REST)
+def test_what_is_towed_from_rest_moves_as_its_equation_says(form, method, tolerance):
+    """At first it has next to no energy, beside that of the led cart; at any tolerance its energy stays its own."""
+    law, state = FROM_REST[form], [0.0, 0.0, 0.0]
+    run = ephs.simulate(
+        scene_of_text(TOWED.replace("{motion}", form)), 1.5, method=method, rtol=tolerance, atol=1e-2 * tolerance
+    )
+
+    def rates(t, y):
+        return [y[1], -2.5 * y[0] - law.acceleration(t), law.rate(t) * (law.acceleration(t) - 5.0 * y[0])]
+
+    for one, other in pairwise([0.0, *TABLE.times, 1.5]):
+        state = solve_ivp(rates, (one, other), state, rtol=1e-12, atol=1e-14).y[:, -1]
+    # errors of steps add up, by a factor of some ten steps of the largest error
+    most = np.abs(run.joint("tow").coordinate).max()
+    assert abs(run.joint("tow").coordinate[-1, 0] - state[0]) < 30.0 * tolerance * max(1.0, most)
+    assert abs(run.work[-1] - state[2]) < 30.0 * tolerance * max(1.0, np.abs(run.work).max())
+
+
 def test_loop_from_rest_to_rest(crank):
     """Work is what the energies gain, and heat; it is so by methods that share no code."""
     first = ephs.simulate(crank, 0.6, method="rk87", rtol=1e-10)

@@ -88,6 +88,7 @@ class Implicit(ReducedMethod):
         weights, allowed = h * self.scheme.coefficients[-1], self._stages.allowed(y0, y1)
         energies = state.heats + stages[:, self._stages.heat]
         (_, work), flows = np.split(weights @ passed, [2])
+        work += closed.totals[1] - state.totals[1]  # that of following motions
         closed = eq.booking.step(state, closed, flows, work, stages=(weights, energies, passed[:, 2:]))
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)

@@ -11,7 +11,7 @@ from ephs.mechanics.methods.explicit import tableau
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
 from ephs.mechanics.sensitivity.explicit import ExplicitTangent
-from ephs.mechanics.sensitivity.family import ParameterFamily, relation_of
+from ephs.mechanics.sensitivity.family import ParameterFamily, differentiated, relation_of
 from ephs.mechanics.sensitivity.sensitivity import ATOL, RTOL
 from ephs.mechanics.tree.engine.adjoints import StepAdjoint
 from ephs.mechanics.tree.equations.equations import ReducedEquations
@@ -20,7 +20,7 @@ from ephs.semantics.spaces.codes import VECTOR
 from ephs.semantics.systems.system import System
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.own import Method
-from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.errors import OptionError, failing_at
 from ephs.solve.running.threads import in_one_thread
 
 if TYPE_CHECKING:
@@ -94,6 +94,7 @@ def gradient(
     if not parameters:
         raise OptionError("parameters", parameters, "at least one path")
     family = ParameterFamily(model, parameters, initial, inputs, None, joints=True)
+    forward = ExplicitTangent(family, t0, tableau(method, chosen=step is None))
     if not family.problem.constant:
         raise OptionError("inputs", "a function", "constants; ephs.sensitivity takes functions of time")
     wanted = np.atleast_1d(np.asarray(times, dtype=float))
@@ -102,7 +103,14 @@ def gradient(
     control: dict[str, Any] = {"step": step} if step is not None else {"rtol": rtol, "atol": atol}
     run: dict[str, Any] = {"t0": t0, "initial": initial, "method": method, "inputs": inputs}
     grid = np.union1d(simulate(model, float(wanted[-1]), **run, **control).t, wanted)
-    forward = ExplicitTangent(family, t0, tableau(method, chosen=step is None))
+    with differentiated(parameters, t0):
+        return _taken_back(family, forward, grid, wanted, weights)
+
+
+def _taken_back(
+    family: ParameterFamily, forward: ExplicitTangent, grid: Array, wanted: Array, weights: "Mapping[str, ArrayLike]"
+) -> Gradient:
+    """The gradient along the steps of a grid, which end at the wanted times too."""
     point, eq = forward.begin(), forward.equations
     seeds = [_seed(eq, name, np.asarray(given, dtype=float), wanted.size) for name, given in weights.items()]
     steps = StepAdjoint(eq.engine, partial(relation_of, family.problem.descriptor), forward.tangents[0][1])
@@ -110,8 +118,9 @@ def gradient(
     states, value = list[tuple[Array, Array]](), 0.0
     for before, after in zip(grid[:-1].tolist(), grid[1:].tolist(), strict=True):
         states.append((q, y))
-        status, q, y = steps.step(q, y, after - before)
-        eq.refuse(status, eq.engine.failed)
+        with failing_at(before):
+            status, q, y = steps.step(q, y, after - before)
+            eq.refuse(status, eq.engine.failed)
         y[: eq.nv] = 0.0
         for place in np.flatnonzero(wanted == after):
             value += sum(float(w[place] @ (q if of_q else y)[where]) for where, of_q, w in seeds)
@@ -143,5 +152,7 @@ def _seed(eq: ReducedEquations, name: str, weights: Array, count: int) -> tuple[
         raise OptionError("weights", name, "joints.….coordinate or joints.….rate of a joint of the tree, not a ball's")
     if weights.size != count * freedoms.size:
         raise OptionError(f"weights[{name!r}]", weights.shape, f"({count}, {freedoms.size})")
+    if not np.all(np.isfinite(weights)):
+        raise OptionError(f"weights[{name!r}]", weights.tolist(), "finite numbers")
     where = eq.layout.elements[joint] if key == "coordinate" else eq.nv + freedoms
     return where, key == "coordinate", weights.reshape(count, freedoms.size)

@@ -45,6 +45,8 @@ WEIGHTS: Final = {
 
 ROUNDING: Final = 8.0 * np.finfo(float).eps
 """Rounding of the difference of two sums of two numbers, relative to all of them."""
+ACTING: Final = ("drive", "wrench", "supply")
+"""Tables of what acts from outside."""
 TURNED: Final = {
     "reals": (LinkConstants.real_width, slice(LinkConstants.rotation.offset, LinkConstants.rotation.offset + 9)),
     "body": (12, slice(9)),
@@ -106,6 +108,8 @@ class ExplicitTangent:
     def __init__(self, family: ParameterFamily, t0: float, method: Tableau) -> None:
         self.family, self.t0, self.method = family, t0, method
         self.equations = ReducedEquations(family.problem, t0)
+        if self.equations.prescribed.changing:
+            raise OptionError("motion", "one that changes with time", "constant rates; ephs.sweep takes others")
         self._others: dict[tuple[int, float], tuple[Problem, ReducedEquations, ReducedState]] = {}
         self._stencils: dict[int, Stencil] = {}
         self.tangents: list[tuple[slice, StepTangent]] = []
@@ -120,8 +124,6 @@ class ExplicitTangent:
         """The initial state, whose derivatives may open its loops."""
         eq, count = self.equations, len(self.family.parameters)
         state = eq.start(self.t0)
-        if eq.prescribed.changing:
-            raise OptionError("motion", "one that changes with time", "constant rates; ephs.sweep takes others")
         if not (eq.constant or eq.held):
             self._of_time(self.t0)
         size = state.q.size + eq.vector(state).size - eq.nv
@@ -150,7 +152,7 @@ class ExplicitTangent:
         """One step of h seconds."""
         eq, base = self.equations, point.state
         if eq.held:
-            eq.given.place(base.t, {})
+            self._act(base.t, {})
         out = StatePoint(base, np.empty_like(point.q), np.empty_like(point.y))
         for which, tangent in self.tangents:
             self._put(tangent, point, which, "base", "start")
@@ -198,12 +200,23 @@ class ExplicitTangent:
             One reads the state, as loads do that keep their direction while bodies turn.
         """
         try:
-            self.equations.given.place(t, _Unread())
+            self._act(t, _Unread())
         except (SolveError, _StateReadSignal) as error:
             if isinstance(error, _StateReadSignal) or isinstance(error.__cause__, _StateReadSignal):
                 known = "functions of time, or constants; loads in world axes and pressures read it"
                 raise OptionError("inputs", "a function that reads the state", known) from error
             raise
+
+    def _act(self, t: float, states: Mapping[Path, Array]) -> None:
+        """Put inputs in place, of the neighbours too, whose parameters may act on inputs: drives, points of forces."""
+        neighbours = [of for _, of, _ in self._others.values()]
+        for of in (self.equations, *neighbours):
+            of.given.place(t, states)
+        beside = {number for number, _ in self._others}
+        for which, tangent in self.tangents:
+            for k, j in enumerate(range(which.start, which.stop)):
+                for name in ACTING if j in beside else ():
+                    tangent.slopes[name][..., k] = self._by(j, lambda of, _, name=name: self._numbers(of, name))
 
     def _put(self, tangent: StepTangent, point: StatePoint, which: slice, elements: str, others: str) -> None:
         nv, q, y = self.equations.nv, tangent.pairs[elements], tangent.pairs[others]

@@ -5,7 +5,8 @@ of degree six and less by the stencils here, to rounding. Initial values that cl
 next term is below rounding at these steps.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
@@ -22,8 +23,9 @@ from ephs.semantics.bundles.errors import StructureError
 from ephs.semantics.derive.relations import entry_of
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.stage import Program
+from ephs.semantics.stage.errors import StageError
 from ephs.semantics.systems.system import System
-from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.errors import OptionError, failing_at
 from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
@@ -49,6 +51,27 @@ NEXT_TO_NOTHING = 1e-200
 """Replacement of zeros of these: models omit what they scale or shift, and neighbours would be others."""
 LEAST = 0.1
 """Least magnitudes for numbers of a scene with either sign, in m, rad, s, N: near zero their own size is no scale."""
+
+
+@contextmanager
+def differentiated(parameters: Sequence[str], t: float) -> Iterator[None]:
+    """Refuse derivatives that are too long to be compiled, and report failures at the start as those of a run.
+
+    Raises
+    ------
+    OptionError
+        They are too long.
+    SimulationError
+        A model has no such start.
+    """
+    try:
+        with failing_at(t):
+            yield
+    except StageError as error:
+        if error.fault != "endless":
+            raise
+        raise OptionError("parameters", parameters, "those of a model whose derivatives are shorter; "
+                          "rods that expand have them at order 2, and ephs.sweep takes all") from error  # fmt: skip
 
 
 def difference(function: Callable[[int], Array], stencil: Stencil, step: float) -> Array:
@@ -109,18 +132,17 @@ class ParameterFamily:
             raise OptionError("parameters", paths, "one path or several, each once, as a list")
         self.model, self._reference, self._joints = model, reference, joints
         self._initial, self._inputs = dict(initial or {}), dict(inputs or {})
-        for path in paths:  # a drive with rate zero has no port
-            joint = path.removeprefix("joints.").rpartition(".drive")[0]
-            if path.startswith("joints.") and joint and f"joints.{joint}" not in self._inputs:
-                assert isinstance(model, Scene)
-                self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
+        if isinstance(model, Scene):
+            for path in paths:  # a drive with rate zero has no port
+                joint = path.removeprefix("joints.").rpartition(".drive")[0]
+                if path.startswith("joints.") and joint and f"joints.{joint}" not in self._inputs:
+                    self._inputs[f"joints.{joint}"] = np.zeros(model.joint(joint).dim)
         self._neighbours: dict[tuple[str, float], Problem] = {}
         self.problem = self._made({})
         if (path := self.problem.descriptor.strikes) is not None:
             raise OptionError("model", str(path), "a contact with a stiffness: impulses have no derivative")
         self._states = {str(slot.path): slot for slot in self.problem.descriptor.states}
-        idle = {path: NEXT_TO_NOTHING for path in paths if path.rpartition(".")[2].partition("[")[0] in OMITTED}
-        idle = {path: value for path, value in idle.items() if not self._read(path)}
+        idle = {path: NEXT_TO_NOTHING for path in paths if _is_omitted(path) and not self._read(path)}
         if idle:
             self.problem = self._made(idle)
         self.parameters = tuple(self._parameter(path) for path in paths)
@@ -205,6 +227,12 @@ def _alike(one: Descriptor, other: Descriptor) -> bool:
             if next(texts) != next(texts):
                 return False
     return True
+
+
+def _is_omitted(path: str) -> bool:
+    """Whether a model omits a number at a path where it is zero; a gear without stiffness is rigid."""
+    key = path.rpartition(".")[2].partition("[")[0]
+    return key in OMITTED and not (key == "stiffness" and path.startswith("gears."))
 
 
 def _entry(path: str) -> tuple[str, int]:

@@ -14,7 +14,7 @@ from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import svd
 from ephs.semantics.spaces.rank import ELIMINATION, NEIGHBOUR, TINY
 from ephs.semantics.systems.system import System
-from ephs.solve.posing.errors import OptionError
+from ephs.solve.posing.errors import OptionError, nearest_of
 from ephs.solve.result.solution import Solution
 from ephs.solve.running.threads import in_one_thread
 
@@ -107,12 +107,18 @@ def fit(
     Raises
     ------
     OptionError
-        A record does not fit its reading, or there are fewer numbers in it than parameters.
+        A record does not fit its reading, or there are fewer numbers in it than parameters; start values, bounds or
+        deviations are of other names, bounds of a wrong order, or deviations not positive.
     SimulationError
         A motion could not be computed.
     """
     from scipy.optimize import least_squares
 
+    for name, given in (("start", start), ("bounds", bounds)):
+        _check_names(name, given or {}, parameters)
+    for path, (least, most) in (bounds or {}).items():
+        if not least < most:
+            raise OptionError(f"bounds[{path!r}]", (least, most), "(least, most), the first below the second")
     record = _RecordedVector(model, data, sigma or {})
     guess = {
         path: float((start or {})[path]) if path in (start or {}) else _own(model, path, run) for path in parameters
@@ -160,6 +166,12 @@ class _RecordedVector:
         for name, values in self.values.items():
             if values.shape[:1] != self.t.shape:
                 raise OptionError(f"data[{name!r}]", values.shape, f"({self.t.size}, …): one row a time")
+        if not (np.all(np.isfinite(self.t)) and np.all(np.diff(self.t) > 0.0)):
+            raise OptionError("data['t']", self.t.tolist(), "ascending times in s")
+        _check_names("sigma", sigma, list(self.values))
+        for name, deviation in sigma.items():
+            if not 0.0 < deviation < np.inf:
+                raise OptionError(f"sigma[{name!r}]", deviation, "a number > 0")
         self._readings = {name: reading_of(model, name) for name in self.values}
         self.kept = {name: np.isfinite(values) for name, values in self.values.items()}
         self.size = int(sum(kept.sum() for kept in self.kept.values()))
@@ -185,6 +197,13 @@ class _RecordedVector:
         if found.shape != wanted and found.size != self.values[name].size:
             raise OptionError(f"data[{name!r}]", wanted, f"{found.shape}")
         return found.reshape(wanted)
+
+
+def _check_names(option: str, given: Mapping[str, object], known: Sequence[str]) -> None:
+    """Refuse numbers of names that a fit does not have, which would change nothing."""
+    for name in given:
+        if name not in known:
+            raise OptionError(f"{option}[{name!r}]", given[name], f"one of {', '.join(known)}{nearest_of(name, known)}")
 
 
 @final

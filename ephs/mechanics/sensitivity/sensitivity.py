@@ -9,10 +9,9 @@ import numpy as np
 from ephs.mechanics.runs.signals import numbers_of
 from ephs.mechanics.runs.simulate import simulate
 from ephs.mechanics.scene.model import Scene
-from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamily, difference
+from ephs.mechanics.sensitivity.family import CENTRAL, Parameter, ParameterFamily, difference, differentiated
 from ephs.mechanics.sensitivity.readings import reading_of
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.stage.errors import StageError
 from ephs.semantics.systems.system import System
 from ephs.solve.methods.own import Method
 from ephs.solve.posing.errors import OptionError, failing_at, nearest_of
@@ -155,16 +154,12 @@ def sensitivity(
     if save_at is not None and times is None:
         raise OptionError("save_at", save_at, "ascending times in s")
     grid = simulate(model, until, **run, **control).t
-    if times is not None and not (np.all(np.diff(times) > 0.0) and grid[0] <= times.min() and times.max() <= grid[-1]):
+    if times is not None and not (
+        times.size and np.all(np.diff(times) > 0.0) and grid[0] <= times[0] and times[-1] <= grid[-1]
+    ):
         raise OptionError("save_at", save_at, f"ascending times in [{grid[0]:g}, {grid[-1]:g}] s")
-    try:
-        with failing_at(float(grid[0])):
-            return _along(family, name, grid, times, chosen=step is None)
-    except StageError as error:
-        if error.fault != "endless":
-            raise
-        raise OptionError("parameters", parameters, "those of a model whose derivatives are shorter; "
-                          "rods that expand have them at order 2, and ephs.sweep takes all") from error  # fmt: skip
+    with differentiated(parameters, float(grid[0])):
+        return _along(family, name, grid, times, chosen=step is None)
 
 
 def _method(method: str | Method, step: float | None) -> str | Method:

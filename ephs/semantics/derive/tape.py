@@ -293,11 +293,19 @@ def has_pieces(relation: object) -> bool:
     return is_dataclass(relation) and any(has_pieces(getattr(relation, field.name)) for field in fields(relation))
 
 
+def pieced(tape: Tape) -> list[bool]:
+    """Of each output, whether a piecewise operation is behind it."""
+    found: list[bool] = []
+    for name, places, _ in tape.operations:
+        found.append(name in PIECEWISE or any(found[i] for i in places))
+    return [found[i] for i in tape.outputs]
+
+
 def quarter(value: object) -> float | None:
     """An exponent that shapes the formula: a whole number of quarters."""
     if isinstance(value, int | float | np.integer):
         number = float(value)  # pyright: ignore[reportUnknownArgumentType]
-        if math.isfinite(number) and (4.0 * number).is_integer() and abs(number) <= 64.0:
+        if math.isfinite(number) and (4.0 * number).is_integer():
             return number
     return None
 

@@ -137,6 +137,7 @@ def test_through_a_contact_that_slips_as_tangents_say():
         ({"parameters": []}, "at least one"),
         ({"weights": {"bodies.coupler.position": [1.0]}}, "joint of the tree"),
         ({"weights": {"joints.main.coordinate": [1.0, 2.0, 3.0]}}, "(2, 1)"),
+        ({"weights": {"joints.main.coordinate": [1.0, np.nan]}}, "finite numbers"),
         ({"inputs": {"joints.main": lambda t: [t]}}, "functions of time"),
     ],
 )

@@ -104,8 +104,26 @@ def test_what_a_record_does_not_tell_has_no_error_bound():
 @pytest.mark.parametrize(
     ("data", "what"),
     [({"osc.pe.q": [0.0]}, "times t"), ({"t": [0.0, 1.0], "osc.pe.q": [0.0]}, "one row a time"),
-     ({"t": [0.0, 1.0], "osc.pe.q": [0.0, np.nan]}, "2 or more")],
+     ({"t": [0.0, 1.0], "osc.pe.q": [0.0, np.nan]}, "2 or more"),
+     ({"t": [1.0, 0.0], "osc.pe.q": [0.0, 1.0]}, "ascending times")],
 )  # fmt: skip
 def test_records_that_do_not_fit_are_refused(data, what):
     with pytest.raises(ephs.OptionError, match=what):
         ephs.fit(damped_oscillator(), data, ["osc.pe.k", "mf.d"], step=0.5)
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [({"start": {"osc.pe.m": 1.0}}, "start.*one of osc.pe.k.*did you mean"),
+     ({"bounds": {"osc.pe": (0.0, 1.0)}}, "bounds.*one of"),
+     ({"bounds": {"osc.pe.k": (1.0, 0.5)}}, "first below the second"),
+     ({"sigma": {"osc.pe.k": 1.0}}, "sigma.*one of osc.pe.q"),
+     ({"sigma": {"osc.pe.q": 0.0}}, "a number > 0"), ({"sigma": {"osc.pe.q": np.nan}}, "a number > 0")],
+)  # fmt: skip
+def test_options_that_would_change_nothing_or_have_no_meaning_are_refused(options, what):
+    data = {"t": [0.0, 0.5, 1.0], "osc.pe.q": [0.1, 0.0, -0.1]}
+    run = {"initial": {"osc.pe.q": 0.1}, "step": 0.5, "max_evaluations": 2}
+    with pytest.raises(ephs.OptionError, match=what):
+        ephs.fit(damped_oscillator(), data, ["osc.pe.k"], **run, **options)
+    lawful = {"start": {"osc.pe.k": 1.0}, "bounds": {"osc.pe.k": (0.5, 2.0)}, "sigma": {"osc.pe.q": 1e-3}}
+    assert 0.5 <= ephs.fit(damped_oscillator(), data, ["osc.pe.k"], **run, **lawful).values["osc.pe.k"] <= 2.0

@@ -193,6 +193,7 @@ def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method, text,
         ({"parameters": []}, "one path or several"),
         ({"parameters": "bodies.crank.mass"}, "one path or several"),
         ({"save_at": [0.2, 0.1]}, "ascending"),
+        ({"save_at": []}, "ascending"),
     ],
 )
 def test_what_cannot_be_is_named(keys, what):
@@ -207,3 +208,63 @@ def test_unknown_readings_name_the_nearest():
         found["osc.pe.x"]
     with pytest.raises(ephs.SceneError, match="did you mean"):
         ephs.sensitivity(shipped("four-bar"), ["bodies.crnk.mass"], 0.1)
+
+
+GEARED = """
+format = 1
+[bodies.arm]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.3, 0.0, 0.0]
+[bodies.wheel]
+mass = 0.5
+inertia = [0.02, 0.02, 0.02]
+[joints.pin]
+type = "revolute"
+bodies = ["ground", "arm"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[joints.axle]
+type = "revolute"
+bodies = ["ground", "wheel"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[gears.g]
+joints = ["pin", "axle"]
+ratio = 0.5
+"""
+
+
+BOTH = pytest.mark.parametrize(
+    "derived",
+    [
+        lambda scene, path, **run: ephs.sensitivity(scene, [path], 0.1, method="rk87", **run),
+        lambda scene, path, **run: ephs.gradient(scene, [path], [0.1], {"joints.pin.rate": [1.0]}, **run),
+    ],
+    ids=["sensitivity", "gradient"],
+)
+
+
+@BOTH
+def test_both_modes_refuse_the_same_by_the_same_words(derived):
+    """A rigid gear becomes no belt, a start that contradicts its joints fails, motions are no functions."""
+    moved = GEARED.partition("[gears")[0] + "motion = { polynomial = [0.0, 0.1] }\n"
+    with pytest.raises(ephs.OptionError, match=r"gears.g.stiffness.*structure"):
+        derived(scene_of_text(GEARED), "gears.g.stiffness")
+    assert derived(scene_of_text(GEARED.replace("ratio = 0.5", "ratio = 0.5\nstiffness = 2.0")), "gears.g.stiffness")
+    with pytest.raises(ephs.SimulationError, match=r"t = 0 s.*contradicts the constraints"):
+        derived(scene_of_text(WOUND), "bodies.arm.velocity[0]")
+    with pytest.raises(ephs.OptionError, match=r"motion.*constant rates"):
+        derived(scene_of_text(moved), "bodies.wheel.mass")
+    with pytest.raises(ephs.AssemblyError, match="not a parameter"):
+        derived(scene_of_text(WOUND).system(), "joints.pin.drive")
+
+
+def test_parameters_that_act_on_inputs_of_time():
+    """A drive is added to a function of time, a ratio multiplies it: at each stage, not at the start alone."""
+    scene = scene_of_text(WOUND + '\n[actuators.u]\njoints = ["pin"]\nratio = 1.5\n')
+    inputs = {"joints.pin": lambda t, s: [np.sin(9.0 * t)], "actuators.u": lambda t, s: [np.cos(7.0 * t)]}
+    names, run = ["joints.pin.coordinate", "heat", "work"], {"method": "rk87", "step": 0.02}
+    paths, run = ["joints.pin.drive", "actuators.u.ratio[0]"], run | {"inputs": inputs}
+    found = agrees(scene, paths, 0.2, names, compared=run, **run)
+    assert np.all(np.abs(found["work"][-1]) > 1e-3)

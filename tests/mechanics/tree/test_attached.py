@@ -249,3 +249,34 @@ def test_balances_hold_where_all_but_the_largest_terms_nearly_vanish():
     still = eq.rates(0.0, state.q, y)[eq.nv : eq.nv + eq.n].copy()
     y[eq.nv : eq.nv + eq.n] = [-2.2e-13, -1.2e-13]
     assert np.allclose(eq.rates(0.0, state.q, y)[eq.nv : eq.nv + eq.n], still, rtol=1e-12)
+
+
+def _led(ratio):
+    """A rotor whose rate is ratio(angle) times the rate of a spring without mass."""
+    pattern = Pattern(
+        junctions={"q": junction(Q.angle), "p": junction(Q.angular_momentum), "b": junction(Q.momentum),
+                   "x": junction(Q.displacement)},
+        boxes={"angle": {"q": "q"}, "rotor": {"p": "p"}, "turn": {"q": "q", "p": "p"}, "spring": {"q": "x"},
+               "lead": {"a": "b", "b": "p", "q": "~q"}, "stretch": {"q": "x", "p": "b"}},
+    )  # fmt: skip
+    lead = ephs.transformer({"a": Q.momentum, "b": Q.angular_momentum, "~q": Q.angle}, lambda q: np.array([[ratio(q)]]))
+    return pattern(
+        angle=ephs.storage({"q": Q.angle}, lambda q: 0.0 * q), rotor=lib.rotor(j=0.02), lead=lead,
+        turn=ephs.gyrator({"q": Q.angle, "p": Q.angular_momentum}, [[0.0, -1.0], [1.0, 0.0]]),
+        spring=lib.spring(k=10.0), stretch=lib.pkc(),
+    )  # fmt: skip
+
+
+def test_what_holds_a_rate_is_decided_on_all_pieces():
+    """A ratio that is 0 on one side and its mirror image: both move alike; one that is 0 everywhere holds a rate."""
+
+    def last(side, ratio):
+        start = {"angle.q": 0.8 * side, "rotor.p": 0.002 * side, "spring.q": 0.01 * side}
+        run = ephs.simulate(_led(ratio), 0.1, initial=start, method="rk87", step=0.02)
+        return np.array([run["angle.q"][-1], run["spring.q"][-1]])
+
+    one, other = last(1.0, lambda q: np.abs(q) + q), last(-1.0, lambda q: np.abs(q) - q)
+    assert largest(one + other) <= 1e-14 * largest(one)
+    assert abs(one[1]) > 1e-4, "the spring moves"
+    with pytest.raises(ephs.OptionError, match="lead holds a rate"):
+        last(1.0, lambda q: 0.0 * q)

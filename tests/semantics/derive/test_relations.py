@@ -208,6 +208,23 @@ def test_what_grows_as_a_power_above_one_is_flat_at_zero(function, flat, power):
     assert ((found.value, found.slopes[0], step.slopes.get(0, 0.0)) == (0.0, 0.0, 0.0)) == flat
 
 
+@given(st.integers(65, 2000) | st.sampled_from([10**6, 10**9]), st.booleans(), st.floats(0.1, 3.0), st.booleans())
+def test_whole_powers_of_any_size_have_values_on_both_sides(size, inverse, near, negative):
+    """As exact arithmetic says, with the rounding of n products: x is within 1/n of one, so that no power is 0 or ∞."""
+    n, on = -size if inverse else size, Duals(PLAIN, 1)
+    x = (-1.0 if negative else 1.0) * (1.0 + near / size)
+    found = on.dual(evaluate(on, record(lambda x: x**n, {"x": None}).tape, [on.along(np.float64(x), 0)], [])[0])
+    with mpmath.workdps(40):
+        value = mpmath.mpf(x) ** n
+        slope = n * value / mpmath.mpf(x)
+        assert abs(float(found.value / value) - 1.0) <= 4 * size * EPS
+        assert abs(float(found.slopes[0] / slope) - 1.0) <= 4 * size * EPS
+    broken = record(lambda x: x ** (n + 0.3), {"x": None})
+    with np.errstate(all="ignore"):
+        rest = evaluate(PLAIN, broken.tape, [np.float64(x)], [np.float64(p) for p in broken.parameters])[0]
+    assert np.isnan(rest) == negative, "what is no whole number has none below zero"
+
+
 SMALL = ["sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "expm1", "log1p", "cos", "cosh", "acos", "exp"]
 
 

@@ -284,10 +284,20 @@ class ReducedEquations:
         return self.ended(base, self.settled(self.vector(base), y), t)
 
     def ended(self, base: ReducedState, y: Array, t: float) -> ReducedState:
-        """The same of a vector whose totals are made up already."""
+        """The same of a vector whose totals are made up already.
+
+        Prescribed rates differ from integrals of their accelerations by an error of the step, and by rounding: what
+        following the laws adds to the energy is work of the motions, no matter of what else moves.
+        """
         q, at = self.advance(base.q, y[: self.nv]), self.nv + self.n
         end = ReducedState(t, q, y[self.nv : at], y[at : at + self.ns], y[at + self.ns :], account=base.account)
-        return self.prescribed.followed(base, end)
+        if not self.prescribed.changing:
+            return end
+        followed = self.prescribed.followed(base, end)
+        energies = [self.engine.energy(of.q, of.r, of.heats)[:2].sum() for of in (end, followed)]
+        totals = followed.totals.copy()
+        totals[1] += energies[1] - energies[0]
+        return replace(followed, totals=totals)
 
     def settled(self, y0: Array, y1: Array) -> Array:
         """The end y1 of a step from y0 with what components made in place of what they passed on."""

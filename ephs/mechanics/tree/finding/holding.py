@@ -10,6 +10,8 @@ import numpy as np
 from ephs.mechanics.tree.finding.frames import Unplaced
 from ephs.mechanics.tree.finding.network import Network
 from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.derive.relations import ReversibleStep
+from ephs.semantics.derive.tape import pieced
 from ephs.semantics.descriptor.descriptor import ComponentSlot
 from ephs.semantics.primitives.primitives import Reversible
 from ephs.semantics.verdicts.checks import random_point
@@ -35,10 +37,18 @@ def check_determined(network: Network, components: Sequence[ComponentSlot]) -> N
 
 
 def _pattern(slot: ComponentSlot, size: int) -> Array:
-    """(size, size) 1 where a flow depends on an effort or a multiplier; of a relation, at one state that is drawn."""
-    if not isinstance(slot.primitive, Reversible):
-        return np.ones((size, size))
+    """(size, size) 1 where a flow depends on an effort or a multiplier.
+
+    An analytic entry that vanishes at three drawn states is zero; one of several pieces counts, see `pieced`.
+    """
     of = slot.primitive
-    left, constraint = of.structure(random_point(of.bundle, of.reads, np.random.default_rng(1)))
-    zero = np.zeros((len(constraint), len(constraint)))
-    return (np.block([[np.asarray(left), constraint.T], [constraint, zero]]) != 0.0).astype(float)
+    if not isinstance(of, Reversible):
+        return np.ones((size, size))
+    rng, found = np.random.default_rng(1), np.zeros((size, of.bundle.size), dtype=bool)
+    for _ in range(3):
+        found |= np.vstack([np.asarray(part) for part in of.structure(random_point(of.bundle, of.reads, rng))]) != 0.0
+    relation = None if of.kernel is None else of.kernel.relation
+    if isinstance(relation, ReversibleStep) and relation.maps is None:
+        found |= np.reshape(pieced(relation.structure), found.shape)
+    left, constraint = np.vsplit(found, [of.bundle.size])
+    return np.block([[left, constraint.T], [constraint, np.zeros((len(constraint), len(constraint)))]]).astype(float)
