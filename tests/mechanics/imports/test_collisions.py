@@ -213,20 +213,6 @@ URDF_NOTES = {
     "concave": (
         robot(collision('<mesh filename="dent.obj"/>')), r"contacts inside of convex hulls: l0 \(0.25 m deep\)",
     ),
-    "collision": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "verbose of collisions: l0"),
-    "link": (robot("<gravity/>"), "gravity of links: l0"),
-    "restitution": (
-        robot(collision("<box size='1 1 1'/>") + '<contact><restitution value="0.5"/></contact>'),
-        "contact/restitution of links: l0$",
-    ),
-    "velocity": (
-        robot("", "").replace('"fixed">', '"revolute"><limit lower="-1" upper="1" velocity="3" effort="2"/>'),
-        "limits of effort of: j1\n.*limit/velocity of joints: j1",
-    ),
-    "safety": (
-        robot("", "").replace('"fixed">', '"revolute"><safety_controller k_velocity="3"/>'),
-        "safety_controller of joints: j1",
-    ),
 }  # fmt: skip
 
 

@@ -152,20 +152,6 @@ def ring(count, height=0.1):
 
 NOTES = {
     "ellipsoid": ('<geom name="x" type="ellipsoid" size="1 2 3"/>', "", "contacts between: floor and x"),
-    "margin": ('<geom name="x" size="1" margin="0.1"/>', "", "margin of geoms: x"),
-    "gap": ('<geom name="x" size="1" gap="0.1"/>', "", "gap of geoms: x"),
-    "impedance": ('<geom name="x" size="1" solimp="0.8 0.9 0.01"/>', "", "solimp of geoms: x"),
-    "directed": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" friction="1 2 0 0 0"/>',
-        "friction that depends on the direction, of: ",
-    ),
-    "soft friction": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" solreffriction="0.1 1"/>',
-        "solreffriction of pairs: ",
-    ),
-    "pair margin": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" margin="0.1"/>', "margin of pairs: ",
-    ),
     "height field": ('<geom name="x" type="hfield" hfield="h"/><geom size="1"/>', "", "height fields: x"),
     "pair of a height field": (
         '<geom name="x" type="hfield" hfield="h"/><geom size="1"/>', '<pair geom1="x" geom2="floor"/>',
@@ -181,10 +167,6 @@ NOTES = {
     "points": (
         '<geom name="x" type="mesh" mesh="nut"/></body><body><freejoint/><geom name="y" type="mesh" mesh="bar"/>', "",
         "contacts between shapes with many edges: x and y",
-    ),
-    "stop": (
-        '<joint name="j" type="hinge" range="-1 1" limited="true" solimplimit="0.5"/><geom size="1"/>', "",
-        "solimplimit of joints: j",
     ),
 }  # fmt: skip
 
