@@ -171,27 +171,6 @@ def test_links_of_an_sdf_meet_each_other_where_it_says_so(tmp_path):
         assert len(scene.contacts) == 3 + expected and len(inner) == expected
 
 
-@pytest.mark.parametrize(
-    ("kind", "limit", "found"),
-    [
-        ("revolute", "<lower>-1</lower><upper>2</upper>", [-1.0, 2.0]),
-        ("prismatic", "<upper>0.5</upper>", [np.nan, 0.5]),
-        ("revolute", "<lower>-1e16</lower><upper>1e16</upper>", None),
-        ("revolute", "<lower>-inf</lower><upper>inf</upper>", None),
-        ("continuous", "<lower>-1</lower><upper>2</upper>", None),
-    ],
-)
-def test_limits_of_an_sdf(kind, limit, found, tmp_path):
-    joint = (
-        f'<joint name="j" type="{kind}"><parent>world</parent><child>body</child>'
-        f"<axis><xyz>0 1 0</xyz><limit>{limit}</limit></axis></joint>"
-    )
-    scene, said = loaded(SDF.format(**GIVEN | {"model": joint}), tmp_path, "sdf")
-    limits = scene.joint("j").limits
-    assert ("limits of: j" in said) == (kind == "continuous")
-    assert limits is None if found is None else limits == pytest.approx(found, nan_ok=True)
-
-
 def test_a_joint_that_a_mimic_holds_has_no_limits(tmp_path):
     text = robot("", "", "")
     text = text.replace('name="j1" type="fixed">', 'name="j1" type="revolute"><limit lower="-1" upper="1"/>')

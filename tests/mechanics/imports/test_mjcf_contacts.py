@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.imports import convert
-from ephs.mechanics.imports.collisions import SINKING
 from ephs.mechanics.imports.mjcf_contacts import LOSS
 from ephs.mechanics.shapes.gap import UPRIGHT
 from ephs.mechanics.shapes.pairs import touches
@@ -200,14 +199,3 @@ def test_a_converted_mesh_is_the_same_surface(tmp_path):
         convert(tmp_path / "model.xml", tmp_path / "again.toml", contact=True)
         again = ephs.load(tmp_path / "again.toml")
     assert again.surfaces["x"].shape == scene.surfaces["x"].shape and len(scene.surfaces["x"].shape["mesh"]) == 18
-
-
-def test_weight_on_a_contact_sinks_as_documented(tmp_path):
-    pytest.importorskip("mujoco")
-    text = (
-        '<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 0.09">'
-        '<freejoint/><geom name="ball" size="0.1"/></body></worldbody></mujoco>'
-    )
-    scene, _ = loaded(text, tmp_path)
-    sol = ephs.simulate(scene, 2.0, method="radau")
-    assert 0.1 - sol.body("b").position[-1, 2] == pytest.approx(9.81 * SINKING**2, rel=1e-4)
