@@ -11,15 +11,15 @@ CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
     "ephs/exporting": 13_400,
-    "ephs/mechanics": 419_500,
+    "ephs/mechanics": 422_300,
     "ephs/modelica": 11_300,
     "ephs/operad": 30_600,
     "ephs/semantics": 192_400,
     "ephs/show": 64_400,
-    "ephs/solve": 124_200,
+    "ephs/solve": 125_500,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 563_100,
+    "tests": 562_700,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

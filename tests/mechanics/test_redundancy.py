@@ -370,4 +370,7 @@ def test_a_system_repeats_what_its_scene_does(name):
     assert [str(each).replace("joints.", "") for each in dependences(of)] == [str(each) for each in dependences(own)]
     here, there = indeterminate(of), indeterminate(own)
     assert [joint.removeprefix("joints.") for joint in here] == list(there)
+    told = [{name: detail for name, _, detail in check_model(model).items} for model in (scene, scene.system())]
+    for what in ("mobility", "redundant constraints", "joint wrenches"):
+        assert told[1][what].replace("joints.", "") == told[0][what]
     assert all(np.array_equal(*each) for each in zip(here.values(), there.values(), strict=True))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import ephs
 from tests.mechanics.elements.test_contact import HEAD, run, scene_of
 from tests.written import scene_of_text
 
@@ -126,31 +125,3 @@ def test_a_rocking_block_loses_what_housner_says():
     assert angles[1] < 0.0
     assert rates[1] ** 2 == pytest.approx(left * squared(tilt) - squared(-angles[1]), rel=5e-3)
     assert np.abs(sol.energy_error).max() <= 1e-11
-
-
-WHEEL = """
-[bodies.wheel]
-mass = 1.0
-inertia = [4e-3, 4e-3, 4e-3]
-position = [0.0, 0.0, 0.11]
-angular_velocity = [0.0, 30.0, 0.0]
-rotation = { axis = [1.0, 0.0, 0.0], angle = 1.5707963267948966 }
-[surfaces.wheel]
-body = "wheel"
-shape = { cylinder = [0.1, 0.05] }
-stiffness = 1e5
-loss = 0.3
-friction = 0.5
-slip = 1e-3
-[surfaces.floor]
-body = "ground"
-shape = { plane = {} }
-"""
-
-
-@pytest.mark.parametrize("rtol", [1e-2, 1e-1])
-def test_a_wheel_that_bounces_on_two_rims_makes_no_energy(rtol):
-    """To the energy of a motion by one tolerance, 2 rtol of it, in the mean of six directions."""
-    scene = scene_of_text(HEAD.format(gravity=-9.81) + WHEEL)
-    sol = ephs.simulate(scene, 1.0, method="rk54", rtol=rtol, audit="off")
-    assert np.abs(sol.energy_error).max() <= 2.0 * np.sqrt(6.0) * rtol

@@ -171,27 +171,6 @@ def test_links_of_an_sdf_meet_each_other_where_it_says_so(tmp_path):
         assert len(scene.contacts) == 3 + expected and len(inner) == expected
 
 
-@pytest.mark.parametrize(
-    ("kind", "limit", "found"),
-    [
-        ("revolute", "<lower>-1</lower><upper>2</upper>", [-1.0, 2.0]),
-        ("prismatic", "<upper>0.5</upper>", [np.nan, 0.5]),
-        ("revolute", "<lower>-1e16</lower><upper>1e16</upper>", None),
-        ("revolute", "<lower>-inf</lower><upper>inf</upper>", None),
-        ("continuous", "<lower>-1</lower><upper>2</upper>", None),
-    ],
-)
-def test_limits_of_an_sdf(kind, limit, found, tmp_path):
-    joint = (
-        f'<joint name="j" type="{kind}"><parent>world</parent><child>body</child>'
-        f"<axis><xyz>0 1 0</xyz><limit>{limit}</limit></axis></joint>"
-    )
-    scene, said = loaded(SDF.format(**GIVEN | {"model": joint}), tmp_path, "sdf")
-    limits = scene.joint("j").limits
-    assert ("limits of: j" in said) == (kind == "continuous")
-    assert limits is None if found is None else limits == pytest.approx(found, nan_ok=True)
-
-
 def test_a_joint_that_a_mimic_holds_has_no_limits(tmp_path):
     text = robot("", "", "")
     text = text.replace('name="j1" type="fixed">', 'name="j1" type="revolute"><limit lower="-1" upper="1"/>')
@@ -212,20 +191,6 @@ URDF_NOTES = {
     "flat": (robot(collision('<mesh filename="flat.obj"/>')), "contacts with meshes that have no volume: l0"),
     "concave": (
         robot(collision('<mesh filename="dent.obj"/>')), r"contacts inside of convex hulls: l0 \(0.25 m deep\)",
-    ),
-    "collision": (robot(collision("<box size='1 1 1'/>", more="<verbose/>")), "verbose of collisions: l0"),
-    "link": (robot("<gravity/>"), "gravity of links: l0"),
-    "restitution": (
-        robot(collision("<box size='1 1 1'/>") + '<contact><restitution value="0.5"/></contact>'),
-        "contact/restitution of links: l0$",
-    ),
-    "velocity": (
-        robot("", "").replace('"fixed">', '"revolute"><limit lower="-1" upper="1" velocity="3" effort="2"/>'),
-        "limits of effort of: j1\n.*limit/velocity of joints: j1",
-    ),
-    "safety": (
-        robot("", "").replace('"fixed">', '"revolute"><safety_controller k_velocity="3"/>'),
-        "safety_controller of joints: j1",
     ),
 }  # fmt: skip
 

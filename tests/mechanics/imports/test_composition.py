@@ -7,7 +7,6 @@ import ephs
 from ephs.mechanics.imports.draft import pose
 from ephs.mechanics.imports.read import read_model
 from ephs.semantics.spaces import SE3
-from tests.mechanics.imports.models import MODELS
 
 MASS = "<inertial><mass>{}</mass><inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial>"
 LINK = '<link name="{}">{}' + MASS + "</link>"
@@ -106,20 +105,6 @@ def test_an_end_of_a_joint_is_the_link_that_its_name_stands_for(end, write, quie
     )
     joint = quiet(write(file(text), "sdf")).joints["j"]
     assert (joint.body1, joint.body2) == (ENDS[end], "x")
-
-
-@pytest.mark.parametrize("number", ["1.79769e+308", "1e16", "inf"])
-@pytest.mark.parametrize("sign", ["-", ""])
-def test_large_limits_are_none(number, sign, write, quiet):
-    lower, upper = ("-1", number) if not sign else (f"-{number}", "1")
-    joint = HINGE.format("j", "world", "w", "").replace(
-        "</axis>", f"<limit><lower>{lower}</lower><upper>{upper}</upper></limit></axis>"
-    )
-    found = quiet(write(file(f'<model name="m">{LINK.format("w", "", 1)}{joint}</model>'), "sdf"), contact=True)
-    assert np.isnan(found.joint("j").limits).tolist() == [bool(sign), not sign]
-    text = MODELS["urdf"].replace('<limit lower="-1" upper="1"', f'<limit lower="{lower}" upper="{upper}"', 1)
-    found = quiet(write(text, "urdf"), contact=True)
-    assert np.isnan(found.joint("shoulder").limits).tolist() == [bool(sign), not sign]
 
 
 WRITTEN = {

@@ -31,10 +31,11 @@ def test_a_converted_model_is_the_same_scene(base, model, tmp_path):
     assert same(ephs.load(model, base=base), ephs.load(tmp_path / "scene.toml"))
 
 
+@pytest.mark.parametrize("contact", [False, True])
 @pytest.mark.parametrize("model", sorted(GYMNASIUM.glob("*.xml")), ids=lambda path: path.stem)
-def test_a_converted_robot_is_the_same_scene(model, tmp_path):
-    convert(model, tmp_path / "scene.toml")
-    assert same(ephs.load(model), ephs.load(tmp_path / "scene.toml"))
+def test_a_converted_robot_is_the_same_scene(model, contact, tmp_path):
+    convert(model, tmp_path / "scene.toml", contact=contact)
+    assert same(ephs.load(model, contact=contact), ephs.load(tmp_path / "scene.toml"))
 
 
 MESH = (

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.imports import convert
-from ephs.mechanics.imports.collisions import SINKING
 from ephs.mechanics.imports.mjcf_contacts import LOSS
 from ephs.mechanics.shapes.gap import UPRIGHT
 from ephs.mechanics.shapes.pairs import touches
@@ -152,20 +151,6 @@ def ring(count, height=0.1):
 
 NOTES = {
     "ellipsoid": ('<geom name="x" type="ellipsoid" size="1 2 3"/>', "", "contacts between: floor and x"),
-    "margin": ('<geom name="x" size="1" margin="0.1"/>', "", "margin of geoms: x"),
-    "gap": ('<geom name="x" size="1" gap="0.1"/>', "", "gap of geoms: x"),
-    "impedance": ('<geom name="x" size="1" solimp="0.8 0.9 0.01"/>', "", "solimp of geoms: x"),
-    "directed": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" friction="1 2 0 0 0"/>',
-        "friction that depends on the direction, of: ",
-    ),
-    "soft friction": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" solreffriction="0.1 1"/>',
-        "solreffriction of pairs: ",
-    ),
-    "pair margin": (
-        '<geom name="x" size="1"/>', '<pair geom1="x" geom2="floor" margin="0.1"/>', "margin of pairs: ",
-    ),
     "height field": ('<geom name="x" type="hfield" hfield="h"/><geom size="1"/>', "", "height fields: x"),
     "pair of a height field": (
         '<geom name="x" type="hfield" hfield="h"/><geom size="1"/>', '<pair geom1="x" geom2="floor"/>',
@@ -181,10 +166,6 @@ NOTES = {
     "points": (
         '<geom name="x" type="mesh" mesh="nut"/></body><body><freejoint/><geom name="y" type="mesh" mesh="bar"/>', "",
         "contacts between shapes with many edges: x and y",
-    ),
-    "stop": (
-        '<joint name="j" type="hinge" range="-1 1" limited="true" solimplimit="0.5"/><geom size="1"/>', "",
-        "solimplimit of joints: j",
     ),
 }  # fmt: skip
 
@@ -218,14 +199,3 @@ def test_a_converted_mesh_is_the_same_surface(tmp_path):
         convert(tmp_path / "model.xml", tmp_path / "again.toml", contact=True)
         again = ephs.load(tmp_path / "again.toml")
     assert again.surfaces["x"].shape == scene.surfaces["x"].shape and len(scene.surfaces["x"].shape["mesh"]) == 18
-
-
-def test_weight_on_a_contact_sinks_as_documented(tmp_path):
-    pytest.importorskip("mujoco")
-    text = (
-        '<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 0.09">'
-        '<freejoint/><geom name="ball" size="0.1"/></body></worldbody></mujoco>'
-    )
-    scene, _ = loaded(text, tmp_path)
-    sol = ephs.simulate(scene, 2.0, method="radau")
-    assert 0.1 - sol.body("b").position[-1, 2] == pytest.approx(9.81 * SINKING**2, rel=1e-4)

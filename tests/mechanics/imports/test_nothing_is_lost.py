@@ -1,12 +1,13 @@
 """Each number of a format either changes the scene, or is named, or concerns solvers and pictures alone.
 
-A row sets one number of a model that holds one of each element. `USED` rows give another scene; others the words of the
-note, or none where the number has no effect on motion. SDF's notes begin with the path, where they begin with "of".
+A line of the files in `lost` sets one number of a model that holds one of each element, at a place of its text. It is
+used, where it gives another scene; or the words of its note follow, or nothing where it has no effect on motion.
 """
 
 import re
 import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -14,7 +15,7 @@ import ephs
 from ephs.mechanics.imports import file_element, mjcf_keys
 from ephs.mechanics.imports.read import read_model
 
-USED, SILENT = object(), None
+FOLDER = Path(__file__).parent / "lost"
 URDF = """<robot name="r"><link name="a"/>
 <link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/>{inertial}</inertial>
   <collision><geometry><sphere radius="1"/></geometry>{collision}</collision>{link}</link>
@@ -29,67 +30,6 @@ def transmission(interface, more=""):
     return f'<transmission name="t"><type>Simple</type>{joint}<actuator name="m"/></transmission>'
 
 
-URDF_ROWS = [
-    ("link", '<contact><lateral_friction value="0.3"/></contact>', USED),
-    ("link", '<contact><rolling_friction value="0.3"/></contact>', USED),
-    ("link", '<contact><spinning_friction value="0.3"/></contact>', USED),
-    ("link", '<contact><stiffness value="3e3"/></contact>', USED),
-    ("link", '<contact><damping value="3"/></contact>', "contact/damping of links: b"),
-    ("link", '<contact><restitution value="0.3"/></contact>', "contact/restitution of links: b"),
-    ("link", '<contact><restitution value="0.0"/></contact>', SILENT),
-    ("link", '<contact><contact_erp value="0.3"/></contact>', "contact/contact_erp of links: b"),
-    ("link", "<self_collision_checking/>", "self_collision_checking of links: b"),
-    ("inertial", '<density value="3"/>', "inertial/density of links: b"),
-    ("collision", "<verbose/>", "verbose of collisions: b"),
-    ("collision", '<origin xyz="0 0 1"/>', USED),
-    ("collision", '<material name="red"/>', SILENT),
-    ("limit", 'velocity="3"', "limit/velocity of joints: j"),
-    ("limit", 'effort="3"', "limits of effort of: j"),
-    ("limit", 'effort="1.79769e+308"', SILENT),
-    ("limit", 'acceleration="3"', "limit/acceleration of joints: j"),
-    ("joint", '<dynamics damping="3"/>', USED),
-    ("joint", '<dynamics friction="3"/>', USED),
-    ("joint", '<dynamics stiffness="3"/>', "dynamics/stiffness of joints: j"),
-    ("joint", '<safety_controller k_velocity="3"/>', "safety_controller of joints: j"),
-    ("joint", '<calibration rising="3"/>', "calibration of joints: j"),
-    ("robot", '<gazebo reference="b"><mu1>0.3</mu1></gazebo>', USED),
-    ("robot", '<gazebo reference="b"><mu1 value="0.3"/><mu2 value="0.3"/></gazebo>', USED),
-    ("robot", '<gazebo reference="b"><mu1>0.3</mu1><mu2>0.2</mu2></gazebo>', "mu2 of links: b"),
-    ("robot", '<gazebo reference="b"><mu2>0.2</mu2></gazebo>', "mu2 of links: b"),
-    ("robot", '<gazebo reference="b"><kp>1e4</kp></gazebo>', USED),
-    ("robot", '<gazebo reference="b"><kp>1e13</kp></gazebo>', r"rigid contacts \(kp\) of: b"),
-    ("robot", '<gazebo reference="b"><kd>1e4</kd></gazebo>', "kd of links: b"),
-    ("robot", '<gazebo reference="b"><fdir1>1 0 0</fdir1></gazebo>', "fdir1 of links: b"),
-    ("robot", '<gazebo reference="b"><minDepth>1e-3</minDepth></gazebo>', "minDepth of links: b"),
-    ("robot", '<gazebo reference="b"><maxVel>1</maxVel></gazebo>', "maxVel of links: b"),
-    ("robot", '<gazebo reference="b"><selfCollide>true</selfCollide></gazebo>', "selfCollide of links: b"),
-    ("robot", '<gazebo reference="b"><selfCollide>false</selfCollide></gazebo>', SILENT),
-    ("robot", '<gazebo reference="b"><turnGravityOff>true</turnGravityOff></gazebo>', "turnGravityOff of links: b"),
-    ("robot", '<gazebo reference="b"><gravity>false</gravity></gazebo>', "gravity of links: b"),
-    ("robot", '<gazebo reference="b"><dampingFactor>0.1</dampingFactor></gazebo>', "dampingFactor of links: b"),
-    (
-        "robot",
-        '<gazebo reference="b"><velocity_decay><linear>1</linear></velocity_decay></gazebo>',
-        "velocity_decay/linear of links: b",
-    ),
-    ("robot", '<gazebo reference="b"><collision><surface/></collision></gazebo>', "collision of links: b"),
-    ("robot", '<gazebo reference="b"><material>Gazebo/Red</material></gazebo>', SILENT),
-    ("robot", '<gazebo reference="b"><sensor name="s"/></gazebo>', "sensors: b"),
-    ("robot", '<gazebo reference="j"><springStiffness>3</springStiffness></gazebo>', USED),
-    ("robot", '<gazebo reference="j"><stopErp>0.1</stopErp></gazebo>', "stopErp of joints: j"),
-    ("robot", '<gazebo reference="j"><provideFeedback>true</provideFeedback></gazebo>', SILENT),
-    ("robot", '<gazebo><plugin name="p" filename="f"/></gazebo>', "plugins: r"),
-    ("inertial", '<origin quat_xyzw="1 0 0 1" xyz="0 0 1"/>', USED),
-    ("inertial", '<origin xyz="0 0 1" rot="1 0 0"/>', "inertial/origin/rot of links: b"),
-    ("inertial", "<mass value='3'/>", "inertial/mass of links: b"),
-    ("robot", transmission("EffortJointInterface"), USED),
-    ("robot", transmission("hardware_interface/EffortJointInterface"), USED),
-    ("robot", transmission("PositionJointInterface"), "transmissions whose interface is no effort: t"),
-    ("robot", transmission("VelocityJointInterface"), "transmissions whose interface is no effort: t"),
-    ("robot", transmission("", "<offset>3</offset>"), "joint/offset of transmissions: t"),
-    ("robot", '<ros2_control name="c"/>', "ros2_control of robots: r"),
-    ("robot", '<material name="red"/>', SILENT),
-]
 SDF = """<sdf version="1.7"><world name="w"><gravity>0 0 -9.81</gravity>{world}<model name="floor"><static>1</static>
 <link name="l"><collision name="c"><geometry><plane/></geometry></collision></link></model>
 <model name="m"><pose>0 0 2 0 0 0</pose>{model}<link name="b"><inertial><mass>1</mass>{inertial}</inertial>
@@ -99,90 +39,6 @@ SDF = """<sdf version="1.7"><world name="w"><gravity>0 0 -9.81</gravity>{world}<
 </world></sdf>"""
 
 
-def nested(path, value):
-    """Elements within each other with a value."""
-    first, _, rest = path.partition("/")
-    return f"<{first}>{nested(rest, value) if rest else value}</{first}>"
-
-
-SDF_ROWS = [
-    ("link", "velocity_decay/linear", "0.1", "of links: b"),
-    ("link", "velocity_decay/linear", "0.0", SILENT),
-    ("link", "velocity_decay/angular", "0.1", "of links: b"),
-    ("link", "gravity", "0", "of links: b"),
-    ("link", "gravity", "true", SILENT),
-    ("link", "kinematic", "1", "of links: b"),
-    ("link", "self_collide", "1", "of links: b"),
-    ("link", "enable_wind", "1", "of links: b"),
-    ("link", "must_be_base_link", "1", SILENT),
-    ("link", "sleep", "1", "of links: b"),
-    ("inertial", "fluid_added_mass/xx", "1", "inertial/fluid_added_mass of links: b"),
-    ("inertial", "density", "1", "inertial/density of links: b"),
-    ("inertial", "pose", "0 0 1 0 0 0", USED),
-    ("collision", "surface/friction/ode/mu", "0.3", USED),
-    ("collision", "surface/friction/ode/mu2", "0.3", "of collisions: b_c"),
-    ("collision", "surface/friction/ode/mu2", "1", SILENT),
-    ("collision", "surface/friction/ode/fdir1", "1 0 0", "of collisions: b_c"),
-    ("collision", "surface/friction/ode/slip1", "1", "of collisions: b_c"),
-    ("collision", "surface/friction/ode/slip2", "1", "of collisions: b_c"),
-    ("collision", "surface/friction/bullet/friction", "0.3", "of collisions: b_c"),
-    ("collision", "surface/friction/bullet/rolling_friction", "0.3", "of collisions: b_c"),
-    ("collision", "surface/friction/torsional/patch_radius", "0.3", "of collisions: b_c"),
-    ("collision", "surface/friction/torsional/surface_radius", "0.3", "of collisions: b_c"),
-    ("collision", "surface/bounce/restitution_coefficient", "0.3", "of collisions: b_c"),
-    ("collision", "surface/bounce/threshold", "0.3", SILENT),
-    ("collision", "surface/soft_contact/dart/stiffness", "0.3", "surface/soft_contact of collisions: b_c"),
-    ("collision", "surface/contact/ode/kp", "1e4", USED),
-    ("collision", "surface/contact/ode/kp", "1e12", r"rigid contacts \(kp\) of: b_c"),
-    ("collision", "surface/contact/ode/kd", "10", "of collisions: b_c"),
-    ("collision", "surface/contact/ode/soft_cfm", "0.1", "of collisions: b_c"),
-    ("collision", "surface/contact/ode/soft_erp", "0.1", "of collisions: b_c"),
-    ("collision", "surface/contact/ode/soft_erp", "0.2", SILENT),
-    ("collision", "surface/contact/ode/max_vel", "0.1", "of collisions: b_c"),
-    ("collision", "surface/contact/ode/min_depth", "0.1", "of collisions: b_c"),
-    ("collision", "surface/contact/bullet/kp", "1e4", "of collisions: b_c"),
-    ("collision", "surface/contact/elastic_modulus", "1e9", "of collisions: b_c"),
-    ("collision", "surface/contact/poissons_ratio", "0.1", "of collisions: b_c"),
-    ("collision", "surface/contact/collide_bitmask", "0", USED),
-    ("collision", "surface/contact/collide_bitmask", "0x0", USED),
-    ("collision", "surface/contact/collide_bitmask", "1", "of collisions: b_c"),
-    ("collision", "surface/contact/collide_bitmask", "65535", SILENT),
-    ("collision", "surface/contact/collide_bitmask", "0xFFFF", SILENT),
-    ("collision", "surface/contact/category_bitmask", "1", "of collisions: b_c"),
-    ("collision", "surface/contact/collide_without_contact", "true", USED),
-    ("collision", "max_contacts", "3", "of collisions: b_c"),
-    ("collision", "laser_retro", "3", SILENT),
-    ("collision", "drake:proximity_properties", "3", "of collisions: b_c"),
-    ("joint", "physics/ode/erp", "0.3", "of joints: j"),
-    ("joint", "physics/ode/limit/cfm", "0.3", "of joints: j"),
-    ("joint", "physics/ode/limit/cfm", "0", SILENT),
-    ("joint", "physics/ode/provide_feedback", "1", SILENT),
-    ("joint", "axis2/xyz", "0 0 1", "axis2 of joints: j"),
-    ("axis", "initial_position", "0.3", "axis/initial_position of joints: j"),
-    ("axis", "mimic/multiplier", "0.3", "axis/mimic of joints: j"),
-    ("limit", "effort", "5", "axis/limit/effort of joints: j"),
-    ("limit", "effort", "-1", SILENT),
-    ("limit", "velocity", "5", "axis/limit/velocity of joints: j"),
-    ("limit", "velocity", "1e16", SILENT),
-    ("limit", "stiffness", "1e5", "axis/limit/stiffness of joints: j"),
-    ("limit", "dissipation", "2", "axis/limit/dissipation of joints: j"),
-    ("dynamics", "damping", "5", USED),
-    ("dynamics", "friction", "5", USED),
-    ("dynamics", "spring_stiffness", "5", USED),
-    ("dynamics", "viscosity", "5", "axis/dynamics/viscosity of joints: j"),
-    ("model", "self_collide", "1", USED),
-    ("model", "allow_auto_disable", "1", SILENT),
-    ("model", "enable_wind", "1", "of models: m"),
-    ("model", "gripper/grasp_check", "1", "grippers: gripper"),
-    ("world", "wind/linear_velocity", "1 0 0", "of worlds: w"),
-    ("world", "wind/linear_velocity", "0 0 0", SILENT),
-    ("world", "physics/max_step_size", "1", SILENT),
-    ("world", "physics/ode/constraints/cfm", "0.1", "of worlds: w"),
-    ("world", "physics/ode/constraints/contact_surface_layer", "0.1", "of worlds: w"),
-    ("world", "physics/simbody/contact/stiffness", "1", "physics/simbody/contact of worlds: w"),
-    ("world", "population/model_count", "3", "population of worlds: w"),
-    ("world", "plugin", "3", "plugins: plugin"),
-]
 MJCF = """<mujoco><compiler autolimits="true" angle="radian"/><option {option}>{flags}</option><worldbody>
 <geom name="floor" type="plane" size="1 1 1"/><body name="b" pos="0 0 3" {body}>
 <joint name="j" type="slide" axis="0 0 1" range="-1 1" frictionloss="0.1" damping="1" {joint}/>
@@ -192,72 +48,7 @@ MJCF = """<mujoco><compiler autolimits="true" angle="radian"/><option {option}>{
 <equality><joint name="e" joint1="j" active="false" {equality}/></equality>
 <tendon><fixed name="t" {tendon}><joint joint="j" coef="1"/></fixed></tendon>
 <actuator><general name="a" joint="j" ctrlrange="-1 1" {actuator}/></actuator></mujoco>"""
-MJCF_ROWS = [
-    ("option", 'gravity="0 0 -1"', USED),
-    ("option", 'density="1"', "options: density"),
-    ("option", 'viscosity="1"', "options: viscosity"),
-    ("option", 'wind="1 0 0"', "options: wind"),
-    ("option", 'impratio="3"', "options: impratio"),
-    ("option", 'timestep="3"', SILENT),
-    ("option", 'cone="elliptic"', SILENT),
-    ("option", 'actuatorgroupdisable="0"', "disabled actuators: a"),
-    ("flags", '<flag gravity="disable"/>', USED),
-    ("flags", '<flag frictionloss="disable"/>', USED),
-    ("flags", '<flag limit="disable"/>', USED),
-    ("flags", '<flag contact="disable"/>', USED),
-    ("flags", '<flag constraint="disable"/>', USED),
-    ("flags", '<flag damper="disable"/>', USED),
-    ("flags", '<flag clampctrl="disable"/>', USED),
-    ("flags", '<flag actuation="disable"/>', "disabled actuators: a"),
-    ("flags", '<flag override="enable"/>', "options: override"),
-    ("flags", '<flag warmstart="disable"/>', SILENT),
-    ("body", 'gravcomp="0.5"', "gravcomp of bodies: b"),
-    ("joint", 'stiffness="3"', USED),
-    ("joint", 'stiffness="3 1"', "stiffness that is not linear of: j"),
-    ("joint", 'stiffness="3" springref="1"', USED),
-    ("joint", 'springdamper="1 1"', USED),
-    ("joint", 'armature="1"', USED),
-    ("joint", 'ref="0.5"', USED),
-    ("joint", 'margin="1"', "margin of joints: j"),
-    ("joint", 'solreflimit="0.1 1"', USED),
-    ("joint", 'solreflimit="0.1 1" limited="false"', USED),
-    ("joint", 'solimplimit="0.1"', "solimplimit of joints: j"),
-    ("joint", 'solreffriction="0.1 1"', "solreffriction of joints: j"),
-    ("joint", 'solimpfriction="0.1"', "solimpfriction of joints: j"),
-    ("joint", 'actuatorfrcrange="-1 1"', "actuatorfrcrange of joints: j"),
-    ("joint", 'actuatorfrcrange="-1 1" actuatorfrclimited="false"', SILENT),
-    ("joint", 'actuatorgravcomp="true"', "actuatorgravcomp of joints: j"),
-    ("joint", 'group="1"', SILENT),
-    ("geom", 'friction="2"', USED),
-    ("geom", 'condim="6"', USED),
-    ("geom", 'solref="0.1 1"', USED),
-    ("geom", 'contype="0" conaffinity="0"', USED),
-    ("geom", 'margin="0.1"', "margin of geoms: g"),
-    ("geom", 'gap="0.1"', "gap of geoms: g"),
-    ("geom", 'solimp="0.1"', "solimp of geoms: g"),
-    ("geom", 'rgba="1 0 0 1"', SILENT),
-    ("pair", 'friction="0.3 0.3"', USED),
-    ("pair", 'friction="0.3 0.4"', "friction that depends on the direction, of: floor and h"),
-    ("pair", 'margin="0.1"', "margin of pairs: floor and h"),
-    ("pair", 'gap="0.1"', "gap of pairs: floor and h"),
-    ("pair", 'solimp="0.1"', "solimp of pairs: floor and h"),
-    ("pair", 'solreffriction="0.1 1"', "solreffriction of pairs: floor and h"),
-    ("equality", 'polycoef="1"', "inactive equality constraints: e"),
-    ("tendon", 'stiffness="3"', USED),
-    ("tendon", 'damping="3"', USED),
-    ("tendon", 'range="-3 3"', "range of tendons: t"),
-    ("tendon", 'frictionloss="3"', "frictionloss of tendons: t"),
-    ("tendon", 'armature="3"', "armature of tendons: t"),
-    ("tendon", 'actuatorfrcrange="-1 1"', "actuatorfrcrange of tendons: t"),
-    ("actuator", 'gear="3"', USED),
-    ("actuator", 'gainprm="3"', USED),
-    ("actuator", 'biastype="affine" biasprm="0 -3 -1"', USED),
-    ("actuator", 'forcerange="-3 3"', "forcerange of actuators: a"),
-    ("actuator", 'dyntype="filter" dynprm="3"', "activation of: a"),
-    ("actuator", 'damping="3"', "damping of actuators: a"),
-    ("actuator", 'armature="3"', "armature of actuators: a"),
-    ("actuator", 'delay="0.1" nsample="3"', "delay of actuators: a"),
-]  # fmt: skip
+MODELS = {"urdf": URDF, "sdf": SDF, "xml": MJCF}
 
 
 def blank(text):
@@ -279,33 +70,28 @@ def told(folder, text, suffix):
     return tables, "\n".join(left)
 
 
-def check(folder, suffix, text, place, row, found):
-    plain, already = told(folder, blank(text), suffix)
-    tables, said = told(folder, given(text, place, row), suffix)
-    if found is USED:
+def rows():
+    """Format, place, text and what becomes of it, of files with a line for each under a heading."""
+    for suffix in MODELS:
+        for part in (FOLDER / f"{suffix}.txt").read_text(encoding="utf-8").removeprefix("= ").split("\n= "):
+            place, *lines = part.split("\n")
+            yield from ((suffix, place, *line.split(" => ")) for line in lines if line)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "place", "row", "found"),
+    [pytest.param(*row, marks=[pytest.mark.long] * (row[0] == "xml")) for row in rows()],
+)
+def test_each_number_of_a_format_is_used_or_named_or_of_no_effect(suffix, place, row, found, tmp_path):
+    text = MODELS[suffix]
+    plain, already = told(tmp_path, blank(text), suffix)
+    tables, said = told(tmp_path, given(text, place, row), suffix)
+    if found == "used":
         assert repr(tables) != repr(plain)
-    elif found is SILENT:
+    elif found == "nothing":
         assert repr(tables) == repr(plain) and said == already
     else:
         assert re.search(f"not modelled: {found}", said), said
-
-
-@pytest.mark.parametrize(("place", "row", "found"), URDF_ROWS)
-def test_numbers_of_a_urdf(place, row, found, tmp_path):
-    check(tmp_path, "urdf", URDF, place, row, found)
-
-
-@pytest.mark.parametrize(("place", "path", "value", "found"), SDF_ROWS)
-def test_numbers_of_an_sdf(place, path, value, found, tmp_path):
-    if isinstance(found, str) and found.startswith("of "):
-        found = f"{path} {found}"
-    check(tmp_path, "sdf", SDF, place, nested(path, value), found)
-
-
-@pytest.mark.parametrize(("place", "row", "found"), MJCF_ROWS)
-def test_numbers_of_an_mjcf(place, row, found, tmp_path):
-    pytest.importorskip("mujoco")
-    check(tmp_path, "xml", MJCF, place, row, found)
 
 
 def test_a_long_list_is_short_in_the_message_and_whole_in_the_warning(tmp_path):

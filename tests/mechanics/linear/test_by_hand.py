@@ -77,6 +77,13 @@ def test_ports_of_joints_are_the_forces_on_them():
     assert np.array_equal(found.D, [[0.0]])
 
 
+def test_a_gap_of_a_system_is_named_by_its_joint():
+    _, system, _, poses, inputs = moving_four_bar()
+    apart = poses | {"bars.rocker.pe.q": poses["bars.rocker.pe.q"] + np.eye(7)[6] * 0.01}
+    with pytest.raises(ephs.AssemblyError, match=r"knee|pivot"):
+        ephs.linearize(system, apart, inputs=inputs)
+
+
 def test_a_voltage_drives_the_current_that_it_sees():
     """Of the coil b' = u − …, i = b/l, by hand-made attachments in all states of the system."""
     scene = shipped("motor-four-bar")

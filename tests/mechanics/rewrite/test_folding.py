@@ -8,22 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ephs
-from ephs import Path, Pattern, System, junction, library, quantity
+from ephs import Path, System, quantity
 from ephs.mechanics import joint
 from ephs.mechanics.elements import components
 from ephs.mechanics.rewrite.folding import FOLD
-from ephs.mechanics.rewrite.rewrite import rewrite, sites_of
+from ephs.mechanics.rewrite.rewrite import rewrite
 from ephs.mechanics.scene.build import scene_system
 from ephs.operad import PortType
 from ephs.semantics import StructureError
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.primitives.pullback import Map, pull_back
 from ephs.semantics.spaces import PAIRS, SE3, pair
-from ephs.semantics.systems.laws import random_probe
 from ephs.semantics.verdicts.checks import random_point
 from ephs.semantics.verdicts.search import search
 from ephs.testing import mechanisms
 from tests.mechanics.kernels import Draw, agreeing
+from tests.mechanics.rewrite.rewriting import levers, same_relation
 from tests.numerics import generators, largest, seeds
 from tests.scenes import SCENES, shipped
 
@@ -32,19 +32,6 @@ MOMENTUM = PortType(quantity.body_momentum, True)
 
 def joint_pair(kind):
     return pair(kind, **dict.fromkeys(PAIRS[kind].parameters, 0.3))
-
-
-def same_relation(before, after, seed):
-    """Equal relations at a random state, within the error bounds."""
-    probe = random_probe(before, seed)
-    state = {str(path): value for path, value in probe.state.items()}
-    # the arguments of an Onsager matrix whose ports were folded would be others: there they are zero
-    kept = dict(after.leaves())
-    efforts = {
-        path: probe.efforts[path] for path, part in before.leaves() if kept.get(path) is part and path in probe.efforts
-    }
-    one, other = (system.relation(probe.reference).at(state, efforts=efforts) for system in (before, after))
-    assert one.same(other)
 
 
 # ---- primitives through maps -----------------------------------------------------------------------------------
@@ -147,139 +134,12 @@ def test_a_folded_mechanism_has_the_same_relation(scene, seed):
     same_relation(system, done.system, seed)
 
 
-@st.composite
-def lever_networks(draw, loops=False):
-    """Levers and friction between junctions, some of which store momentum or are outer ports, one may stand still."""
-    rng = np.random.default_rng(draw(seeds))
-    count = draw(st.integers(2, 6))
-    roles = [draw(st.sampled_from(["plain", "plain", "stored", "open"])) for _ in range(count)]
-    junctions = {f"j{i}": junction(quantity.momentum, exposed=role == "open") for i, role in enumerate(roles)}
-    boxes, parts = {}, {}
-    for i, role in enumerate(roles):
-        if role == "stored":
-            boxes[f"mass{i}"], parts[f"mass{i}"] = {"p": f"j{i}"}, library.point_mass(m=float(rng.uniform(0.5, 2.0)))
-        if draw(st.booleans()):
-            junctions[f"s{i}"] = junction(quantity.entropy)
-            boxes[f"rub{i}"], parts[f"rub{i}"] = (
-                {"p": f"j{i}", "s": f"s{i}"},
-                library.friction(d=float(rng.uniform(0.1, 1.0))),
-            )
-            boxes[f"env{i}"], parts[f"env{i}"] = {"s": f"s{i}"}, library.environment()
-    for k in range(draw(st.integers(count, count + 2)) if loops else count - 1):
-        a = draw(st.integers(0, count - 1)) if k >= count - 1 else k + 1
-        b = draw(st.integers(0, count - 1)) if k >= count - 1 else draw(st.integers(0, k))
-        ratio = float(rng.choice([1.0, rng.uniform(0.5, 2.0)]))
-        name = f"lever{k}"
-        boxes[name] = {"a": f"j{a}", "b": f"j{b}"}
-        parts[name] = ephs.transformer({"a": quantity.momentum, "b": quantity.momentum}, [[ratio]])
-    if draw(st.booleans()):
-        boxes["still"], parts["still"] = {"p": "j0"}, components.ground(quantity.momentum)
-    return Pattern(junctions=junctions, boxes=boxes)(parts)
-
-
-def in_order(system, rng):
-    """Fold site by site in a random order until none is left."""
-    done = system.flatten()
-    while sites := [site for site in sites_of(done, FOLD) if not site.refusal]:
-        done = sites[int(rng.integers(len(sites)))].apply(done).system
-    return done
-
-
-@settings(max_examples=60)
-@given(system=lever_networks(), seed=seeds)
-def test_the_order_of_folding_makes_no_difference(system, seed):
-    rng = np.random.default_rng(seed)
-    one, other = in_order(system, rng), in_order(system, rng)
-    assert one.pattern.isomorphic(other.pattern, fix_interface=True)
-    same_relation(one, other, seed)
-    same_relation(system, one, seed)
-    whole = rewrite(system, [FOLD]).system
-    assert whole.pattern.isomorphic(one.pattern, fix_interface=True)
-
-
-@settings(max_examples=60)
-@given(system=lever_networks(loops=True), seed=seeds)
-def test_loops_of_levers_mean_what_they_did(system, seed):
-    """They repeat what others say, or hold everything; the split of a flow between two ports of a box is arbitrary."""
-    rng = np.random.default_rng(seed)
-    one, other = in_order(system, rng), in_order(system, rng)
-    same_relation(one, other, seed)
-    same_relation(system, one, seed)
-
-
-@settings(max_examples=10)
-@given(scene=mechanisms(max_bodies=2), seed=seeds)
-def test_nor_does_it_in_mechanisms(scene, seed):
-    rng = np.random.default_rng(seed)
-    system = scene.system()
-    one = in_order(system, rng)
-    assert rewrite(system, [FOLD]).system.pattern.isomorphic(one.pattern, fix_interface=True)
-    same_relation(system, one, seed)
-
-
-def chain(**middle):
-    """A mass, a lever, a junction that a test may spoil, and a second lever to friction."""
-    junctions = {name: junction(quantity.momentum) for name in ("a", "b", "c")}
-    junctions["b"] = junction(quantity.momentum, exposed=middle.get("exposed", False))
-    junctions["s"] = junction(quantity.entropy)
-    boxes = {
-        "mass": {"p": "a"},
-        "first": {"x": "a", "y": "b"},
-        "second": {"x": "b", "y": "c"},
-        "rub": {"p": "c", "s": "s"},
-        "env": {"s": "s"},
-    }
-    ports = {"x": quantity.momentum, "y": quantity.momentum}
-    parts = {
-        "mass": library.point_mass(m=2.0),
-        "first": ephs.transformer(ports, [[3.0]]),
-        "second": ephs.transformer(ports, [[0.5]]),
-        "rub": library.friction(d=0.4),
-        "env": library.environment(),
-    }
-    if middle.get("stored"):
-        boxes["load"], parts["load"] = {"p": "b"}, library.point_mass(m=1.0)
-    return Pattern(junctions=junctions, boxes=boxes)(parts)
-
-
 def test_levers_in_series_multiply():
-    done = rewrite(chain(), [FOLD])
+    done = rewrite(levers(), [FOLD])
     assert {str(path) for path, _ in done.system.leaves()} == {"mass", "rub", "env"}
     rub = dict(done.system.leaves())[Path.of("rub")]
     matrix = rub.matrix({}, np.array([1.0, 0.0]), Reference())
     assert matrix[0, 0] / 293.15 == pytest.approx(0.4 * (3.0 * 0.5) ** 2, rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("fault", "words"), [("exposed", "b is an outer port"), ("stored", "load stores a state at b")]
-)
-def test_a_junction_that_is_needed_is_not_folded(fault, words):
-    system = chain(**{fault: True})
-    refused = [site for site in sites_of(system, FOLD) if words in site.refusal]
-    assert refused
-    with pytest.raises(ephs.AssemblyError, match=words):
-        refused[0].apply(system)
-    done = rewrite(system, [FOLD]).system
-    assert {str(path) for path, _ in done.leaves()} >= {"first", "rub"}
-    same_relation(system, done, 3)
-
-
-def test_a_junction_whose_state_is_read_is_not_folded():
-    reader = ephs.gyrator(
-        {"a": quantity.flux_linkage, "b": quantity.angular_momentum, "~x": quantity.momentum},
-        lambda x: [[0.0, x], [-x, 0.0]],
-    )
-    junctions = {name: junction(quantity.momentum, exposed=name == "p") for name in ("p", "b")}
-    junctions |= {
-        "a": junction(quantity.flux_linkage, exposed=True),
-        "c": junction(quantity.angular_momentum, exposed=True),
-    }
-    boxes = {"lever": {"x": "p", "y": "b"}, "reader": {"a": "a", "b": "c", "x": "~b"}}
-    ports = {"x": quantity.momentum, "y": quantity.momentum}
-    system = Pattern(junctions=junctions, boxes=boxes)(lever=ephs.transformer(ports, [[2.0]]), reader=reader)
-    refusals = [site.refusal for site in sites_of(system, FOLD)]
-    assert any("reader reads the state of b" in refusal for refusal in refusals)
-    assert all(refusals)
 
 
 # ---- steps -----------------------------------------------------------------------------------------------------

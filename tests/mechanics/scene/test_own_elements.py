@@ -3,7 +3,6 @@
 import json
 import re
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.mechanics.scene.build import initial_state
 from ephs.mechanics.scene.custom import ElementError
 from ephs.mechanics.scene.document import scene_from_text, scene_to_text
-from ephs.mechanics.scene.own_units import OwnUnits, mobility_of
+from ephs.mechanics.scene.own_units import mobility_of
 from ephs.mechanics.scene.parameters import names, read, varied
 from ephs.mechanics.scene.reference import scene_tables
 from ephs.mechanics.scene.registry import REGISTERED
@@ -232,16 +231,6 @@ def test_a_rod_takes_one_freedom_and_a_tendon_none(tmp_path):
         assert mobility_of(problem) == dense_mobility(problem.descriptor, x) == Mobility(count, 0)
 
 
-def test_runs_in_other_units_agree(tmp_path):
-    scene = dragged(tmp_path, coefficient=1.0)
-    small = rescaled(scene, 1e-6, 1e-9, 1e-3)
-    assert small.elements["drags"]["air"].coefficient == pytest.approx(1.0 * 1e-9 / 1e-6)
-    assert OwnUnits.of(small) != OwnUnits.of(scene)
-    one = ephs.simulate(scene, 1.0, method="rk87", rtol=1e-9)
-    other = ephs.simulate(small, 1e-3, method="rk87", rtol=1e-9)
-    assert other.body("ball").position[-1] * 1e6 == pytest.approx(one.body("ball").position[-1], rel=1e-6)
-
-
 def test_a_part_does_as_its_elements_do_flat(tmp_path):
     rod = {"bodies": ["ground", "ball"], "at1": [0.1, 0.0, 0.0], "at2": [0.0, 0.1, 0.0]}
     text = FALL + "position = [0.6, 0.0, -0.8]\n" + BOX + table("drags", "air", GOOD) + table("rods", "r", rod)
@@ -261,24 +250,6 @@ def test_a_part_does_as_its_elements_do_flat(tmp_path):
     again = scene_from_text(scene_to_text(nested))
     assert problem_of_scene(again).initial.keys() == problem_of_scene(nested).initial.keys()
     assert again.system() == nested.system()
-
-
-def test_solutions_are_saved_with_it(tmp_path):
-    sol = ephs.simulate(dragged(tmp_path), 0.5, method="rk54")
-    sol.save(tmp_path / "run.nc")
-    again = ephs.load_solution(tmp_path / "run.nc")
-    assert again.scene.elements == sol.scene.elements
-    assert again.body("ball").velocity == pytest.approx(sol.body("ball").velocity, abs=1e-12)
-    REGISTERED.pop("drags")
-    with pytest.raises(ValueError, match=r"\[drags.NAME\] is not registered"):
-        ephs.load_solution(tmp_path / "run.nc")
-
-
-def test_a_sweep_varies_it(tmp_path):
-    found = ephs.sweep(
-        dragged(tmp_path), {"drags.air.coefficient": [0.1, 1.0]}, 0.5, outputs=["thermal.box.temperature"]
-    )
-    assert found["thermal.box.temperature"].sizes["drags.air.coefficient"] == 2
 
 
 def test_an_element_on_a_joint_oscillates_for_all_methods_and_goes_on(tmp_path):
@@ -451,10 +422,3 @@ def test_its_lines_are_drawn_in_parts_too(tmp_path):
     line = lines_of(nested)["rods.left.r-1"]
     assert (line.body1, line.body2) == ("ground", "left.ball")
     assert line.at1.tolist() == [1.0, 0.0, 1.0] and line.at2.tolist() == [0.0, 0.0, 0.1]
-
-
-def test_another_scene_is_untouched_by_changes(tmp_path):
-    scene = dragged(tmp_path)
-    moved = scene.with_state(coordinates={"ball": [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]})
-    assert moved.elements == scene.elements
-    assert replace(scene, name="other").elements == scene.elements

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 import ephs
 from ephs.mechanics.runs.scene_problem import problem_of_scene
-from ephs.mechanics.scene.rescaled import rescaled
 from ephs.mechanics.tree.equations.equations import ReducedEquations
 from ephs.operad import Path
 from tests.written import scene_of_text
@@ -144,17 +143,6 @@ def test_an_actuator_pulls_at_a_tendon_by_its_ratio_within_its_limits(tmp_path):
     one, other = (ended(scene, "rk87", given)[0] for given in ({"actuators.winch": 5.0}, {"actuators.cable": 6.0}))
     assert np.allclose(one, other, rtol=0.0, atol=1e-12)
     assert not np.allclose(one, ended(scene, "rk87")[0], atol=1e-3)
-
-
-def test_a_tiny_mechanism_does_as_a_large_one():
-    scene = loaded(CABLE)
-    tiny = rescaled(scene, 1e-5, 1e-12, 1e-3)  # by whose actuators one control is as much
-    one = ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
-    other = ephs.simulate(tiny, 3e-4, method="rk87", rtol=1e-10, inputs={"actuators.cable": 5.0}, audit="off")
-    for name in ("pin", "elbow"):
-        assert other.joint(name).coordinate[-1] == pytest.approx(one.joint(name).coordinate[-1], abs=1e-8)
-    at = "tendons.cable.spring.q"
-    assert 1e5 * other[at].ravel()[-1] == pytest.approx(one[at].ravel()[-1], rel=1e-8)
 
 
 def test_the_length_is_a_state_where_it_stores_energy():

@@ -1,11 +1,16 @@
 """Sensitivities are the derivatives of the computed motion: as extrapolated differences of whole runs say."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 import pytest
 
 import ephs
 from ephs.mechanics.scene.parameters import read, varied
 from ephs.mechanics.sensitivity.readings import reading_of
+from tests.mechanics.ball import BALL
 from tests.numerics import largest, slope
 from tests.oscillator import damped_oscillator
 from tests.scenes import shipped
@@ -19,75 +24,128 @@ def reading(solution, name):
     return reading_of(solution.scene or solution.system, name)(solution)
 
 
-def agrees(scene, paths, until, names, tolerance=GOOD, compared=None, **options):
-    """Compare each derivative with differences of whole runs: of the same steps, or of ones good to rounding."""
-    found = ephs.sensitivity(scene, paths, until, **options)
+WOUND = """
+format = 1
+[bodies.arm]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+position = [0.3, 0.0, 0.0]
+[joints.pin]
+type = "screw"
+pitch = 0.1
+bodies = ["ground", "arm"]
+at = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[motors.m]
+joint = "pin"
+constant = 0.2
+resistance = 1.25
+voltage = 1.3
+"""
+"""A motor without inductance: its current follows from a balance."""
+
+
+HARD = BALL.replace("stiffness = 1e5\nloss = 0.2", "restitution = 0.5").replace("slip = {slip}\n", "").format()
+
+
+@dataclass(frozen=True)
+class Case:
+    """Paths of a model, what is read of its motion, and how it is run; differences over a part of the numbers."""
+
+    model: Callable[[], ephs.Scene]
+    paths: str
+    names: str
+    until: float
+    options: dict[str, Any]
+    compared: dict[str, Any] | None = None
+    tolerance: float = 1e-7
+    part: float = 1e-2
+    extrapolated: int = 2
+
+
+FOUR_BAR = Case(
+    lambda: shipped("four-bar"),
+    "bodies.coupler.mass bodies.rocker.inertia[2] joints.main.friction joints.main.drive "
+    "joints.knee.frame1.position[0] joints.main.coordinate world.gravity[1]",
+    "joints.main.coordinate joints.knee.rate bodies.coupler.position heat work kinetic",
+    0.16, {"method": "rk54", "step": 0.02}, tolerance=GOOD,
+)  # fmt: skip
+NATURAL = {"method": "natural", "step": 0.01}
+EXACT = {"rtol": 1e-12, "atol": 1e-13}
+CHAIN = Case(
+    lambda: shipped("chain"),
+    "bodies.rod1.mass joints.j0.coordinate joints.j2.frame2.position[1] joints.j1.rate",
+    "joints.j3.coordinate joints.j0.rate bodies.rod3.velocity energy",
+    0.5, EXACT | {"save_at": np.linspace(0.0, 0.5, 4)},
+    {"method": "rk87", "save_at": np.linspace(0.0, 0.5, 4)} | EXACT,
+)  # fmt: skip
+MOTOR = Case(
+    lambda: scene_of_text(WOUND),
+    "motors.m.resistance motors.m.constant motors.m.voltage bodies.arm.mass",
+    "joints.pin.coordinate heat",
+    0.1, {"method": "rk87", "step": 0.02}, tolerance=GOOD,
+)  # fmt: skip
+THROWN = Case(
+    lambda: scene_of_text(BALL.format(slip=2e-2).replace("1e5", "1e4").replace("0.3]", "0.12]")),
+    "contacts.ball_floor.stiffness contacts.ball_floor.loss contacts.ball_floor.friction bodies.ball.mass",
+    "bodies.ball.position bodies.ball.velocity",
+    0.12, {"method": "rk54", "step": 2e-4}, tolerance=1e-5, part=1e-4, extrapolated=0,
+)  # fmt: skip
+DIFFERENCED = {
+    "a loop, rk54": FOUR_BAR,
+    "a loop, rk87": replace(FOUR_BAR, options={"method": "rk87", "step": 0.04}),
+    "a loop, natural": replace(
+        FOUR_BAR, paths="bodies.coupler.mass joints.main.friction joints.main.drive joints.main.coordinate", until=0.05,
+        names="joints.main.coordinate joints.main.rate heat work potential", options=NATURAL, tolerance=1e-7,
+    ),
+    "heat, natural": Case(
+        lambda: shipped("slider-crank"),
+        "bodies.rod.mass joints.bearing.friction thermal.housing.capacity joints.bearing.rate",
+        "joints.bearing.coordinate joints.bearing.rate heat work potential thermal.housing.temperature", 0.05, NATURAL,
+    ),
+    "chosen steps are held": CHAIN,
+    "on a group": Case(
+        lambda: shipped("heavy-top"),
+        "bodies.top.inertia[0] bodies.top.mass joints.tip.rate[1]",
+        "bodies.top.quaternion bodies.top.angular_velocity joints.tip.coordinate", 0.02,
+        {"method": "rk87", "step": 2e-3},
+    ),
+    "a rest of zero, whose spring is another relation": replace(
+        CHAIN, model=lambda: varied(shipped("chain"), {"joints.j0.stiffness": 5.0}), paths="joints.j0.rest",
+        names="joints.j0.rate", until=0.2, options={"method": "rk54", "step": 0.02}, compared=None, tolerance=GOOD,
+    ),
+    "efforts that balances determine, rk87": MOTOR,
+    "efforts that balances determine, natural": replace(MOTOR, options={"method": "natural", "step": 0.02}),
+    "through a contact": THROWN,
+}  # fmt: skip
+
+
+SHORT = ("a rest", "efforts", "through")
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=[pytest.mark.long] * (not name.startswith(SHORT))) for name in DIFFERENCED]
+)
+def test_derivatives_are_differences_of_whole_runs(case):
+    """Of the same steps, or of ones good to rounding: those of chosen steps are of the motion itself."""
+    case = DIFFERENCED[case]
+    model, names = case.model(), case.names.split()
+    found = ephs.sensitivity(model, case.paths.split(), case.until, **case.options)
     got = {name: found[name] for name in names}
-    run = compared or {"save_at": found.t} | options
-    for number, path in enumerate(paths):
-        value = read(scene, path)
+    for number, path in enumerate(case.paths.split()):
+        value = read(model, path)
 
         def at(by, path=path, value=value):
-            motion = ephs.simulate(varied(scene, {path: value + by}, strict=False), until, **run)
+            run = case.compared or case.options
+            motion = ephs.simulate(varied(model, {path: value + by}, strict=False), case.until, audit="off", **run)
             return np.concatenate([reading(motion, name).ravel() for name in names])
 
-        expected = slope(at, 1e-2 * (abs(value) if abs(value) > 1e-9 else 1.0), 2)
-        mine = np.concatenate([got[name][..., number].ravel() for name in names])
-        start = 0
+        expected = slope(at, case.part * (abs(value) if abs(value) > 1e-9 else 1.0), case.extrapolated)
         for name in names:
-            size = got[name][..., number].size
-            part = slice(start, start + size)
-            start += size
+            mine, expected = got[name][..., number].ravel(), np.atleast_1d(expected)
+            theirs, expected = expected[: mine.size], expected[mine.size :]
             own = largest(reading(found.solution, name)) / max(abs(value), 1.0)
-            scale = max(largest(expected[part]), 1e-3 * own)
-            assert largest(mine[part] - expected[part]) < tolerance * scale, (path, name)
-    return found
-
-
-@pytest.mark.parametrize("method", ["rk54", "rk87"])
-def test_constant_steps_of_explicit_methods_with_a_closed_loop(method):
-    scene = shipped("four-bar")
-    paths = ["bodies.coupler.mass", "bodies.rocker.inertia[2]", "joints.main.friction", "joints.main.drive",
-             "joints.knee.frame1.position[0]", "joints.main.coordinate", "world.gravity[1]"]  # fmt: skip
-    names = ["joints.main.coordinate", "joints.knee.rate", "bodies.coupler.position", "heat", "work", "kinetic"]
-    step = 0.02 if method == "rk54" else 0.04
-    agrees(scene, paths, 0.16, names, method=method, step=step, compared={"method": method, "step": step})
-
-
-def test_chosen_steps_are_held():
-    """The derivative of a run whose steps were chosen is that of the motion itself, to the tolerances."""
-    scene = shipped("chain")
-    paths = ["bodies.rod1.mass", "joints.j0.coordinate", "joints.j2.frame2.position[1]", "joints.j1.rate"]
-    names = ["joints.j3.coordinate", "joints.j0.rate", "bodies.rod3.velocity", "energy"]
-    exact = {"rtol": 1e-12, "atol": 1e-13}
-    times = np.linspace(0.0, 0.5, 4)
-    agrees(scene, paths, 0.5, names, 1e-7, {"method": "rk87", "save_at": times} | exact, save_at=times, **exact)
-
-
-def test_bodies_that_turn_freely():
-    """Of a body on a group: initial velocities, inertia, all left-trivialised."""
-    scene = shipped("heavy-top")
-    paths = ["bodies.top.inertia[0]", "bodies.top.mass", "joints.tip.rate[1]"]
-    names = ["bodies.top.quaternion", "bodies.top.angular_velocity", "joints.tip.coordinate"]
-    agrees(scene, paths, 0.02, names, 1e-7, method="rk87", step=2e-3, compared={"method": "rk87", "step": 2e-3})
-
-
-@pytest.mark.parametrize("scene", ["four-bar", "slider-crank"])
-def test_natural_steps_of_scenes(scene):
-    paths = {
-        "four-bar": ["bodies.coupler.mass", "joints.main.friction", "joints.main.drive", "joints.main.coordinate"],
-        "slider-crank": [
-            "bodies.rod.mass",
-            "joints.bearing.friction",
-            "thermal.housing.capacity",
-            "joints.bearing.rate",
-        ],
-    }[scene]
-    joint = "main" if scene == "four-bar" else "bearing"
-    names = [f"joints.{joint}.coordinate", f"joints.{joint}.rate", "heat", "work", "potential"]
-    names += ["thermal.housing.temperature"] if scene == "slider-crank" else []
-    options = {"method": "natural", "step": 0.01}
-    agrees(shipped(scene), paths, 0.05, names, 1e-7, options, **options)
+            assert largest(mine - theirs) < case.tolerance * max(largest(theirs), 1e-3 * own), (path, name)
 
 
 def test_systems_by_components_and_initial_values():
@@ -131,50 +189,6 @@ def test_a_friction_of_zero_has_a_derivative_from_above():
     assert found["joints.j0.rate"][-1, 0, 0] == pytest.approx(expected, rel=1e-8)
 
 
-def test_a_rest_of_zero_has_a_derivative():
-    """Springs whose force is 0 at the coordinate 0 are other relations."""
-    scene = shipped("chain")
-    agrees(
-        varied(scene, {"joints.j0.stiffness": 5.0}),
-        ["joints.j0.rest"],
-        0.2,
-        ["joints.j0.rate"],
-        step=0.02,
-        method="rk54",
-    )
-
-
-WOUND = """
-format = 1
-[bodies.arm]
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-position = [0.3, 0.0, 0.0]
-[joints.pin]
-type = "screw"
-pitch = 0.1
-bodies = ["ground", "arm"]
-at = [0.0, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-[motors.m]
-joint = "pin"
-constant = 0.2
-resistance = 1.25
-voltage = 1.3
-"""
-"""A motor without inductance: its current follows from a balance."""
-
-
-@pytest.mark.parametrize("options", [{"method": "rk87", "step": 0.02}, {"method": "natural", "step": 0.02}], ids=str)
-def test_efforts_that_balances_determine_have_derivatives(options):
-    paths, name = ["motors.m.resistance", "motors.m.constant", "motors.m.voltage", "bodies.arm.mass"], "joints.pin"
-    scene = scene_of_text(WOUND)
-    found = agrees(scene, paths, 0.1, [f"{name}.coordinate", "heat"], **options)
-    if options["method"] == "rk87":
-        back = ephs.gradient(scene, paths, [0.1], {f"{name}.coordinate": [1.0]}, **options)
-        np.testing.assert_allclose(list(back.derivatives.values()), found[f"{name}.coordinate"][-1, 0], rtol=1e-9)
-
-
 @pytest.mark.parametrize("method", ["rk54", "natural"])
 @pytest.mark.parametrize(
     ("text", "path"), [(WOUND, "joints.pin.pitch"), (WOUND.replace("1.25", "1.0"), "motors.m.resistance")]
@@ -194,12 +208,13 @@ def test_numbers_that_are_in_equations_and_in_no_table_are_refused(method, text,
         ({"parameters": "bodies.crank.mass"}, "one path or several"),
         ({"save_at": [0.2, 0.1]}, "ascending"),
         ({"save_at": []}, "ascending"),
+        ({"model": scene_of_text(HARD), "method": "rk54"}, "impulses"),
     ],
 )
 def test_what_cannot_be_is_named(keys, what):
-    given = {"parameters": ["bodies.crank.mass"], "until": 0.1} | keys
+    given = {"model": shipped("four-bar"), "parameters": ["bodies.crank.mass"], "until": 0.1} | keys
     with pytest.raises(ephs.OptionError, match=what):
-        ephs.sensitivity(shipped("four-bar"), **given)
+        ephs.sensitivity(**given)
 
 
 def test_unknown_readings_name_the_nearest():
