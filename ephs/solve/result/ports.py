@@ -33,7 +33,8 @@ class PortMotion:
     Parameters
     ----------
     flow, effort
-        (n, d) each, the flow into the system, the effort relative to the reference environment.
+        (n, d) each, the flow into the system, the effort relative to the reference environment. A flow is NaN where it
+        depends on the derivative of a prescribed effort that has none.
     intensive
         (d,) what turns the effort into the energy effort: θ₀ at entropy ports, −π₀ at volume ports, μ₀ of species.
     """

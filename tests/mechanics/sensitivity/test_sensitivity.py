@@ -71,6 +71,7 @@ FOUR_BAR = Case(
     0.16, {"method": "rk54", "step": 0.02}, tolerance=GOOD,
 )  # fmt: skip
 NATURAL = {"method": "natural", "step": 0.01}
+DRIVEN = {"joints.pin": lambda t, _: [np.sin(9.0 * t)], "actuators.u": lambda t, _: [np.cos(7.0 * t)]}
 EXACT = {"rtol": 1e-12, "atol": 1e-13}
 CHAIN = Case(
     lambda: shipped("chain"),
@@ -117,10 +118,15 @@ DIFFERENCED = {
     "efforts that balances determine, rk87": MOTOR,
     "efforts that balances determine, natural": replace(MOTOR, options={"method": "natural", "step": 0.02}),
     "through a contact": THROWN,
+    "what acts on inputs of time, at each stage": Case(
+        lambda: scene_of_text(WOUND + '\n[actuators.u]\njoints = ["pin"]\nratio = 1.5\n'),
+        "joints.pin.drive actuators.u.ratio[0]",
+        "joints.pin.coordinate heat work", 0.2, {"method": "rk87", "step": 0.02, "inputs": DRIVEN}, tolerance=GOOD,
+    ),
 }  # fmt: skip
 
 
-SHORT = ("a rest", "efforts", "through")
+SHORT = ("a rest", "efforts", "through", "what acts")
 
 
 @pytest.mark.parametrize(
@@ -273,13 +279,3 @@ def test_both_modes_refuse_the_same_by_the_same_words(derived):
         derived(scene_of_text(moved), "bodies.wheel.mass")
     with pytest.raises(ephs.AssemblyError, match="not a parameter"):
         derived(scene_of_text(WOUND).system(), "joints.pin.drive")
-
-
-def test_parameters_that_act_on_inputs_of_time():
-    """A drive is added to a function of time, a ratio multiplies it: at each stage, not at the start alone."""
-    scene = scene_of_text(WOUND + '\n[actuators.u]\njoints = ["pin"]\nratio = 1.5\n')
-    inputs = {"joints.pin": lambda t, s: [np.sin(9.0 * t)], "actuators.u": lambda t, s: [np.cos(7.0 * t)]}
-    names, run = ["joints.pin.coordinate", "heat", "work"], {"method": "rk87", "step": 0.02}
-    paths, run = ["joints.pin.drive", "actuators.u.ratio[0]"], run | {"inputs": inputs}
-    found = agrees(scene, paths, 0.2, names, compared=run, **run)
-    assert np.all(np.abs(found["work"][-1]) > 1e-3)
