@@ -5,7 +5,7 @@ import pytest
 import ephs
 from ephs.mechanics.scene.parameters import names, read, varied
 from tests.mechanics.elements.shell.test_shell_touch import cloth, touch
-from tests.mechanics.sensitivity.test_sensitivity import agrees, reading
+from tests.mechanics.sensitivity.test_sensitivity import Case, check_derivatives, reading
 
 LAYER = "thickness = 5e-3, E1 = 2e5, E2 = 1e5, G12 = 4e4, nu12 = 0.2, rho = 900.0"
 LAYERS = f"layers = [{{ {LAYER}, angle = 0.3 }}, {{ {LAYER}, G13 = 3e4 }}]"
@@ -52,10 +52,12 @@ HELD = 'edges = ["free", "free", "free", "ground"]'
 
 
 def test_derivatives_by_numbers_of_layers_are_those_of_differences():
-    paths = ["shells.cloth.layers[0].E1", "shells.cloth.layers[1].angle", "shells.cloth.layers[0].thickness",
-             "shells.cloth.layers[1].G12", "shells.cloth.damping"]  # fmt: skip
+    paths = (
+        "shells.cloth.layers[0].E1 shells.cloth.layers[1].angle shells.cloth.layers[0].thickness "
+        "shells.cloth.layers[1].G12 shells.cloth.damping"
+    )
     step = {"method": "rk54", "step": 5e-4}
-    agrees(layered(HELD), paths, 0.02, ["heat", "kinetic", "potential"], 1e-6, **step, compared=step)
+    check_derivatives(Case(lambda: layered(HELD), paths, "heat kinetic potential", 0.02, step, tolerance=1e-6))
 
 
 def test_derivatives_of_a_touch_are_those_of_differences():
