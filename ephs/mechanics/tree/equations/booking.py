@@ -55,6 +55,7 @@ class Booking:
         missed: Array | None = None,
         stages: tuple[Array, Array, Array] | None = None,
         between: tuple["ReducedState", "ReducedState"] | None = None,
+        refused: bool = True,
     ) -> "ReducedState":
         """The end of a step with heats and totals, see `Heats`, by sums that lose nothing to rounding.
 
@@ -71,6 +72,8 @@ class Booking:
             As of `Heats.taken`.
         between
             Ends of a shorter step from the same start and of a longer one, between which components make their entropy.
+        refused
+            Whether a step is refused in which a component loses entropy.
 
         Raises
         ------
@@ -83,7 +86,8 @@ class Booking:
         change, made = heats.taken(start.heats, flows, stages)
         if between is not None:
             made = held_between(made, *(each.totals[2:] - start.totals[2:] for each in between))
-        self._refuse(made, flows, start, end)
+        if refused:
+            self._refuse(made, flows, start, end)
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
         change = np.where(heats.plain, end.heats - start.heats, change)
         sums, at = np.concatenate([start.heats, start.totals]), start.heats.size
