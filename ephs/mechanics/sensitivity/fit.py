@@ -168,7 +168,7 @@ class _RecordedVector:
                 raise OptionError(f"data[{name!r}]", values.shape, f"({self.t.size}, …): one row a time")
         if not (np.all(np.isfinite(self.t)) and np.all(np.diff(self.t) > 0.0)):
             raise OptionError("data['t']", self.t.tolist(), "ascending times in s")
-        _check_names("sigma", sigma, list(self.values))
+        _check_names("sigma", sigma, [*self.values, "t"])
         for name, deviation in sigma.items():
             if not 0.0 < deviation < np.inf:
                 raise OptionError(f"sigma[{name!r}]", deviation, "a number > 0")
