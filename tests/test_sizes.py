@@ -16,10 +16,10 @@ CEILINGS = {
     "ephs/operad": 30_600,
     "ephs/semantics": 192_400,
     "ephs/show": 64_400,
-    "ephs/solve": 125_500,
+    "ephs/solve": 125_600,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 562_700,
+    "tests": 562_900,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

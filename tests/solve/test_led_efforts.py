@@ -92,6 +92,20 @@ def test_an_effort_that_reads_states_rises_with_them():
     assert np.allclose(sol.port("b").flow[:, 0], -3.0 * np.exp(-sol.t), atol=1e-6)
 
 
+def test_only_what_depends_on_a_lost_derivative_is_lost():
+    """Of two coils that nothing ties the one whose current turns has no voltage there, the other has."""
+    ports = {name: junction(quantity.flux_linkage, exposed=True) for name in "ab"}
+    system = Pattern(junctions=ports, boxes={"one": {"b": "a"}, "two": {"b": "b"}})(
+        one=lib.inductor(l=2.0), two=lib.inductor(l=3.0)
+    )
+    sol = ephs.simulate(
+        system, 1.0, initial={"one.b": 1.0}, method="radau", save_at=[0.0, 0.5, 1.0], jumps=[0.5],
+        inputs={"a": {"effort": lambda t: abs(t - 0.5)}, "b": {"effort": np.sin}},
+    )  # fmt: skip
+    assert np.array_equal(np.isnan(sol.port("a").flow[:, 0]), [False, True, False])
+    assert np.allclose(sol.port("b").flow[:, 0], 3.0 * np.cos(sol.t), atol=1e-6)
+
+
 def test_an_effort_that_turns_at_an_instant_has_no_voltage_there():
     sol = led(
         lib.inductor(l=2.0),

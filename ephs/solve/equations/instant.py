@@ -159,10 +159,14 @@ def instant(
 
 
 def _least_norm(matrix: Array, right: Array) -> tuple[Array, Array]:
-    """Solution of least norm, and a basis (n, k) of the null space."""
+    """Solution of least norm, NaN where it depends on a NaN on the right, and a basis (n, k) of the null space."""
     u, sigma, vt = svd(matrix)
-    rank = rank_of(sigma, IMPLICIT)
-    return vt[:rank].T @ ((u[:, :rank].T @ right) / sigma[:rank]), vt[rank:].T
+    rank, lost = rank_of(sigma, IMPLICIT), np.isnan(right)
+    solution = vt[:rank].T @ ((u[:, :rank].T @ np.where(lost, 0.0, right)) / sigma[:rank])
+    if lost.any():
+        inverse = np.abs((vt[:rank].T / sigma[:rank]) @ u[:, :rank].T)
+        solution[inverse[:, lost].max(axis=1) > SPANNED * inverse.max(axis=1)] = np.nan
+    return solution, vt[rank:].T
 
 
 def constraints_of(d: Descriptor, x: Array) -> Array:

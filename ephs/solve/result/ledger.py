@@ -180,7 +180,7 @@ def ledgers(problem: Problem, record: RunRecord, *, by_energy: bool = False) -> 
 
 
 def _acting(problem: Problem) -> Counter[int]:
-    """How many components and outer ports act on each effort."""
+    """Number of components and outer ports with a flow at each effort."""
     d = problem.descriptor
     ports = (range(j.efforts.start, j.efforts.stop) for j in d.junctions if j.exposed)
     return Counter(chain.from_iterable((*(slot.efforts for slot in d.components), *ports)))

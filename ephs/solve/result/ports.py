@@ -74,7 +74,7 @@ def port_motion(solution: "Solution", path: Path) -> PortMotion:
 def rates_at(solution: "Solution", i: int, state: State) -> InstantRates:
     """Rates, efforts, multipliers and flows at the i-th instant of a solution with its problem, in a state.
 
-    What depends on the derivative of a prescribed effort is NaN where a function of the user has none.
+    Where the function that prescribes an effort has no derivative, the numbers that depend on this are NaN.
     """
     problem = solution.problem
     assert problem is not None

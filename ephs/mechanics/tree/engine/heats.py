@@ -117,7 +117,7 @@ class StageRates:
     def made(
         self, on: Evaluator, tables: Tables, before: Vector, maker: Integer, ends: tuple[Integer, Integer]
     ) -> tuple[Real, Real]:
-        """What a component passed on in J, and the entropy that it made in J/K, by the method's weights."""
+        """Heat in J that a component transferred and entropy in J/K that it produced, by the method's quadrature."""
         passed, made, a = on.variable(0.0), on.variable(0.0), self.tableau.a
 
         def stage(s: Integer) -> None:
