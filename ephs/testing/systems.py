@@ -70,8 +70,8 @@ def systems(
         if value < 1:
             raise InvalidArgument(f"{name}={value}: expected at least 1")
     pool = draw(st.sampled_from(SCALARS + OWN + (GROUPS if groups else ())))
-    if draw(st.booleans()):
-        pool = (pool[0].in_frame("B"), *pool[1:])
+    framed = draw(st.integers(0, 2))
+    pool = (*(of.in_frame("B") for of in pool[:framed]), *pool[framed:])
     alone = draw(st.booleans()) if isolated is None else isolated
     count = 0 if alone else 1
     return draw(levels(depth=max_depth, most=max_junctions, pool=pool, ports={}, open_count=count, posed=posed))

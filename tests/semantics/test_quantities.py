@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from ephs import AssemblyError, Pattern, StructureError, irreversible, junction, simulate, storage
+from ephs import AssemblyError, Pattern, StructureError, System, irreversible, junction, simulate, storage
 from ephs.operad import Quantity, Space
 from ephs.operad import quantity as Q
 from ephs.semantics import Reference, library
@@ -167,3 +167,13 @@ def test_a_reference_is_a_value():
     ]
     assert Bundle.of(power_ports(n=both, v=Q.volume)).charges == ("H", "O", "volume")
     assert library.environment().environment
+
+
+@given(st.lists(st.sampled_from((Q.volume, Q.pose, Q.charge)), min_size=2, max_size=6))
+def test_junctions_of_a_system_have_their_own_quantities_whatever_their_frames(kinds):
+    junctions = {f"j{i}": junction(of.in_frame("B")) for i, of in enumerate(kinds)}
+    pattern = Pattern(junctions, {f"b{i}": {"x": f"j{i}"} for i in range(len(kinds))})
+    system = System.of(pattern, {f"b{i}": library.environment(x=of.in_frame("B")) for i, of in enumerate(kinds)})
+    d = system.descriptor()
+    assert [slot.quantity for slot in d.junctions] == kinds
+    assert [slot.quantity.in_frame(None) for slot in d.states] == kinds

@@ -1,5 +1,6 @@
 """Runs of a problem by a method."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -8,17 +9,23 @@ from typing import Any, final
 import numpy as np
 
 from ephs.mechanics.methods.registry import METHODS, MethodEntry, Setting, chosen
+from ephs.mechanics.runs.system_problem import is_posed
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.descriptor.descriptor import Descriptor
+from ephs.semantics.descriptor.product import factors_of
 from ephs.solve.auditing.growth import Again
+from ephs.solve.march.control import Policy
 from ephs.solve.posing.breakpoints import Breakpoints
 from ephs.solve.posing.errors import OptionError, SolveError
 from ephs.solve.posing.events import Event
 from ephs.solve.posing.problem import Problem, State
 from ephs.solve.result.solution import Solution
+from ephs.solve.running.abreast import PartRun, integrate_abreast
 from ephs.solve.running.control import RTOL, Control, Tolerance
-from ephs.solve.running.loop import integrate
+from ephs.solve.running.loop import RunLoop, integrate
 from ephs.solve.running.request import RunRequest
+from ephs.solve.running.stepping import Stepper
 from ephs.solve.running.watching import Progress
 
 CLOSE = 1e-4
@@ -51,10 +58,36 @@ class Course:
         SimulationError
             The run failed part-way; ``.partial`` is the solution up to there.
         """
+        parts = self._parts(breakpoints, request)
+        if len(parts) > 1:
+            return integrate_abreast(self.problem, parts, request)
         seen = breakpoints.of(self.problem)
-        setting = Setting(seen, self.start, self.control, self.options, method=self.method.name)
-        make = partial(self.method.make, setting)
-        return integrate(seen, self.start, self.end, make, self.control, breakpoints, request)
+        return integrate(seen, self.start, self.end, partial(self._stepper, seen), self.control, breakpoints, request)
+
+    def _stepper(self, problem: Problem) -> tuple[Stepper[Any], Policy | None]:
+        return self.method.make(Setting(problem, self.start, self.control, self.options, method=self.method.name))
+
+    def _parts(self, breakpoints: Breakpoints, request: RunRequest) -> list[PartRun]:
+        """Runs of the independent parts; none where what is asked for, or what inputs read, is of the whole.
+
+        The steps of a run are those of its whole; constant ones, too, and impacts are events.
+        """
+        problem, d = self.problem, self.problem.descriptor
+        whole = request.save_at is None or request.events or request.journal or self.control.step is not None
+        if whole or not problem.timed or breakpoints.sampled or d.strikes is not None:
+            return []
+        factors = factors_of(d, problem.prescribed, *([is_posed] if problem.mechanical else []))
+        if len(factors) < 2:
+            return []
+        begin, asked = time.perf_counter(), replace(request, progress=None, remarks={})
+        parts: list[PartRun] = []
+        for factor in factors:
+            own, known = _restricted(problem, factor.descriptor), breakpoints.again()
+            seen = known.of(own)
+            stepper = self._stepper(seen)
+            run = RunLoop(seen, self.start, self.end, *stepper, self.control, known, asked, begin)
+            parts.append(PartRun(factor, run))
+        return parts
 
     def serves(self, name: str) -> bool:
         """Whether another method, by its name, accepts the problem with these steps."""
@@ -86,6 +119,19 @@ class Course:
         control = Control(tolerance, tolerance, None, 0.0, self.control.most, most)
         course = replace(self, end=float(kept[-1]), control=control, method=METHODS["rk87"], options={})
         return course.run(Breakpoints(self.start, course.end, np.array(known.times)), RunRequest(save_at=kept))
+
+
+def _restricted(problem: Problem, descriptor: Descriptor) -> Problem:
+    """The problem of an independent part."""
+    return replace(
+        problem,
+        system=descriptor.system,
+        descriptor=descriptor,
+        initial={slot.path: problem.initial[slot.path] for slot in descriptor.states},
+        signals={slot.path: problem.signals[slot.path] for slot in descriptor.outer},
+        shown=None,
+        given=None,
+    )
 
 
 def by_constant_steps(problem: Problem, until: float, step: float) -> Solution:

@@ -87,10 +87,11 @@ def simulate(
     step
         Constant steps in s: the grid is t₀ + k·step, and the last step ends at ``until``.
     max_step, min_step, max_steps
-        Limits of chosen steps in s, and of the number of steps.
+        Limits of chosen steps in s, and of the number of steps, each of every independent part.
     save_at
         Times at which to save the solution, each reached by a shorter step from the same start (radau on systems: by
-        its collocation polynomial, where no prescribed effort changes); None saves every step.
+        its collocation polynomial, where no prescribed effort changes); independent parts then take steps of their own.
+        None saves every step.
     form
         ``"paper"``: the flat system, for natural methods; ``"folded"``: the same without transformers and the
         junctions behind them, for natural methods; ``"reduced"``, the default: the smallest form of the method.

@@ -6,12 +6,11 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ephs.mechanics.runs.signals import signal
-from ephs.operad import Path, Pattern, quantity
+from ephs.operad import Path, Pattern, Quantity, quantity
 from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles import extents
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import AssemblyError
-from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.systems.system import System
 from ephs.solve.posing.problem import Problem, Signal
 
@@ -59,18 +58,15 @@ def problem_of_system(
         return system_text(system, signals, given)
 
     made = Problem(name, system, descriptor, state, signals, given, document=cache(text))
-    if not _embodied(descriptor):
+    if not any(map(is_posed, descriptor.numbering.quantities)):
         return made
     return _of_mechanism(made, {path: state[path] for path in map(Path.of, initial or {})}, assemble=assemble)
 
 
-def _embodied(descriptor: Descriptor) -> bool:
-    """Whether there may be bodies or joints: momenta of bodies, or relative poses."""
+def is_posed(of: Quantity) -> bool:
+    """Whether a quantity is of a body or a joint: the momentum of a body, or a relative pose."""
     body = quantity.body_momentum
-    return any(
-        of.kind == "relative_pose" or (of.kind == body.kind and of.space == body.space)
-        for of in descriptor.numbering.quantities
-    )
+    return of.kind == "relative_pose" or (of.kind == body.kind and of.space == body.space)
 
 
 def _of_mechanism(problem: Problem, given: Mapping[Path, Array], *, assemble: bool) -> Problem:

@@ -65,10 +65,11 @@ class Numbering:
 
 @final
 class Interned(Generic[T]):
-    """Consecutive numbers of distinct values. Objects are recognised by identity: keep them alive."""
+    """Consecutive numbers of distinct values. Objects are recognised by identity, and so kept."""
 
     def __init__(self) -> None:
         self.values: list[T] = []
+        self._met: list[T] = []  # else another object could have the identity of one that is gone
         self._by_id: dict[int, int] = {}
         self._by_value: dict[T, int] = {}
 
@@ -79,6 +80,7 @@ class Interned(Generic[T]):
             found = self._by_value.setdefault(value, len(self.values))
             if found == len(self.values):
                 self.values.append(value)
+            self._met.append(value)
             self._by_id[id(value)] = found
         return found
 

@@ -48,7 +48,7 @@ class Breakpoints:
         asked: Sequence[ProbedInput] = (),
         held: Sequence[Sampling] = (),
     ) -> None:
-        self._held = held
+        self._held, self._asked = held, asked
         self._until, self._sign, self._at = until, 1.0 if until > t0 else -1.0, t0
         self.near = NEAR * float(np.spacing(max(abs(t0), abs(until))))
         self._times: list[float] = [] if declared is None else declared.tolist()
@@ -56,6 +56,18 @@ class Breakpoints:
         self._found: list[Change] = []
         self._split = 0
         self._probe = SignalProbe(asked, t0, until, self.within) if asked else None
+
+    def again(self) -> "Breakpoints":
+        """The same for another run from here, which finds jumps for itself."""
+        found = Breakpoints(self._at, self._until, np.array(self._times), self._asked)
+        if found._probe is not None:
+            found._probe.begin(self._at)
+        return found
+
+    @property
+    def sampled(self) -> bool:
+        """Whether inputs are sampled."""
+        return bool(self._held)
 
     @property
     def times(self) -> tuple[float, ...]:

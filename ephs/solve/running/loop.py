@@ -1,7 +1,7 @@
 """Time loop of all methods: control, events, records, progress and interruption."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Generic, TypeVar
@@ -64,17 +64,17 @@ def integrate(
     begin = time.perf_counter()
     if not (np.isfinite(until) and until != t0):
         raise OptionError("until", until, f"a time other than t0 = {t0!r} s")
-    run = _RunLoop(problem, t0, until, *make(), control, breakpoints, request, begin)
+    run = RunLoop(problem, t0, until, *make(), control, breakpoints, request, begin)
     with failures_of(run):
         run.start()
-        run.setup = time.perf_counter() - begin
-        run.advance(run.restore())
+        for _ in run.advance(run.restore()):
+            pass
         run.write(end=True)
     return run.solution()
 
 
-class _RunLoop(Generic[S]):
-    """One run in progress."""
+class RunLoop(Generic[S]):
+    """One run in progress; parameters as of `integrate`, and when it began by the clock, in s."""
 
     state: S
 
@@ -129,9 +129,12 @@ class _RunLoop(Generic[S]):
         self.stepper.prepare(self.state, self.sign * self.h)
         events = self.request.events
         self.watch = Watch(events, self.t0, self._here() if events else {})
+        self.setup = time.perf_counter() - self.begin
 
-    def advance(self, stood: Snapshot | None) -> None:
+    def advance(self, stood: Snapshot | None) -> Iterator[None]:
         """Run to the end or to a terminal event: in compiled code while possible, then step by step.
+
+        Others may go on after each of what it yields: many compiled steps, or one.
 
         ``stood`` is where the compiled part of an earlier run did, None where it was left.
         """
@@ -145,11 +148,11 @@ class _RunLoop(Generic[S]):
             if stood is not None:
                 self.leg.restore(stood)
             stood = None
-            self._follow(self.leg)
+            yield from self._follow(self.leg)
             self.leg = None
-        self._advance_stepwise()
+        yield from self._advance_stepwise()
 
-    def _follow(self, leg: Leg[S]) -> None:
+    def _follow(self, leg: Leg[S]) -> Iterator[None]:
         """Compiled steps until the end, or until the compiled code stops."""
         done, most = False, BURST
         while not (done or leg.left):
@@ -168,6 +171,7 @@ class _RunLoop(Generic[S]):
             most = int(np.clip(RESPONSE / each, 1, BURST))
             if not leg.left:  # else a journal would lead from one method into the other
                 self._look()
+            yield
 
     def _require_steps_left(self) -> None:
         """Refuse more steps than are allowed."""
@@ -179,7 +183,7 @@ class _RunLoop(Generic[S]):
         """Number of the next step on the grid of constant ones."""
         return self.counts.steps - self.breakpoints.split + 1
 
-    def _advance_stepwise(self) -> None:
+    def _advance_stepwise(self) -> Iterator[None]:
         control, grid = self.control, self.grid
         while self.t != self.until and not self.ended:
             self._require_steps_left()
@@ -219,6 +223,7 @@ class _RunLoop(Generic[S]):
                 self.state = self.stepper.anew(self.state)
                 self.breakpoints.enter(end, self._here, split=not whole)
             self._look()
+            yield
 
     def _shrink(self, h: float, cause: SolveError | None) -> None:
         self.counts = replace(self.counts, rejected=self.counts.rejected + 1)
@@ -265,8 +270,11 @@ class _RunLoop(Generic[S]):
         now, progress = time.perf_counter(), self.request.progress
         if progress is not None and (self.t == self.until or now - self.looked > 0.5 * RESPONSE):
             self.looked = now
-            error = self.balance.error(self.stepper.row(self.state))
-            progress(self.t, self.until, {**self.stats(), "energy_error": error})
+            progress(self.t, self.until, {**self.stats(), "energy_error": self.energy_error()})
+
+    def energy_error(self) -> float:
+        """The defect of the energy balance now, relative to the largest energies so far."""
+        return self.balance.error(self.stepper.row(self.state))
 
     def _at(self, state: S) -> Mapping[Path, Array]:
         return States(self.problem.descriptor.unpack(self.stepper.row(state).x))
@@ -297,11 +305,15 @@ class _RunLoop(Generic[S]):
 
     def solution(self) -> Solution:
         """The solution so far."""
-        stats = self.stats()
-        self._settle()
-        ends = self._ends()
+        stats, kept = self.stats(), self.kept_rows()
+        ends = self.ends()
         stats |= {**self.stepper.stats(), **self.request.remarks}  # also known from rows
-        return audited(self.problem, self.kept.whole(self.problem.descriptor), stats, self.bounds, ends, self._trials)
+        return audited(self.problem, kept, stats, self.bounds, ends, self._trials)
+
+    def kept_rows(self) -> RunRecord:
+        """All kept rows so far."""
+        self._settle()
+        return self.kept.whole(self.problem.descriptor)
 
     def _trials(self, solution: Solution) -> Tests | None:
         step = self.control.step
@@ -313,7 +325,7 @@ class _RunLoop(Generic[S]):
         )  # fmt: skip
         return repeatable(trials, self.bounds, ended=self.ended or self.t == self.until)
 
-    def _ends(self) -> list[RunRecord]:
+    def ends(self) -> list[RunRecord]:
         """The first and the last row, recorded or not; none for a run that did not start or is not finite."""
         with suppress(SolveError):  # a failed run may end where evaluation is impossible
             if self.first:

@@ -1,0 +1,187 @@
+"""Runs of the independent parts of a problem, abreast: each takes steps of its own, and the results are of the whole.
+
+What is read of parts that share nothing is read of each: their states side by side, the sums of their ledgers.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, final
+
+import numpy as np
+
+from ephs.semantics.bundles.bundle import Array
+from ephs.semantics.descriptor.numbering import Index
+from ephs.semantics.descriptor.product import Factor, Mask
+from ephs.solve.auditing.retaken import Missed
+from ephs.solve.posing.errors import SolveError
+from ephs.solve.posing.problem import Problem
+from ephs.solve.result.record import RunRecord
+from ephs.solve.result.solution import Solution
+from ephs.solve.running.ending import audited, failures_of
+from ephs.solve.running.loop import RESPONSE, RunLoop
+from ephs.solve.running.request import RunRequest
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class PartRun:
+    """The run of an independent part of a problem; it keeps the same times as the others."""
+
+    factor: Factor
+    run: RunLoop[Any]
+
+
+def integrate_abreast(problem: Problem, parts: Sequence[PartRun], request: RunRequest) -> Solution:
+    """Solve the initial value problems of the independent parts of a problem, as `integrate` does the whole.
+
+    Raises
+    ------
+    SimulationError
+        The run of a part failed; ``.partial`` holds the solution up to the last of the times that all have reached.
+        `Interrupted` where the user stopped it.
+    """
+    runs = _Abreast(problem, parts, request)
+    with failures_of(runs):
+        runs.start()
+        runs.advance()
+    return runs.solution()
+
+
+@final
+class _Abreast:
+    """Runs of parts, of which the one that is behind goes on first, so that all are near each other when they end."""
+
+    def __init__(self, problem: Problem, parts: Sequence[PartRun], request: RunRequest) -> None:
+        self.problem, self.parts, self.request, self.bounds = problem, parts, request, request.bounds
+        self.runs = [part.run for part in parts]
+        first = self.runs[0]
+        self.t0, self.until, self.t, self.h = first.t0, first.until, first.t0, 0.0
+        self.begin = self.looked = first.begin
+        self.setup = 0.0
+        self.starts = problem.point, np.zeros(len(problem.descriptor.components))
+        several = np.bincount(np.concatenate([part.factor.components for part in parts])) > 1
+        shared = np.bincount(np.concatenate([part.factor.states for part in parts])) > 1
+        self.shared = [(several[part.factor.components], shared[part.factor.states]) for part in parts]
+
+    def start(self) -> None:
+        """The first row of each."""
+        for run in self.runs:
+            run.start()
+        for part in self.parts:
+            assert part.run.first is not None
+            self.starts[1][part.factor.components] = part.run.first.energies
+        self.setup = time.perf_counter() - self.begin
+
+    def advance(self) -> None:
+        """Run all to the end.
+
+        Raises
+        ------
+        SolveError, ArithmeticError, LinAlgError
+            That of the run that fails first; the others have come to its time, too.
+        """
+        going, failed = {run: run.advance(None) for run in self.runs}, list[tuple[RunLoop[Any], Exception]]()
+        while going:
+            run = min(going, key=lambda one: abs(one.t - one.t0))
+            self.t, self.h = run.t, run.h
+            if failed and abs(run.t - run.t0) >= min(abs(one.t - one.t0) for one, _ in failed):
+                break
+            try:
+                next(going[run])
+            except StopIteration:
+                del going[run]
+            except (SolveError, ArithmeticError, np.linalg.LinAlgError) as error:
+                failed.append((run, error))
+                del going[run]
+            self._tell()
+        if failed:
+            run, error = min(failed, key=lambda one: abs(one[0].t - one[0].t0))
+            self.t, self.h = run.t, run.h
+            raise error
+        self.t = self.until
+
+    def _tell(self) -> None:
+        """Report progress at intervals: the time to which all have come."""
+        now, progress = time.perf_counter(), self.request.progress
+        if progress is not None and (self.t == self.until or now - self.looked > 0.5 * RESPONSE):
+            self.looked = now
+            error = max(run.energy_error() for run in self.runs)
+            progress(self.t, self.until, {**self.stats(), "energy_error": error})
+
+    def stats(self) -> dict[str, Any]:
+        """Statistics of the whole: sums of those of the parts, or what they have in common."""
+        each = [run.stats() for run in self.runs]
+        keys = dict.fromkeys(key for one in each for key in one)
+        combined = {key: _COMBINED.get(key, _together)([one[key] for one in each if key in one]) for key in keys}
+        if "work_apart" in combined:
+            apart = [(one["work_apart"], one["work_apart_at"]) for one in each if "work_apart" in one]
+            combined["work_apart_at"] = max(apart)[1]
+        times = {"setup_s": self.setup, "integrate_s": time.perf_counter() - self.begin - self.setup}
+        return {**combined, **self.request.remarks, **times, "parts": len(self.runs)}
+
+    def solution(self) -> Solution:
+        """The solution of the whole, as far as all have come."""
+        kept, ends = self._whole([run.kept_rows() for run in self.runs]), [run.ends() for run in self.runs]
+        found: list[RunRecord] = []
+        if all(ends):
+            arrived = all(run.t == self.until for run in self.runs)
+            last = self._whole([last for _, last in ends]) if arrived else kept[-1:]
+            found = [self._whole([first for first, _ in ends]), last] if last.t.size else []
+        return audited(self.problem, kept, self.stats(), self.bounds, found, lambda _: self._missed())
+
+    def _missed(self) -> Missed | None:
+        """The error of chosen steps in that part where it is largest."""
+        seconds = self.problem.seconds
+        found = [run.samples.retaken.missed(run.stepper, run.breakpoints, seconds) for run in self.runs]
+        return max((one for one in found if one is not None), key=lambda one: one.size, default=None)
+
+    def _whole(self, records: Sequence[RunRecord]) -> RunRecord:
+        """Rows of the whole at those times to which all have come.
+
+        What is stored in several parts, as in the environment, is there the sum of what it has gained in each.
+        """
+        count = min(len(record.t) for record in records)
+        records = [record[:count] for record in records]
+        x, energies = (np.tile(start, (count, 1)) for start in self.starts)
+        for part, (several, shared), record in zip(self.parts, self.shared, records, strict=True):
+            _put(x, part.factor.states, record.x, shared, self.starts[0])
+            _put(energies, part.factor.components, record.energies, several, self.starts[1])
+        sums = sum(record.ledgers[:, :4] for record in records)
+        least = np.min([record.ledgers[:, 4:] for record in records], axis=0)
+        return RunRecord(records[0].t, x, energies, np.hstack([sums, least]))
+
+
+def _put(out: Array, places: Index, values: Array, shared: Mask, start: Array) -> None:
+    """Set the values of places, and add what those that are shared have gained since the start."""
+    several = places[shared]
+    out[:, places[~shared]] = values[:, ~shared]
+    out[:, several] += values[:, shared] - start[several]
+
+
+def _together(values: Sequence[Any]) -> Any:
+    """Sum of numbers; lists one after the other; of others what they have in common, or the first."""
+    first = values[0]
+    if isinstance(first, list):
+        return [one for value in values for one in value]
+    return sum(values) if isinstance(first, int | float) and not isinstance(first, bool) else first
+
+
+def _names(values: Sequence[str]) -> str:
+    return ", ".join(dict.fromkeys(name for value in values for name in value.split(", ")))
+
+
+def _defects(values: Sequence[dict[str, float]]) -> dict[str, float]:
+    """By how much balances would be missed: the sum of all, and the largest with its time."""
+    return {**max(values, key=lambda one: one["largest"]), "sum": sum(one["sum"] for one in values)}
+
+
+_COMBINED: Final[dict[str, Callable[[Sequence[Any]], Any]]] = {
+    "method": _names,
+    "chosen": _names,
+    "shortest_step": min,
+    "longest_step": max,
+    "least_production": min,
+    "plain_defect": _defects,
+}
+"""How statistics of parts that are no sums are combined."""
