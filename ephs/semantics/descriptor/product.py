@@ -8,13 +8,13 @@ the sum of the flows that it takes in the parts.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ephs.operad import Directory, Path, Pattern, Quantity
-from ephs.operad.disjoint import DisjointSets
 from ephs.semantics.descriptor.descriptor import Descriptor
 from ephs.semantics.descriptor.numbering import Index, Numbering, spans, starts
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
@@ -63,7 +63,7 @@ def factors_of(
 def _factors(descriptor: Descriptor, prescribed: frozenset[Path], counts: Callable[[Quantity], bool]) -> list[Factor]:
     n, flat = descriptor.numbering, descriptor.system.flatten()
     power = [path for path, port in descriptor.system.interface.items() if port.power]
-    wires = _Wires.of(n, np.array([path in prescribed for path in power], dtype=bool))
+    wires = _wires_of(n, np.array([path in prescribed for path in power], dtype=bool))
     wanted = np.array([counts(one) for one in n.quantities], dtype=bool)[n.states] & ~wires.holds[wires.storing]
     numbers, stored = np.arange(n.primitive.size), np.unique(wires.storing[wanted])
     parts = list(dict.fromkeys(wires.label[stored].tolist()))
@@ -102,43 +102,46 @@ class _Wires:
     holds: Mask
     label: Index
 
-    @staticmethod
-    def of(n: Numbering, prescribed: Mask) -> "_Wires":
-        """Those of a system; ``prescribed`` (outer ports,) says of which the effort is."""
-        numbers = np.arange(n.primitive.size)
-
-        def each(values: list[int]) -> Index:
-            return np.array(values, dtype=np.int64)[n.primitive]
-
-        owner = np.repeat(numbers, each([len(one.bundle.ports) for one in n.primitives]))
-        reader = np.repeat(numbers, each([len(one.reads) for one in n.primitives]))
-        storing = np.repeat(numbers, each([len(one.bundle.ports) * isinstance(one, Storage) for one in n.primitives]))
-        source = storing[n.reads]
-        holds = each([_holds_efforts(one) for one in n.primitives]).astype(bool)
-        holds[source[source != reader]] = False  # others read what it stores
-        held = np.zeros(n.junctions.size, dtype=bool)
-        lost = numbers
-        while lost.size:  # what does not hold all of its junctions holds none
-            held[:] = False
-            held[n.wires[holds[owner]]] = True
-            held[n.outer] = prescribed
-            lost = np.flatnonzero(holds & np.isin(numbers, owner[~held[n.wires]]))
-            holds[lost] = False
-        passing = ~held[n.wires]
-        sets = DisjointSets[int]()
-        for one, other in zip(owner[passing].tolist(), (numbers.size + n.wires[passing]).tolist(), strict=True):
-            sets.join(one, other)
-        for one, other in zip(reader.tolist(), source.tolist(), strict=True):
-            sets.join(one, other)
-        holds &= np.isin(numbers, owner[np.isin(n.wires, n.wires[~holds[owner]])])
-        return _Wires(owner, n.wires, storing, holds, np.array(sets.leaders(numbers.tolist()), dtype=np.int64))
-
     def beside(self, part: Mask) -> Mask:
         """(components,) whether each belongs to a part, or prescribes an effort in it."""
         mine = part & ~self.holds
         met = self.holds[self.owner] & np.isin(self.junction, self.junction[mine[self.owner]])
         mine[self.owner[met]] = True
         return mine
+
+
+def _wires_of(n: Numbering, prescribed: Mask) -> _Wires:
+    """The wires of a system; ``prescribed`` (outer ports,) says of which the effort is."""
+    numbers = np.arange(n.primitive.size)
+
+    def each(values: list[int]) -> Index:
+        return np.array(values, dtype=np.int64)[n.primitive]
+
+    owner = np.repeat(numbers, each([len(one.bundle.ports) for one in n.primitives]))
+    reader = np.repeat(numbers, each([len(one.reads) for one in n.primitives]))
+    storing = np.repeat(numbers, each([len(one.bundle.ports) * isinstance(one, Storage) for one in n.primitives]))
+    source = storing[n.reads]
+    holds = each([_holds_efforts(one) for one in n.primitives]).astype(bool)
+    holds[source[source != reader]] = False  # others read what it stores
+    held = np.zeros(n.junctions.size, dtype=bool)
+    lost = numbers
+    while lost.size:  # what does not hold all of its junctions holds none
+        held[:] = False
+        held[n.wires[holds[owner]]] = True
+        held[n.outer] = prescribed
+        lost = np.flatnonzero(holds & np.isin(numbers, owner[~held[n.wires]]))
+        holds[lost] = False
+    passing = ~held[n.wires]
+    holds &= np.isin(numbers, owner[np.isin(n.wires, n.wires[~holds[owner]])])
+    ends = np.concatenate([owner[passing], reader]), np.concatenate([numbers.size + n.wires[passing], source])
+    return _Wires(owner, n.wires, storing, holds, _sets_of(numbers.size + n.junctions.size, *ends)[: numbers.size])
+
+
+def _sets_of(size: int, ones: Index, others: Index) -> Index:
+    """(size,) equal numbers for what is joined by pairs."""
+    sparse, csgraph = import_module("scipy.sparse"), import_module("scipy.sparse.csgraph")  # only runs ask
+    joined = sparse.coo_array((np.ones(ones.size), (ones, others)), (size, size))
+    return np.asarray(csgraph.connected_components(joined, directed=False)[1], dtype=np.int64)
 
 
 def _holds_efforts(primitive: Primitive) -> bool:

@@ -145,14 +145,14 @@ class _Abreast:
         records = [record[:count] for record in records]
         x, energies = (np.tile(start, (count, 1)) for start in self.starts)
         for part, (several, shared), record in zip(self.parts, self.shared, records, strict=True):
-            _put(x, part.factor.states, record.x, shared, self.starts[0])
-            _put(energies, part.factor.components, record.energies, several, self.starts[1])
+            _set_or_add(x, part.factor.states, record.x, shared, self.starts[0])
+            _set_or_add(energies, part.factor.components, record.energies, several, self.starts[1])
         sums = sum(record.ledgers[:, :4] for record in records)
         least = np.min([record.ledgers[:, 4:] for record in records], axis=0)
         return RunRecord(records[0].t, x, energies, np.hstack([sums, least]))
 
 
-def _put(out: Array, places: Index, values: Array, shared: Mask, start: Array) -> None:
+def _set_or_add(out: Array, places: Index, values: Array, shared: Mask, start: Array) -> None:
     """Set the values of places, and add what those that are shared have gained since the start."""
     several = places[shared]
     out[:, places[~shared]] = values[:, ~shared]
