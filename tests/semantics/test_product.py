@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from ephs import Path, Pattern, System
+from ephs import Path, Pattern, System, irreversible, quantity
 from ephs import library as lib
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics import Reference
@@ -40,6 +40,21 @@ def walls():
     return WALLS(bodies | {f"wall{i}": lib.heat_transfer(h=float(i)) for i in (1, 2)})
 
 
+def watched():
+    """Two coils in a room, whose entropy one of the wires reads."""
+    pattern = Pattern.from_text(COILS.to_text().replace("wire2(b=b2, s)", "wire2(b=b2, s, x=~s)"))
+    ports = {"b": quantity.flux_linkage, "s": quantity.entropy, "~x": quantity.entropy}
+    wire = irreversible(ports, lambda b, s, x: (1.0 + x * x) * np.array([[s, -b], [-b, b * b / s]]))
+    return pattern({**dict(coils(lib.environment()).fillings), Path.of("wire2"): wire})
+
+
+def vented():
+    """Two coils in a room, which exchanges volume with the outside, too."""
+    pattern = Pattern.from_text(COILS.to_text().replace("room(s)", "v: volume, exposed; room(s, v)"))
+    room = lib.environment(s=quantity.entropy, v=quantity.volume)
+    return pattern({**dict(coils(lib.environment()).fillings), Path.of("room"): room})
+
+
 def parts_of(system, *prescribed):
     return factors_of(system.descriptor(), frozenset(map(Path.of, prescribed)))
 
@@ -62,8 +77,8 @@ def test_equations_of_a_system_are_those_of_its_parts(name, seed):
 
 @pytest.mark.parametrize(
     ("system", "prescribed"),
-    [(coils(lib.thermal_capacity(c1=300.0, c2=2.0)), ()), (walls(), ())],
-    ids=["what is heated by both", "a heat flow into both"],
+    [(coils(lib.thermal_capacity(c1=300.0, c2=2.0)), ()), (walls(), ()), (watched(), ()), (vented(), ())],
+    ids=["what is heated by both", "a heat flow into both", "a room that is read", "a room with an outer port"],
 )
 def test_what_takes_part_joins_them(system, prescribed):
     """The control: nothing prescribes the effort of what they share."""

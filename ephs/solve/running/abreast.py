@@ -10,9 +10,7 @@ from typing import Any, Final, final
 
 import numpy as np
 
-from ephs.semantics.bundles.bundle import Array
-from ephs.semantics.descriptor.numbering import Index
-from ephs.semantics.descriptor.product import Factor, Mask
+from ephs.semantics.descriptor.product import Factor
 from ephs.solve.auditing.retaken import Missed
 from ephs.solve.posing.errors import SolveError
 from ephs.solve.posing.problem import Problem
@@ -59,18 +57,13 @@ class _Abreast:
         self.t0, self.until, self.t, self.h = first.t0, first.until, first.t0, 0.0
         self.begin = self.looked = first.begin
         self.setup = 0.0
-        self.starts = problem.point, np.zeros(len(problem.descriptor.components))
-        several = np.bincount(np.concatenate([part.factor.components for part in parts])) > 1
         shared = np.bincount(np.concatenate([part.factor.states for part in parts])) > 1
-        self.shared = [(several[part.factor.components], shared[part.factor.states]) for part in parts]
+        self.shared = [shared[part.factor.states] for part in parts]
 
     def start(self) -> None:
         """The first row of each."""
         for run in self.runs:
             run.start()
-        for part in self.parts:
-            assert part.run.first is not None
-            self.starts[1][part.factor.components] = part.run.first.energies
         self.setup = time.perf_counter() - self.begin
 
     def advance(self) -> None:
@@ -118,7 +111,7 @@ class _Abreast:
             apart = [(one["work_apart"], one["work_apart_at"]) for one in each if "work_apart" in one]
             combined["work_apart_at"] = max(apart)[1]
         times = {"setup_s": self.setup, "integrate_s": time.perf_counter() - self.begin - self.setup}
-        return {**combined, **self.request.remarks, **times, "parts": len(self.runs)}
+        return {**combined, **self.request.remarks, **times, "independent_parts": len(self.runs)}
 
     def solution(self) -> Solution:
         """The solution of the whole, as far as all have come."""
@@ -143,20 +136,16 @@ class _Abreast:
         """
         count = min(len(record.t) for record in records)
         records = [record[:count] for record in records]
-        x, energies = (np.tile(start, (count, 1)) for start in self.starts)
-        for part, (several, shared), record in zip(self.parts, self.shared, records, strict=True):
-            _set_or_add(x, part.factor.states, record.x, shared, self.starts[0])
-            _set_or_add(energies, part.factor.components, record.energies, several, self.starts[1])
+        start = self.problem.point
+        x, energies = np.tile(start, (count, 1)), np.zeros((count, len(self.problem.descriptor.components)))
+        for part, shared, record in zip(self.parts, self.shared, records, strict=True):
+            own, several = part.factor.states[~shared], part.factor.states[shared]
+            x[:, own] = record.x[:, ~shared]
+            x[:, several] += record.x[:, shared] - start[several]
+            energies[:, part.factor.components] = record.energies  # the environment's is read off its states
         sums = sum(record.ledgers[:, :4] for record in records)
         least = np.min([record.ledgers[:, 4:] for record in records], axis=0)
         return RunRecord(records[0].t, x, energies, np.hstack([sums, least]))
-
-
-def _set_or_add(out: Array, places: Index, values: Array, shared: Mask, start: Array) -> None:
-    """Set the values of places, and add what those that are shared have gained since the start."""
-    several = places[shared]
-    out[:, places[~shared]] = values[:, ~shared]
-    out[:, several] += values[:, shared] - start[several]
 
 
 def _together(values: Sequence[Any]) -> Any:
