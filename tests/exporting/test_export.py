@@ -106,13 +106,13 @@ def test_what_depends_on_a_number_is_the_same_beside_stiff_parts(path):
 
     ends = 'bodies = ["ground", "slider"]\nat1 = [0.5, 0.0, 0.0]\nat2 = [0.0, 0.0, 0.0]'
 
-    def found(stiffness):
+    def moved_numbers(stiffness):
         stop = f"[springs.stop]\n{ends}\nstiffness = {stiffness}\n"
         made = image_of(scene_of_text(text + PUSHED + stop), parameters=[path]).dependences
         return [(each.entry, each.constant, each.terms) for each in made]
 
-    assert found(1.0) == found(1e14)
-    assert found(1.0)
+    assert moved_numbers(1.0) == moved_numbers(1e14)
+    assert moved_numbers(1.0)
 
 
 @pytest.mark.long

@@ -290,8 +290,10 @@ def test_the_turning_of_joints_is_that_of_their_constraints(kind, on_group):
         rng.standard_normal(12 + group.dim),
     )
 
-    def held(h):
+    def residual_after(h):
         return joint.structure({read: group.retract(x, h * rates)})[1] @ e
 
-    expected = (8.0 * (held(1e-3) - held(-1e-3)) - held(2e-3) + held(-2e-3)) / 12e-3
+    expected = (
+        8.0 * (residual_after(1e-3) - residual_after(-1e-3)) - residual_after(2e-3) + residual_after(-2e-3)
+    ) / 12e-3
     assert largest(turned(joint, {read: x}, e, rates, ephs.Reference()) - expected) <= 1e-10 * largest(expected)
