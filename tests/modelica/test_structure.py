@@ -83,6 +83,7 @@ def test_too_many_or_too_few_equations_are_no_relation(extra):
     assert caught.value.fault == "count"
 
 
+@settings(max_examples=10, deadline=None)
 @given(st.floats(1.0, 100.0), st.floats(-100.0, 1.0))
 def test_a_start_is_the_number_that_its_expression_has(parts, v0, v1):
     """Of a modification, of an initial equation, which counts before it, and of a temperature."""
