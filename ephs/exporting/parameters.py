@@ -74,27 +74,44 @@ def dependence(
     fitted = [*unit, *-unit, *(unit[i] + unit[j] for i, j in pairs)]
     held = [*(0.6 * unit), *rng.uniform(-1.0, 1.0, (2, len(names)))]
     seen, tried = np.array([numbers_at(shares) for shares in fitted]), np.array([numbers_at(shares) for shares in held])
-    scale = np.repeat([np.abs(each).max(initial=0.0) for each in np.split(base, np.cumsum(sizes)[:-1])], sizes)
-    moving = np.flatnonzero(np.abs(np.vstack([seen, tried]) - base).max(axis=0) > EXACT * scale)
+    every = np.vstack([base, seen, tried])
+    own, apart = np.abs(every).max(axis=0), np.abs(every - base)
+    moving = np.flatnonzero(apart.max(axis=0) > EXACT * own).tolist()
+    by_each = apart[1 : 1 + len(names)] > EXACT * own
+    fits = {place: _either(base[place], seen[:, place], tried[:, place], held, pairs, own[place]) for place in moving}
+    # what fits none may be rounding of larger numbers: of those that the same parameters move, and of no others
+    fitted_size = np.array([[0.0 if fits[k] is None else own[k] for k in moving]]) * by_each[:, moving]
     out: list[ParameterPolynomial] = []
     of_array = np.repeat(np.arange(len(sizes)), sizes)
     inside = np.concatenate([np.zeros(0, dtype=int), *(np.arange(size) for size in sizes)])
-    for place in moving.tolist():
-        samples = base[place], seen[:, place], tried[:, place]
-        terms, constant, reciprocal = _fit(samples, held, pairs, scale[place]), float(base[place]), False
-        if terms is None and min(np.abs(each).min() for each in samples) > 0.0:
-            samples = 1.0 / base[place], 1.0 / seen[:, place], 1.0 / tried[:, place]
-            terms, constant, reciprocal = _fit(samples, held, pairs, abs(samples[0])), float(samples[0]), True
-        if terms is None:
-            changed = np.abs(seen[: len(names), place] - base[place])
-            raise ExportError("polynomial", found=names[int(np.argmax(changed))])
-        own = {key: float(value / np.prod(moves[list(key)])) for key, value in terms.items() if value}
-        out.append(ParameterPolynomial(int(of_array[place]), int(inside[place]), constant, own, reciprocal))
+    for place, fit in fits.items():
+        if fit is None:
+            movers = by_each[:, place] | ~by_each[:, place].any()
+            scale = float(fitted_size[movers].max())
+            fit = _either(base[place], seen[:, place], tried[:, place], held, pairs, scale)
+        if fit is None:
+            raise ExportError("polynomial", found=names[int(np.argmax(apart[1 : 1 + len(names), place]))])
+        constant, terms, reciprocal = fit
+        own_terms = {key: float(value / np.prod(moves[list(key)])) for key, value in terms.items() if value}
+        if own_terms:
+            out.append(ParameterPolynomial(int(of_array[place]), int(inside[place]), constant, own_terms, reciprocal))
     return out
 
 
+def _either(
+    base: float, seen: Array, tried: Array, held: Sequence[Array], pairs: Sequence[tuple[int, int]], scale: float
+) -> tuple[float, dict[Key, float], bool] | None:
+    """Constant and coefficients of a polynomial, or (True) of the reciprocal of one; None where it is neither."""
+    terms = _fit((base, seen, tried), held, pairs, scale)
+    if terms is not None:
+        return float(base), terms, False
+    if min(abs(base), np.abs(seen).min(), np.abs(tried).min()) > 0.0:
+        terms = _fit((1.0 / base, 1.0 / seen, 1.0 / tried), held, pairs, 1.0 / abs(base))
+    return None if terms is None else (1.0 / base, terms, True)
+
+
 def _fit(
-    samples: tuple[Array, Array, Array], held: Sequence[Array], pairs: Sequence[tuple[int, int]], scale: float
+    samples: tuple[float, Array, Array], held: Sequence[Array], pairs: Sequence[tuple[int, int]], scale: float
 ) -> dict[Key, float] | None:
     """Coefficients of a polynomial through samples at ±1 and at pairs of 1, None if it misses other samples."""
     base, seen, tried = samples

@@ -1,7 +1,7 @@
 """A component of Modelica as flat equations of Pymoca, in SymPy's expressions."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -138,17 +138,13 @@ def flattened(tree: Any, name: str, given: Mapping[str, float]) -> Flat:
     reader = ExpressionReader(name, real, parameters, lambda parts, scope: _constant(tree, parts, scope), kinds)
     units = {real[key]: str(free[key].unit.value or "") if key in free else "" for key in real}
     ports = _ports(name, real, free, units)
+    own = {port.flow.name for port in ports}
     try:
-        equations = tuple(_equations(reader, found.equations, {port.flow.name for port in ports}))
+        equations = tuple(_equations(reader, found.equations, own))
+        starts = _starts(reader, free, _equations(reader, found.initial_equations, own))
     except RecursionError:
         raise ModelicaError("expression", where=name, found="parameters that need each other") from None
-    return Flat(
-        name,
-        ports,
-        equations,
-        units,
-        {real[key]: float(free[key].start.value or 0.0) for key in real if key in free and _is_number(free[key].start)},
-    )
+    return Flat(name, ports, equations, units, starts)
 
 
 def _readings(instance: Any) -> Iterator[str]:
@@ -166,8 +162,19 @@ def _first(error: Exception) -> str:
     return next(iter(str(error).splitlines()), type(error).__name__)
 
 
-def _is_number(node: Any) -> bool:
-    return isinstance(getattr(node, "value", "none"), float | int | None)
+def _starts(reader: ExpressionReader, free: Mapping[str, Any], initial: Sequence[ZeroResidual]) -> dict[Symbol, float]:
+    """Values at the start: those of variables, unless initial equations give them."""
+    out = {symbol: 0.0 for symbol in reader.variables.values()}
+    for key, symbol in reader.variables.items():
+        if key in free and getattr(free[key].start, "value", 0) is not None:
+            out[symbol] = float(reader.value(free[key].start))
+    for each in initial:
+        symbol = next(iter(each.residual.free_symbols), None)
+        slope = each.residual.diff(symbol) if symbol in out else sp.Symbol("none")
+        if slope.free_symbols or each.residual.free_symbols != {symbol}:
+            raise ModelicaError("initial", where=reader.where, equation=each.text)
+        out[symbol] = float(sp.expand(symbol - each.residual / slope))
+    return out
 
 
 def _parameters(

@@ -99,6 +99,22 @@ def test_parameters_of_what_drives_are_in_the_program(path):
         assert image_of(model, parameters=[path], inputs=["joints.bearing"]).dependences
 
 
+@pytest.mark.parametrize("path", ["bodies.crank.mass", "joints.bearing.friction", "joints.bearing.drive"])
+def test_what_depends_on_a_number_is_the_same_beside_stiff_parts(path):
+    """Numbers of all units stand in one array: a soft one counts beside those of a stop of 1e14 N/m."""
+    text = (ROOT / "scenes/slider-crank.toml").read_text()
+
+    ends = 'bodies = ["ground", "slider"]\nat1 = [0.5, 0.0, 0.0]\nat2 = [0.0, 0.0, 0.0]'
+
+    def moved_numbers(stiffness):
+        stop = f"[springs.stop]\n{ends}\nstiffness = {stiffness}\n"
+        made = image_of(scene_of_text(text + PUSHED + stop), parameters=[path]).dependences
+        return [(each.entry, each.constant, each.terms) for each in made]
+
+    assert moved_numbers(1.0) == moved_numbers(1e14)
+    assert moved_numbers(1.0)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 2, 7])
 def test_drawn_scenes_are_exported(seed):

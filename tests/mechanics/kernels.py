@@ -6,6 +6,7 @@ import numpy as np
 
 from ephs.semantics import Reference, Storage
 from ephs.semantics.descriptor.kernel_table import OK, address_of, prototype
+from ephs.semantics.descriptor.sparsity import jacobian_mask
 from ephs.semantics.primitives.behaviour import NaturalBehaviour
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from tests import numerics
@@ -74,7 +75,7 @@ class Draw:
 
 
 def agreeing(draw, near=3e-6):
-    """The energy of a kernel, whose values are the plain ones, and its Jacobian their differences.
+    """The energy of a kernel, whose values are the plain ones, and its Jacobian their differences, 0 off its mask.
 
     Differences, and the differenced slopes of springs, are good to about eight digits: ``near`` of the largest.
     """
@@ -83,5 +84,6 @@ def agreeing(draw, near=3e-6):
     assert status == OK
     assert largest(values - expected, initial=0.0) <= 2e-13 * max(1.0, largest(expected, initial=0.0))
     differences = numerics.jacobian(lambda v: draw.plain(draw.z + v), draw.z.size, 1e-5).reshape(jacobian.shape)
+    assert not jacobian[~jacobian_mask(draw.primitive)].any()
     assert largest(jacobian - differences, initial=0.0) <= near * max(1.0, largest(differences, initial=0.0))
     return energy

@@ -11,8 +11,9 @@ from ephs.mechanics.elements.offset import frame_change
 from ephs.mechanics.elements.tendon import tension_spring
 from ephs.operad import Path
 from ephs.operad import quantity as Q
-from ephs.semantics import Storage, StructureError, library
+from ephs.semantics import Irreversible, Storage, StructureError, library
 from ephs.semantics.descriptor.kernel_table import DOMAIN, OK, TEMPERATURE, TURN
+from ephs.semantics.descriptor.sparsity import jacobian_mask
 from ephs.semantics.spaces import PAIRS, SE3, SO3, pair
 from ephs.semantics.verdicts.search import search
 from ephs.testing import check_primitive, mechanisms
@@ -83,6 +84,17 @@ def test_a_kernel_is_its_plain_definition(name, seed, size):
     if isinstance(draw.primitive, Storage) and not draw.primitive.environment:
         there = draw.primitive.energy(draw.primitive.retract(draw.x, draw.v))
         assert abs(energy - there) <= 4e-15 * max(1.0, abs(there))
+
+
+WITHOUT_LOSSES = [n for n, p in PRIMITIVES.items() if not isinstance(p, Irreversible)]
+
+
+@pytest.mark.parametrize("name", [name for name in WITHOUT_LOSSES if not name.startswith("velocity_relation")])
+def test_a_mask_has_no_more_entries_than_its_jacobian(name):
+    """Of the others parts count that cancel each other."""
+    drawn = [Draw(PRIMITIVES[name], seed, 0.3).compiled() for seed in range(12)]
+    found = np.any([jacobian != 0.0 for status, _, jacobian, _ in drawn if status == OK], axis=0)
+    assert np.array_equal(found, jacobian_mask(PRIMITIVES[name]))
 
 
 @pytest.mark.parametrize("name", [n for n, p in PRIMITIVES.items() if isinstance(p, Storage) and not p.environment])

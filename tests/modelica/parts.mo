@@ -84,6 +84,40 @@ package Parts "Components by their textbook equations, in the units and connecto
   equation
     i = C*der(v);
   end Capacitor;
+  model Charged
+    extends Branch(v(start = 2*v0 - v1));
+    parameter Real v0 = 1;
+    parameter Real v1 = 0;
+    parameter Real C(unit = "F") = 0.5;
+  equation
+    i = C*der(v);
+  end Charged;
+  model Initial
+    extends Branch(v(start = 7));
+    parameter Real v0 = 1;
+    parameter Real v1 = 0;
+    parameter Real C(unit = "F") = 0.5;
+  initial equation
+    C*v = v0 - C*v1;
+  equation
+    i = C*der(v);
+  end Initial;
+  model Warm
+    Heat port;
+    parameter Real v0 = 1;
+    parameter Real v1 = 0;
+    Real T(unit = "K", start = 2*v0 - v1);
+  equation
+    T = port.T;
+    20*der(T) = port.Q_flow;
+  end Warm;
+  model Settled
+    extends Branch;
+  initial equation
+    der(v) = 0;
+  equation
+    i = der(v);
+  end Settled;
   model Inductor
     extends Branch;
     parameter Real L(unit = "H") = 0.25;

@@ -22,6 +22,7 @@ REFUSED = {
     "Heater": ("source", "port.Q_flow = -50"),
     "Sampler": ("branch", "when v > 0"),
     "Stepwise": ("algorithm", "expected equations"),
+    "Settled": ("initial", r"the value of one variable: der\(v\) = 0"),
     "Unsaid": ("value", "R=…"),
     "Reversed": ("connector", "connector p of m, N.m, expected one of V, A"),
     "Nothing": ("flat", "cannot be flattened"),

@@ -81,3 +81,16 @@ def test_too_many_or_too_few_equations_are_no_relation(extra):
     with pytest.raises(ModelicaError) as caught:
         relation_of(flat, more)
     assert caught.value.fault == "count"
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(1.0, 100.0), st.floats(-100.0, 1.0))
+def test_a_start_is_the_number_that_its_expression_has(parts, v0, v1):
+    """Of a modification, of an initial equation, which counts before it, and of a temperature."""
+    for name in ("Charged", "Initial"):
+        found = parts.read(f"Parts.{name}", v0=v0, v1=v1).initial["stored.v"]
+        assert found == pytest.approx(0.5 * (2.0 * v0 - v1), rel=1e-15)
+    warm = parts.read("Parts.Warm", v0=v0, v1=v1).system.flatten()
+    (made,) = (primitive for _, primitive in warm.leaves())
+    assert dict(made.parameters)["c1"] == pytest.approx(20.0 * (2.0 * v0 - v1), rel=1e-15)
+    assert parts.read("Parts.Capacitor").initial["stored.v"] == 1.5

@@ -7,9 +7,9 @@ the same tape, and share what is made of it. What branches on its arguments, or 
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final, TypeVar, cast, final
+from typing import Any, Final, TypeVar, final
 
 import numpy as np
 
@@ -280,25 +280,6 @@ def _operations() -> Mapping[str, Callable[..., Real]]:
 
 OPERATIONS: Final = _operations()
 """Operations on the numbers of an evaluator."""
-PIECEWISE: Final = frozenset({"absolute", "sign", "choose", "root"})
-"""Operations that are not analytic: a derivative may vanish in one region and not in another."""
-
-
-def has_pieces(relation: object) -> bool:
-    """Whether a relation has a tape with a piecewise operation."""
-    if isinstance(relation, Tape):
-        return any(name in PIECEWISE for name, _, _ in relation.operations)
-    if isinstance(relation, tuple):
-        return any(map(has_pieces, cast("tuple[object, ...]", relation)))
-    return is_dataclass(relation) and any(has_pieces(getattr(relation, field.name)) for field in fields(relation))
-
-
-def pieced(tape: Tape) -> list[bool]:
-    """Of each output, whether a piecewise operation is behind it."""
-    found: list[bool] = []
-    for name, places, _ in tape.operations:
-        found.append(name in PIECEWISE or any(found[i] for i in places))
-    return [found[i] for i in tape.outputs]
 
 
 def quarter(value: object) -> float | None:

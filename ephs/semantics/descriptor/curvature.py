@@ -1,4 +1,4 @@
-"""Second derivatives of energies at a point, by the same compiled relations that runs step with."""
+"""Derivatives at a point, by the same compiled relations that runs step with, over a step of no length."""
 
 import ctypes
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.descriptor.kernel_table import OK, address_of, prototype
-from ephs.semantics.primitives.primitives import Point, Storage
+from ephs.semantics.primitives.primitives import Point, Reversible, Storage
 from ephs.semantics.spaces import manifold
 
 
@@ -17,17 +17,8 @@ def curvature(storage: Storage, x: Point, reference: Reference | None = None) ->
     exp(v) exp(w) = exp(v + w + ½ [v, w] + …). Exact of recorded energies, else by differences of the efforts; no
     numbers outside of the domain.
     """
-    given = reference or Reference()
     n = storage.bundle.size
-    address, numbers, _callback = address_of(storage, given)
-    dims = np.array([n, 0, n, sum(x[port].size for port in storage.reads)], dtype=np.int64)
-    scal = np.array([0.0, given.temperature, given.pressure])
-    point = np.concatenate([*(x[port] for port in storage.reads), np.zeros(1)])
-    effort, slope, rest = np.zeros(n + 1), np.zeros(n * n + 1), np.zeros(n * n + 4096)
-    arrays = (scal, np.append(numbers, 0.0), point, np.zeros(n + 1), effort, rest, slope, rest, rest, rest)
-    pointers = [each.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for each in arrays]
-    if prototype(address)(dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *pointers) != OK:
-        return np.full((n, n), np.nan)
+    effort, slope, _ = _written(storage, x, np.zeros(n), 0, reference)
     half = slope[: n * n].reshape(n, n)
     out = half + half.T
     for _, where, quantity in storage.bundle.items():
@@ -35,3 +26,33 @@ def curvature(storage: Storage, x: Point, reference: Reference | None = None) ->
         for j, way in enumerate(np.eye(group.dim)):
             out[where, where.start + j] += 0.5 * effort[where] @ group.ad(way)
     return out
+
+
+def turned(process: Reversible, x: Point, efforts: Array, rates: Array, reference: Reference) -> Array:
+    """dC/dt e (k,) at the rates (m,) of the states that are read.
+
+    Over a step v the conditions are C(x exp(v/2)) e. Exact of recorded structures, else by differences; no numbers
+    outside of the domain.
+    """
+    n, k, m = efforts.size, process.multipliers, rates.size
+    jacobian = _written(process, x, efforts, k, reference)[2]
+    return 2.0 * jacobian[: (n + k) * (n + k + m)].reshape(n + k, -1)[n:, n + k :] @ rates
+
+
+def _written(
+    primitive: Storage | Reversible, x: Point, efforts: Array, k: int, reference: Reference | None
+) -> tuple[Array, Array, Array]:
+    """What a relation writes into its arrays of efforts, flows and derivatives; nothing but NaN outside its domain."""
+    given = reference or Reference()
+    n, m = efforts.size, sum(manifold(primitive.interface[port].quantity.space).dim for port in primitive.reads)
+    address, numbers, _callback = address_of(primitive, given)
+    point = np.concatenate([*(x[port] for port in primitive.reads), np.zeros(1)])
+    dims = np.array([n, k, m, point.size - 1], dtype=np.int64)
+    scal = np.array([0.0, given.temperature, given.pressure])
+    effort, flow, jacobian = np.append(efforts, 0.0), np.zeros(n * n + n + 1), np.zeros((n + k) * (n + k + m) + 1)
+    rest = np.zeros(max(m, k) + 1)
+    arrays = (scal, np.append(numbers, 0.0), point, rest, effort, rest, flow, rest.copy(), jacobian, np.zeros(4096))
+    pointers = [each.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for each in arrays]
+    if prototype(address)(dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *pointers) != OK:
+        effort, flow, jacobian = (np.full(each.size, np.nan) for each in (effort, flow, jacobian))
+    return effort, flow, jacobian

@@ -14,8 +14,10 @@ import numpy as np
 
 from ephs.semantics.bundles.bundle import Array, Reference
 from ephs.semantics.bundles.errors import SemanticsError
+from ephs.semantics.bundles.extents import room
 from ephs.semantics.derive.relations import compiled
 from ephs.semantics.primitives.behaviour import NaturalBehaviour, Storing
+from ephs.semantics.primitives.differences import settled
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
 from ephs.semantics.spaces import manifold
 from ephs.semantics.spaces.rank import DIFFERENCE
@@ -135,7 +137,9 @@ def _storage(storage: Storage, potentials: Mapping[str, float]) -> _Evaluate:
 
         step = v.copy()
         effort[:] = outputs_at(step)
-        slope[:] = _differenced(outputs_at, step).ravel()
+        ways = zip(_rooms(storage, point), np.eye(step.size), strict=True)
+        columns = [settled(lambda k, way=way: outputs_at(step + k * way), size) for size, way in ways]
+        slope[:] = np.array(columns).T.ravel()
         energy[0] = storage.energy(storage.retract(point, step))
 
     return evaluate
@@ -161,15 +165,23 @@ def _relation(primitive: Primitive, potentials: Mapping[str, float]) -> _Evaluat
         z = np.concatenate([e, lam, v])
         out = outputs_at(z)
         flow[:], condition[:] = out[:n], out[n:]
-        jacobian[:] = _differenced(outputs_at, z).ravel()
+        sizes = DIFFERENCE * np.concatenate([np.ones(n + k), _rooms(primitive, point)])
+        jacobian[:] = _differenced(outputs_at, z, sizes).ravel()
 
     return evaluate
 
 
-def _differenced(function: Callable[[Array], Array], z: Array) -> Array:
+def _rooms(primitive: Primitive, point: Mapping[Any, Array]) -> Array:
+    """(m,) lengths within which the states that are read may be moved."""
+    of = [primitive.interface[port].quantity for port in primitive.reads]
+    rooms = [np.full(each.space.dim, room(each, point[port])) for each, port in zip(of, primitive.reads, strict=True)]
+    return np.concatenate([*rooms, np.zeros(0)])
+
+
+def _differenced(function: Callable[[Array], Array], z: Array, sizes: Array) -> Array:
     columns: list[Array] = []
     for i in range(z.size):
         delta = np.zeros(z.size)
-        delta[i] = DIFFERENCE * max(1.0, abs(float(z[i])))
+        delta[i] = sizes[i] * max(1.0, abs(float(z[i])))
         columns.append((function(z + delta) - function(z - delta)) / (2.0 * delta[i]))
     return np.array(columns).T if columns else np.zeros((0, 0))

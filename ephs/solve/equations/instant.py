@@ -4,7 +4,7 @@ Dense and plain: an oracle for integrators, and what reports forces. Constraints
 their rate C ė + Ċ e = 0 determines multipliers and rates (Lohmayer, Capobianco, Leyendecker, section 5).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ephs.operad import Path, Quantity
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.descriptor.curvature import curvature
+from ephs.semantics.descriptor.curvature import curvature, turned
 from ephs.semantics.descriptor.descriptor import ComponentSlot, Descriptor, Input
 from ephs.semantics.linear.sums import uncancelled
 from ephs.semantics.primitives.primitives import Irreversible, Reversible
@@ -138,7 +138,7 @@ def instant(
         row += dim
     differentiated = np.zeros((n_l, size))
     differentiated[:, rise] = constraint
-    turning = -_turned_constraints(d, x, _known_rates(d, constraint, flows)) @ efforts
+    turning = -_turned_constraints(d, reference, x, efforts, _known_rates(d, constraint, flows))
     matrix = np.vstack([balance, growth, differentiated, held])
     scale = np.maximum(np.abs(matrix).max(axis=1, initial=0.0), TINY)
     everything = np.concatenate([right, np.zeros(n_w), turning, lift])
@@ -220,11 +220,6 @@ def _flows(d: Descriptor, reference: Reference, x: Array, efforts: Array) -> Arr
     return out
 
 
-def _difference(function: Callable[[float], Array], h: float) -> Array:
-    """The derivative at 0 of a function of numbers of steps h, by differences of fourth order."""
-    return (8.0 * (function(1.0) - function(-1.0)) - (function(2.0) - function(-2.0))) / (12.0 * h)
-
-
 def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
     """Rates of the states at junctions without constraints: those are all that constraints may read."""
     touched = np.abs(constraint).max(axis=0, initial=0.0) > 0.0
@@ -235,24 +230,12 @@ def _known_rates(d: Descriptor, constraint: Array, flows: Array) -> Array:
     return out
 
 
-def _turned_constraints(d: Descriptor, x: Array, rates: Array) -> Array:
-    """dC/dt along known rates, (multiplier_size, effort_size), by differences of fourth order."""
-    out = np.zeros((d.multiplier_size, d.effort_size))
+def _turned_constraints(d: Descriptor, reference: Reference, x: Array, efforts: Array, rates: Array) -> Array:
+    """dC/dt e along known rates, (multiplier_size,)."""
+    out = np.zeros(d.multiplier_size)
     for slot in d.components:
-        primitive = slot.primitive
-        if not (slot.multipliers and primitive.reads and isinstance(primitive, Reversible)):
-            continue
-        fastest = max((float(np.abs(rates[s.rates]).max(initial=0.0)) for s in slot.reads), default=0.0)
-        if fastest == 0.0:
-            continue
-        h = 1e-3 / fastest
-
-        along = h * rates
-
-        def constraints_at(
-            steps: float, slot: ComponentSlot = slot, primitive: Reversible = primitive, along: Array = along
-        ) -> Array:
-            return primitive.structure(d.point(slot, d.advance(x, steps * along)))[1]
-
-        _place(out, slot, _difference(constraints_at, h))
+        known = rates[rates_read(slot)]
+        if slot.multipliers and isinstance(slot.primitive, Reversible) and known.any():
+            where = slice(slot.multiplier, slot.multiplier + slot.multipliers)
+            out[where] = turned(slot.primitive, d.point(slot, x), efforts[list(slot.efforts)], known, reference)
     return out

@@ -4,23 +4,18 @@ What vanishes of a component's Jacobian is found once for all components of one 
 are placed at once.
 """
 
-import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from ephs.semantics.bundles.bundle import Array, Reference
-from ephs.semantics.derive.tape import has_pieces
-from ephs.semantics.descriptor.kernel_table import Callback, address_of, prototype
+from ephs.semantics.descriptor.kernel_table import Callback, address_of
 from ephs.semantics.descriptor.numbering import Index, spans, starts
+from ephs.semantics.descriptor.sparsity import Mask, jacobian_mask
 from ephs.semantics.primitives.primitives import Primitive, Reversible, Storage
-from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.solve.methods.records import IRREVERSIBLE, REVERSIBLE, STORING, WORKING, Tables, efforts_of, rates_of
-
-LINEAR = frozenset({"constant_structure", "quadratic"})
-"""Kernels whose Jacobian's entries are their parameters, so that zeros depend on the parameters."""
 
 
 @final
@@ -68,7 +63,7 @@ def laid_out(t: Tables, primitive: Index, entries: Sequence[LayoutEntry], refere
         (components,) which of the entries each component is.
     """
     size = int(t.counts[3])
-    flat, j_at = _places(t, primitive, [_local_pattern(entry, reference) for entry in entries])
+    flat, j_at = _places(t, primitive, [jacobian_mask(entry.primitive, reference) for entry in entries])
     constant_at, values = _constant_entries(t, size)
     place, found = _numbered(np.concatenate([constant_at, flat, np.full(1, -1)]))
     template = np.zeros(place.size + size)
@@ -111,7 +106,7 @@ def _constant_entries(t: Tables, size: int) -> tuple[Index, Array]:
     return np.concatenate([stored, prescribed]), values
 
 
-def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, Index]:
+def _places(t: Tables, primitive: Index, patterns: Sequence[Mask]) -> tuple[Index, Index]:
     """Positions of local Jacobian entries in the matrix, row · size + column, −1 where it is structurally zero; and
     where those of each component begin. Components of one pattern are placed at once."""
     n_rate, n_effort, size = t.counts[0], t.counts[1], t.counts[3]
@@ -131,57 +126,3 @@ def _places(t: Tables, primitive: Index, patterns: list[Array]) -> tuple[Index, 
         at = np.where(pattern, rows[:, :, None] * size + columns[:, None, :], -1)
         out[j_at[these, None] + np.arange(pattern.size)] = at.reshape(these.size, -1)
     return out, j_at
-
-
-def _local_pattern(entry: LayoutEntry, reference: Reference) -> Array:
-    """Mask of the entries of a component's Jacobian that are not identically zero.
-
-    An analytic function that vanishes at three random points is zero. Callbacks may branch, and recorded functions may
-    be piecewise: of these, all entries count.
-    """
-    primitive, (kind, _, n, k, _) = entry.primitive, entry.counts
-    read = tuple(primitive.interface[port].quantity for port in primitive.reads)
-    nv = sum(quantity.space.dim for quantity in read)
-    shape = (n, n) if kind == STORING else (n + k, n + k + nv)
-    kernel = primitive.kernel
-    numbers = kernel.parameters if kernel is not None else ()
-    if kernel is not None and kernel.name in LINEAR:
-        numbers = tuple(number != 0.0 for number in numbers)
-    names = None if kernel is None else (kernel.name, kernel.relation)
-    key = (names, numbers, read, kind, n, k)
-    if key not in _patterns:
-        plain = entry.callback is not None or not shape[0] or (kernel is not None and has_pieces(kernel.relation))
-        _patterns[key] = np.ones(shape, dtype=bool) if plain else _sample_pattern(entry, reference, shape)
-    return _patterns[key]
-
-
-_patterns: dict[Any, Array] = {}  # a cache: the pattern is a function of the key
-
-
-def _sample_pattern(entry: LayoutEntry, reference: Reference, shape: tuple[int, int]) -> Array:
-    rng = np.random.default_rng(5)
-    primitive, (_, _, n, k, _) = entry.primitive, entry.counts
-    call = prototype(entry.address)
-    nv = sum(primitive.interface[port].quantity.space.dim for port in primitive.reads)
-    found = np.zeros(shape, dtype=bool)
-    for _ in range(3):
-        point = random_point(primitive.bundle, primitive.reads, rng)
-        x = np.concatenate([*(point[p] for p in primitive.reads), np.zeros(1)])
-        dims = np.array([n, k, nv, x.size - 1], dtype=np.int64)
-        arrays = [
-            np.array([1e-2, reference.temperature, reference.pressure]),
-            np.append(entry.numbers, 0.0),
-            x,
-            1e-2 * rng.standard_normal(nv + 1),
-            np.concatenate([random_efforts(primitive.bundle, rng), np.zeros(1)]),
-            rng.standard_normal(k + 1),
-            np.zeros(n * n + n + 1),
-            np.zeros(k + 2),
-            np.zeros((n + k) * (n + k + nv) + 1),
-            np.zeros(4096),
-        ]
-        pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in arrays]
-        call(dims.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *pointers)
-        out = arrays[6] if isinstance(primitive, Storage) else arrays[8]
-        found |= out[: shape[0] * shape[1]].reshape(shape) != 0.0
-    return found

@@ -27,7 +27,6 @@ from ephs.semantics.stage import (
     Vector,
     staged,
 )
-from ephs.solve.equations.layout import LINEAR
 from ephs.solve.equations.model import Model
 from ephs.solve.equations.sparse import Index
 from ephs.solve.methods.continuous import AccumulatorRates, Continuous, Matrices
@@ -278,7 +277,7 @@ class Integral:
 def _constant(model: Model) -> Any:
     """(components,) whether a component's equations are linear with constant coefficients."""
     n = model.descriptor.numbering
-    of = [one.kernel is not None and one.kernel.name in LINEAR for one in n.primitives]
+    of = [one.kernel is not None and one.kernel.name in ("constant_structure", "quadratic") for one in n.primitives]
     return np.array(of, dtype=bool)[n.primitive] & np.isin(model.tables.kind, (STORING, REVERSIBLE))
 
 

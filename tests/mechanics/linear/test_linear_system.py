@@ -209,6 +209,7 @@ def test_a_state_at_a_kink_has_no_linear_system(power, place):
         (lambda q: 25.0 * (abs(q - 1.0) + q - 1.0) ** 2, 1.5, 200.0),
         (lambda q: (abs(q - 40.0) + q - 40.0) ** 3, 40.5, 24.0),
         (lambda q: 3.0 * q**2 + 5.0 * (abs(q + 30.0) - q - 30.0) ** 2, -31.0, 46.0),
+        (lambda q: -np.exp(-60.0 * (q - 30.0) ** 2), 30.0, 120.0),
     ],
 )
 def test_parts_that_act_on_one_side_have_their_stiffness_there(energy, at, stiffness):

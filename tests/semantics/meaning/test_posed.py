@@ -1,5 +1,6 @@
 """Which states have a motion, and one: what says so, what runs, and what the laws of gluing are in exact numbers."""
 
+import math
 import re
 
 import numpy as np
@@ -10,17 +11,17 @@ import ephs
 from ephs import Pattern
 from ephs import library as lib
 from ephs import quantity as Q
-from ephs.mechanics.elements.components import gravity, pair_spring
+from ephs.mechanics.elements.components import gravity, holonomic, pair_spring
 from ephs.operad import ROOT, Path
 from ephs.semantics import SemanticsError
-from ephs.semantics.descriptor.curvature import curvature
+from ephs.semantics.descriptor.curvature import curvature, turned
 from ephs.semantics.meaning import relation_of_pattern
 from ephs.semantics.meaning.fields import Rational, Rounded, as_written
 from ephs.semantics.meaning.functor import filled
 from ephs.semantics.meaning.linear import LinearRelation
 from ephs.semantics.meaning.variables import RelationVariable
 from ephs.semantics.primitives.differences import slope
-from ephs.semantics.spaces import manifold, pair
+from ephs.semantics.spaces import PAIRS, manifold, pair
 from ephs.testing import nestings
 from tests.numerics import largest
 
@@ -241,5 +242,58 @@ def test_that_of_two_states_is_symmetric_and_what_is_not_recorded_is_differenced
     found = curvature(ephs.storage(ports, lambda a, b: a * a * b + b**4), point)
     assert np.allclose(found, expected, rtol=1e-15)
     plain = ephs.storage(ports, lambda a, b: float(a) ** 2 * float(b) + float(b) ** 4)
-    differenced = curvature(plain, point)
-    assert np.allclose(differenced, expected, rtol=1e-3)
+    assert np.allclose(curvature(plain, point), expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("scale", [50.0, 1.0, 1e-2, 1e-4])
+def test_differences_fit_the_scale_on_which_an_energy_varies(scale):
+    """That of a gas of a small volume and heat capacity; steps of at most 1e-3 have the rounding of two differences."""
+    ports, at = {"s": Q.entropy, "v": Q.volume}, {"s": 0.3 * scale, "v": 1e-3 * scale}
+    point = {Path.of(name): np.array([value]) for name, value in at.items()}
+    recorded = ephs.storage(ports, lambda s, v: scale * np.exp(s / scale) * (scale / v) ** 0.4)
+    plain = ephs.storage(
+        ports, lambda s, v: scale * math.exp(float(s) / scale) * math.exp(0.4 * math.log(scale / float(v)))
+    )
+    assert plain.kernel is None
+    assert np.allclose(plain.effort(point, ephs.Reference()), recorded.effort(point, ephs.Reference()), rtol=1e-8)
+    assert np.allclose(curvature(plain, point), curvature(recorded, point), rtol=1e-7 * max(1.0, scale))
+
+
+PULLED = {"a": Q.momentum, "b": Q.momentum, "~q": Q.displacement}
+
+
+def _turning(ratio, x):
+    """By the efforts a and b of a constraint a + ratio(q) b = 0, at the rate 3."""
+    made = ephs.constraint(PULLED, lambda q: np.array([[1.0, ratio(q)]]), multipliers=1)
+    return [turned(made, {Path.of("q"): np.array([x])}, e, np.array([3.0]), ephs.Reference())[0] for e in np.eye(2)]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-4, 1e-7])
+@pytest.mark.parametrize("x", [-0.7, 0.1, 2.0])
+def test_the_turning_of_a_recorded_constraint_is_exact(scale, x):
+    """At lengths of any scale, which no step of differences fits; that of a plain function is by one of 5e-7."""
+    expected = 3.0 * np.cos(x) / scale
+    assert _turning(lambda q: np.sin(q / scale), x * scale) == pytest.approx([0.0, expected], rel=1e-14)
+    differenced = _turning(lambda q: math.sin(float(q) / scale), x * scale)[1]
+    assert (abs(differenced - expected) <= 1e-5 * abs(expected)) == (scale > 1e-6)
+
+
+@pytest.mark.parametrize("kind", [name for name in PAIRS if name != "fixed"])
+@pytest.mark.parametrize("on_group", [True, False])
+def test_the_turning_of_joints_is_that_of_their_constraints(kind, on_group):
+    rng = np.random.default_rng(3)
+    joint = holonomic(pair(kind, **dict.fromkeys(PAIRS[kind].parameters, 0.3)), on_group=on_group)
+    (read,), group = joint.reads, manifold(joint.interface[joint.reads[0]].quantity.space)
+    x, rates, e = (
+        group.exp(0.5 * rng.standard_normal(group.dim)),
+        rng.standard_normal(group.dim),
+        rng.standard_normal(12 + group.dim),
+    )
+
+    def residual_after(h):
+        return joint.structure({read: group.retract(x, h * rates)})[1] @ e
+
+    expected = (
+        8.0 * (residual_after(1e-3) - residual_after(-1e-3)) - residual_after(2e-3) + residual_after(-2e-3)
+    ) / 12e-3
+    assert largest(turned(joint, {read: x}, e, rates, ephs.Reference()) - expected) <= 1e-10 * largest(expected)
