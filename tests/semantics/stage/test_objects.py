@@ -29,15 +29,6 @@ SMALL = Program("small", total=Entry(lambda on, x: x[0] * on.exp(x[1]), x=vector
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A store of this test's own."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(STORE, "usable", True)
-    store._prune.cache_clear()
-    return tmp_path / "ephs" / "objects"
-
-
-@pytest.fixture
 def compilations(monkeypatch):
     """The modules that LLVM compiles."""
     texts: list[str] = []
