@@ -140,19 +140,24 @@ def evaluated(expression, values):
 CLOSED = [name for name, system in SYSTEMS.items() if all(port.power for port in system.interface.values())]
 
 
+def drawn_point(name, seed):
+    """A system, a source of numbers, its reference, and a state of positive numbers."""
+    rng = np.random.default_rng(seed)
+    state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in SYSTEMS[name].states}
+    return SYSTEMS[name], rng, Reference(293.15, 300.0), state
+
+
 @pytest.mark.parametrize("name", CLOSED)
 @pytest.mark.parametrize("seed", range(3))
 def test_numbers_in_the_descriptor_form_give_its_residual(name, seed):
     """At any rates, efforts, multipliers and flows, whether or not they solve the equations."""
-    system, rng, reference = SYSTEMS[name], np.random.default_rng(seed), Reference(293.15, 300.0)
+    system, rng, reference, state = drawn_point(name, seed)
     d = system.descriptor()
-    state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
     inputs = {slot.path: Input(rng.standard_normal(1), False) for slot in d.outer}
     z = rng.standard_normal(d.unknowns(inputs))
     residual = d.residual(ContinuousBehaviour(reference), d.pack(state), inputs, z)
     values = named_numbers(system, state, reference)
-    junction_of = {path: where for path, where in zip(system.states, _junctions(system), strict=True)}
-    values |= {f"d{junction_of[s.path]}/dt": z[s.rate] for s in d.states}
+    values |= {f"d{where}/dt": z[s.rate] for s, where in zip(d.states, _junctions(system), strict=True)}
     values |= {f"{s.path}.e": z[d.rate_size + s.at] for s in d.junctions}
     values |= {f"{path}.f": float(given.value[0]) for path, given in inputs.items()}
     for slot in d.components:
@@ -173,11 +178,9 @@ def _junctions(system):
 @pytest.mark.parametrize("name", ["lever", "stator", "motor", "piston", "cylinder"])
 @pytest.mark.parametrize("seed", range(3))
 def test_numbers_in_the_reduced_form_give_what_the_solver_computes(name, seed):
-    system, rng, reference = SYSTEMS[name], np.random.default_rng(seed), Reference(293.15, 300.0)
-    d = system.descriptor()
-    state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
+    system, rng, reference, state = drawn_point(name, seed)
     stored = set(_junctions(system))
-    inputs = {slot.path: Input(rng.standard_normal(1), slot.path not in stored) for slot in d.outer}
+    inputs = {slot.path: Input(rng.standard_normal(1), slot.path not in stored) for slot in system.descriptor().outer}
     found = solved(system, state, ContinuousBehaviour(reference), inputs)
     values = named_numbers(system, state, reference)
     for path, where in zip(system.states, _junctions(system), strict=True):
