@@ -22,7 +22,7 @@ from ephs.semantics.stage import PLAIN
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.verdicts.checks import random_efforts, random_point
 from tests.numerics import EPS, generators, largest, seeds
-from tests.semantics.zoo import PS, conduction_matrix, friction_matrix
+from tests.semantics.zoo import conduction_matrix, drag
 from tests.staged import run_both
 
 
@@ -51,7 +51,7 @@ ENERGIES = {
     "direct": ({"q": Q.direct_pose}, lambda q: q[4] ** 2 * q[0] ** 2 + np.arctan2(q[6], 9.0 + q[5])),
 }
 RELATIONS = {
-    "drag": ephs.irreversible(PS, lambda p, s: abs(p) * friction_matrix(p, s)),
+    "drag": drag(lambda p, s: abs(p))(),
     "conduction": ephs.irreversible(
         {"a": Q.entropy, "b": Q.entropy, "~q": Q.displacement},
         lambda a, b, q: 2.0 * (1.0 + np.tanh(q) ** 2) * conduction_matrix(a, b),

@@ -18,7 +18,7 @@ from ephs.semantics.primitives.behaviour import ContinuousBehaviour
 from ephs.semantics.symbols.algebra import text_of
 from ephs.semantics.symbols.words import Words, operator, pairing
 from examples import oscillator, physics
-from tests.semantics.zoo import PS, friction_matrix
+from tests.semantics.zoo import drag
 
 FORMS = ("relation", "descriptor", "reduced")
 SYSTEMS = {name: system for name, system in vars(physics).items() if isinstance(system, ephs.System)}
@@ -235,10 +235,7 @@ def test_functions_of_ones_own_are_written_out():
 def test_drag_keeps_the_sign_of_the_velocity():
     """|u| u is not u²: velocities have either sign, temperatures one."""
 
-    def drag(p, s):
-        return 0.2 * abs(p) * friction_matrix(p, s)
-
-    brake = ephs.irreversible(PS, drag)
+    brake = drag(lambda p, s: 0.2 * abs(p))()
     system = oscillator.damped(osc=OSCILLATOR, mf=brake, env=lib.environment())
     assert "Abs(p)" in text_of(system.equations()["dp/dt"])
     m, p = sp.Symbol("m", positive=True), sp.Symbol("p", real=True)
