@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ephs import Pattern
@@ -107,6 +107,7 @@ def test_what_changes_later_changes_nothing(p, s):
 
 
 @settings(max_examples=30)
+@example(middle=449.9999999999999, width=1e-6, asks=True)  # 450 lies within it
 @given(st.floats(150.0, 900.0), st.floats(1e-6, 3.0), st.booleans())
 def test_friction_that_is_negative_in_a_drawn_window_is_refused(middle, width, asks):
     """Whether it hides from its record or cannot be recorded; without the window it passes."""
@@ -118,8 +119,9 @@ def test_friction_that_is_negative_in_a_drawn_window_is_refused(middle, width, a
 
         return drag(d)
 
-    with pytest.raises(StructureError, match=f"witness: .*s = {str(middle)[:2]}" if width < 1e-3 else "witness"):
+    with pytest.raises(StructureError) as caught:
         part(-1.0)()
+    assert abs(caught.value.witness.efforts["s"] - middle) < width
 
 
 @pytest.mark.parametrize(
