@@ -49,6 +49,14 @@ def wanted(solution, name):
     return np.atleast_1d(getattr(joint, what)[-1])[int(part[0]) if part else 0]
 
 
+def advanced(model, until, **given):
+    """The exported model after a time, under inputs where some are given."""
+    run = Run(exported(image_of(model, inputs=list(given), until=until), "made"))
+    run.call("inputs", None, np.array(list(given.values())))
+    assert run.call("advance", ctypes.c_int64, until) == 0
+    return run
+
+
 def assert_named(outputs, solution, within):
     """All outputs are what their names say; rotations up to the sign of their quaternions."""
     for name, value in outputs.items():
@@ -134,8 +142,7 @@ def test_drawn_scenes_are_exported(seed):
 @pytest.mark.parametrize("scene", ["slider-crank", "heavy-top", "four-bar", "chain", "mbs", "motor-four-bar"])
 def test_the_steps_are_those_of_the_package(scene):
     model = shipped(scene)
-    run = Run(exported(image_of(model, until=0.3), "made"))
-    assert run.call("advance", ctypes.c_int64, 0.3) == 0
+    run = advanced(model, 0.3)
     assert run.call("time", ctypes.c_double) == 0.3
     solution = ephs.simulate(model, 0.3, method="rk87", save_at=[0.3], audit="off")
     for name, value in run.outputs().items():
@@ -147,8 +154,7 @@ def test_the_steps_are_those_of_the_package(scene):
 
 def test_the_energy_is_that_of_all_storages_but_the_environment():
     model = shipped("motor-four-bar")
-    run = Run(exported(image_of(model, until=0.3), "made"))
-    assert run.call("advance", ctypes.c_int64, 0.3) == 0
+    run = advanced(model, 0.3)
     solution = ephs.simulate(model, 0.3, method="rk87", save_at=[0.0, 0.3], audit="off")
     around = sum(
         293.15 * solution[str(path)][-1].item()
@@ -160,10 +166,7 @@ def test_the_energy_is_that_of_all_storages_but_the_environment():
 
 def test_forces_from_outside_are_inputs():
     model = shipped("slider-crank")
-    run = Run(exported(image_of(model, inputs=["joints.bearing"], until=0.2), "made"))
-    force = np.array([0.5])
-    run.call("inputs", None, force)
-    run.call("advance", ctypes.c_int64, 0.2)
+    run = advanced(model, 0.2, **{"joints.bearing": 0.5})
     pushed = ephs.simulate(model, 0.2, method="rk87", inputs={"joints.bearing": 0.5 - 0.06}, save_at=[0.2])
     free = ephs.simulate(model, 0.2, method="rk87", save_at=[0.2])
     found = run.outputs()["joints.bearing.coordinate"]
@@ -303,12 +306,10 @@ CONTROLLED["tendon"] = (
 @pytest.mark.parametrize("way", CONTROLLED)
 @pytest.mark.parametrize("controls", [(1.0, 0.05), (5.0, -7.0), (-3.0, 0.0)])
 def test_controls_of_actuators_are_inputs(way, controls):
-    model, names = scene_of_text(CONTROLLED[way]), ["actuators.push", "actuators.both"]
-    run = Run(exported(image_of(model, inputs=names, until=0.2), "made"))
-    run.call("inputs", None, np.array(controls))
-    assert run.call("advance", ctypes.c_int64, 0.2) == 0
-    found = run.outputs()
-    same = ephs.simulate(model, 0.2, method="rk87", inputs=dict(zip(names, controls, strict=True)), save_at=[0.2])
+    model = scene_of_text(CONTROLLED[way])
+    inputs = dict(zip(("actuators.push", "actuators.both"), controls, strict=True))
+    found = advanced(model, 0.2, **inputs).outputs()
+    same = ephs.simulate(model, 0.2, method="rk87", inputs=inputs, save_at=[0.2])
     for joint in ("h", "k"):
         assert found[f"joints.{joint}.rate"] == pytest.approx(same.joint(joint).rate[-1, 0], rel=1e-7)
 

@@ -43,7 +43,7 @@ from ephs.testing import systems
 from tests.numerics import largest
 from tests.operad.test_documents import places_in
 from tests.semantics.test_primitives import ARGUMENTS
-from tests.semantics.zoo import PS, friction_matrix
+from tests.semantics.zoo import drag, friction_matrix
 
 SCHEMA = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
 PATTERN = Resource.from_contents(json.loads(PATTERN_SCHEMA.read_text(encoding="utf-8")))
@@ -57,7 +57,7 @@ def couple(strength):
     def energy(a, b):
         return strength * a**2 * np.exp(-(b**2)) + b**2 / 2 + a**4
 
-    def drag(p, s, x):
+    def shared(p, s, x):
         return strength * (1 + x**2) * abs(p) * friction_matrix(p, s)
 
     def turning(q):
@@ -69,7 +69,7 @@ def couple(strength):
     return [
         ephs.storage({"a": Q.displacement, "b": Q.displacement}, energy),
         ephs.storage({"q": Q.relative_pose("spherical")}, turning),
-        ephs.irreversible({"p": Q.momentum, "s": Q.entropy, "~x": Q.displacement}, drag, name="drag"),
+        ephs.irreversible({"p": Q.momentum, "s": Q.entropy, "~x": Q.displacement}, shared, name="drag"),
         ephs.gyrator({"q": Q.displacement, "p": Q.momentum, "~x": Q.displacement}, spin),
         ephs.gyrator({"q": Q.charge, "p": Q.flux_linkage}, [[0, strength], [-strength, 0]]),
         ephs.transformer(
@@ -254,11 +254,7 @@ BOUNDED = {
     "constant": lambda: ephs.transformer(
         {"a": Q.momentum, "b": Q.momentum, "~x": Q.displacement}, [[2.0]], domain={"x": (1.5, np.inf)}
     ),
-    "irreversible": lambda: ephs.irreversible(
-        PS,
-        lambda p, s: friction_matrix(p, s),
-        domain={"p": (3.0, 4.0)},
-    ),
+    "irreversible": drag(lambda p, s: 1.0, domain={"p": (3.0, 4.0)}),
 }
 
 

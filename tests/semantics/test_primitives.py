@@ -16,7 +16,7 @@ from ephs.semantics.verdicts.checks import random_efforts, random_point
 from ephs.testing import interfaces, irreversibles, reversibles, storages
 from tests.numerics import largest, seeds
 from tests.semantics.subspace import dirac
-from tests.semantics.zoo import PS, QP, friction_matrix
+from tests.semantics.zoo import QP, drag
 
 GASES = (
     library.chemistry.Species("A", {"X": 1}, energy=1e3, entropy=10.0, capacity=20.0),
@@ -170,7 +170,7 @@ def test_what_one_makes_oneself_is_what_the_library_makes():
         "pkc": ephs.gyrator(QP, [[0.0, -1.0], [1.0, 0.0]]),
         "lever": ephs.transformer({"q1": Q.displacement, "q2": Q.displacement}, [[2.5]]),
         "rigid_link": ephs.constraint({"p": Q.momentum, "p2": Q.momentum}, [[1.0, -1.0]]),
-        "friction": ephs.irreversible(PS, lambda p, s: 0.2 * friction_matrix(p, s)),
+        "friction": drag(lambda p, s: 0.2)(),
     }
     for name, primitive in mine.items():
         state = {str(port): 0.4 for port in primitive.reads}

@@ -47,7 +47,7 @@ def test_fillings_are_complete_and_fit(missing):
 
 def test_a_filling_with_another_interface_is_refused_with_both_sides():
     lone = Pattern.from_text("q: displacement; pe(q)")
-    with pytest.raises(PatternError, match=r"box pe: .*momentum.*displacement"):
+    with pytest.raises(PatternError, match=r"box pe: the filling's interface does not match.*momentum.*displacement"):
         lone(pe=library.point_mass(m=1.0))
     with pytest.raises(SemanticsError, match=r"pe.*momentum.*displacement"):
         System.of(lone, {"pe": library.point_mass(m=1.0)})

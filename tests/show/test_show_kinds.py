@@ -8,19 +8,16 @@ import pytest
 from matplotlib.colors import to_rgb
 
 import ephs
-from ephs.operad import Pattern
-from ephs.semantics import library as lib
 from ephs.show import ShowError, plot, plot_mechanism, plot_motion, plot_phase, plot_wrenches
 from ephs.show.kinds import KINDS
 from ephs.show.shared.palette import CYCLE, dashes
+from tests.oscillator import free_oscillator
 from tests.scenes import shipped
 
 
 @pytest.fixture(scope="module")
 def oscillator() -> ephs.Solution:
-    pattern = Pattern.from_text("q: displacement; p: momentum; pe(q); ke(p); pkc(q, p)")
-    system = pattern(pe=lib.spring(k=1.0), ke=lib.point_mass(m=1.0), pkc=lib.pkc())
-    return ephs.simulate(system, 6.0, initial={"pe.q": 1.0}, step=0.01)
+    return ephs.simulate(free_oscillator(), 6.0, initial={"pe.q": 1.0}, step=0.01)
 
 
 @pytest.mark.parametrize("kind", KINDS)

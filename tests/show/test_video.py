@@ -9,6 +9,7 @@ from PIL import Image
 import ephs
 from ephs.show import ShowError, write_video
 from ephs.show.motions.video import VIDEOS
+from tests.oscillator import free_oscillator
 
 SCENE = """
 format = 1
@@ -71,9 +72,6 @@ def test_other_endings_and_missing_programs_are_named(swing, tmp_path, monkeypat
 
 
 def test_systems_without_bodies_are_refused(tmp_path):
-    spring = ephs.Pattern.from_text("q: displacement; p: momentum; pe(q); pkc(q, p); ke(p)")(
-        pe=ephs.library.spring(k=1.0), pkc=ephs.library.pkc(), ke=ephs.library.point_mass(m=1.0)
-    )
-    sol = ephs.simulate(spring, 0.1, initial={"pe.q": 1.0}, step=0.05)
+    sol = ephs.simulate(free_oscillator(), 0.1, initial={"pe.q": 1.0}, step=0.05)
     with pytest.raises(ShowError, match="bodies"):
         write_video(sol, tmp_path / "a.gif")

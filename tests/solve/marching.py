@@ -27,9 +27,34 @@ from ephs.solve.march.memory import Memory, Totals
 from ephs.solve.march.records import Ending, MarchControl, Motion, TableauRecord
 
 
+class Plain(Motion):
+    """What a motion without heat, sums and constraints has nothing to do for."""
+
+    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
+        return 0.0
+
+    def book(self, on: Evaluator, tableau: TableauRecord, k: Matrix, h: Real, totals: Totals) -> Integer:
+        return 0
+
+    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
+        """There is no heat."""
+
+    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
+        """There is no heat."""
+
+    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
+        """There are no sums."""
+
+    def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:
+        return 0
+
+    def least(self, on: Evaluator, change: Vector) -> Real:
+        return 0.0
+
+
 @final
 @dataclass(frozen=True, slots=True)
-class Field(Motion):
+class Field(Plain):
     """A plain right-hand side ẏ = f(y) on ℝⁿ.
 
     Parameters
@@ -72,24 +97,6 @@ class Field(Motion):
     def settle(self, on: Evaluator, base: Vector, y: Vector, q: Vector) -> Integer:
         return 0
 
-    def rounding(self, on: Evaluator, anchor: Real, y: Vector) -> Real:
-        return 0.0
-
-    def book(self, on: Evaluator, tableau: TableauRecord, k: Matrix, h: Real, totals: Totals) -> Integer:
-        return 0
-
-    def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
-        """There is no heat."""
-
-    def warm(self, on: Evaluator, y0: Vector, y: Vector) -> None:
-        """There is no heat."""
-
-    def hold(self, on: Evaluator, change: Vector, low: Vector, high: Vector) -> None:
-        """There are no sums."""
-
-    def open(self, on: Evaluator, account: RunAccount, q: Vector, y: Vector) -> Integer:
-        return 0
-
     def correct(
         self, on: Evaluator, account: RunAccount, h: Real, start: Vector, y: Vector, q: Vector, allowed: Vector
     ) -> Integer:
@@ -104,9 +111,6 @@ class Field(Motion):
 
     def project(self, on: Evaluator, q: Vector, change: Vector) -> None:
         """There are no constraints."""
-
-    def least(self, on: Evaluator, change: Vector) -> Real:
-        return 0.0
 
 
 def program(motion):

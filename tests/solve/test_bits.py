@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from ephs.mechanics.runs.scene_problem import problem_of_scene
 from ephs.semantics.spaces import codes
 from ephs.semantics.spaces.differentials import DIMENSIONS, differentials
-from ephs.semantics.stage import Program
 from ephs.solve.equations.model import Model, compile_model
 from ephs.solve.methods.natural import Natural
 from ephs.solve.methods.newton import natural_program
@@ -19,6 +18,7 @@ from ephs.solve.methods.records import DONE
 from ephs.solve.running.snapshot import parts
 from tests.numerics import generators, seeds
 from tests.scenes import shipped
+from tests.staged import run_both
 
 pytestmark = pytest.mark.optimised
 
@@ -32,23 +32,6 @@ def model_of(name: str) -> tuple[Model, np.ndarray]:
     problem = problem_of_scene(shipped(name))
     made = compile_model(problem.descriptor, problem.reference, problem.inputs(0.0, problem.initial))
     return made, problem.descriptor.pack(problem.initial)
-
-
-def copied(value):
-    return {name: array.copy() for name, array in parts(value).items()}
-
-
-def same(program: Program, name: str, given) -> list:
-    """Run an entry function both ways on copies of its arguments; the arguments as both leave them, and the result."""
-    runs = []
-    for calls in (program.plain(), program.compiled()):
-        arguments = given()
-        result = calls[name](*arguments)
-        runs.append([*arguments, np.array(0 if result is None else result)])
-    for one, other in zip(*runs, strict=True):
-        pairs = [(one[key], other[key]) for key in one] if isinstance(one, dict) else [(one, other)]
-        assert all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
-    return runs[0]
 
 
 def disturbed(model: Model, x, seed, stages):
@@ -69,17 +52,14 @@ def test_a_step_of_order_2(name, seed):
     method.prepare(state, h)
     rows = [np.zeros((1, width)) for width in (x.size, made.tables.kind.size, 5)]
 
-    def given():
-        tables = made.tables, method._groups, method.elimination
-        return [
-            *map(parts, tables), copied(method._memory), copied(method._scratch), x.copy(), state.z.copy(),
-            state.previous.copy(), made.scal(h), made.scal(0.0), made.input_values()[None], state.sums.copy(),
-            *[row.copy() for row in rows], np.zeros(4, dtype=np.int64), 1,
-        ]  # fmt: skip
-
-    found = same(natural_program(1), "advance", given)
-    assert found[-3][2] == (found[-3][0] == DONE)
-    assert np.array_equal(found[5], x) != (found[-3][0] == DONE)
+    tables = made.tables, method._groups, method.elimination
+    _, *found = run_both(
+        natural_program(1), "advance",
+        *map(parts, tables), parts(method._memory), parts(method._scratch), x, state.z, state.previous,
+        made.scal(h), made.scal(0.0), made.input_values()[None], state.sums, *rows, np.zeros(4, dtype=np.int64), 1,
+    )  # fmt: skip
+    assert found[-2][2] == (found[-2][0] == DONE)
+    assert np.array_equal(found[5], x) != (found[-2][0] == DONE)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -88,18 +68,14 @@ def test_a_step_of_order_2(name, seed):
 def test_the_stages_of_order_4(name, seed):
     made, x = model_of(name)
     h, method, state = disturbed(made, x, seed, 3)
-    inputs = np.tile(made.input_values(), (3, 1))
-
-    def given():
-        return [
-            parts(made.tables), parts(method._groups), np.zeros(made.unknowns, dtype=np.int64), x.copy(),
-            state.z.copy(), made.scal(h), made.scal(0.0), inputs,
-            copied(made.memory()), copied(method._scratch), 1,
-        ]  # fmt: skip
-
-    found = same(natural_program(3), "linearise", given)
-    assert found[-1] == 0
-    assert found[-3]["slope"].any()
+    status, *found = run_both(
+        natural_program(3), "linearise",
+        parts(made.tables), parts(method._groups), np.zeros(made.unknowns, dtype=np.int64), x, state.z,
+        made.scal(h), made.scal(0.0), np.tile(made.input_values(), (3, 1)), parts(made.memory()),
+        parts(method._scratch), 1,
+    )  # fmt: skip
+    assert status == 0
+    assert found[-2]["slope"].any()
 
 
 @settings(max_examples=10)
@@ -108,7 +84,7 @@ def test_the_stages_of_order_4(name, seed):
 def test_differentials(code, rng, size):
     v = size * rng.standard_normal(DIMENSIONS[code])
     for name in (f"dexp_left_{code}", f"dexp_left_inv_{code}"):
-        same(differentials(), name, lambda: [v, np.zeros((v.size, v.size))])
+        run_both(differentials(), name, v, np.zeros((v.size, v.size)), signed=False)
 
 
 def test_every_group_but_vectors_has_differentials():

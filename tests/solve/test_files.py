@@ -88,6 +88,7 @@ def test_every_variable_has_a_unit_and_every_axis_names():
     force = data["joint_wrench"].sel(joint="cylinder", wrench=["fx", "fy", "fz"])
     assert np.array_equal(force, sol.joint("cylinder").wrench[:, 3:])
     assert data["temperature"].sel(node="housing").dims == ("t",)
+    assert (data["t"].attrs["units"], data["heat"].attrs["units"]) == ("s", "J")
 
 
 def test_others_read_the_file_with_xarray_alone(tmp_path):
@@ -319,6 +320,7 @@ def test_a_slice_is_the_solution_at_these_instants():
     ("asked", "words"),
     [
         ("osc.pe.p", r"osc\.pe\.p: no such state; did you mean osc\.pe\.q"),
+        ("osc.q", r"osc\.q.*osc\.pe\.q"),
         ("osc", r"osc: no such state; below it lie osc\.pe\.q, osc\.ke\.p"),
         ("xyz", r"xyz: no such state; the states are osc\.pe\.q"),
     ],

@@ -14,18 +14,11 @@ from ephs.solve.methods.integral import Integral
 from ephs.solve.methods.records import IRREVERSIBLE
 from examples import physics
 from tests.numerics import EPS, largest
-from tests.solve.test_energies import compiled
+from tests.solve.test_energies import compiled, state
 
 ROUNDING = EPS
 SYSTEMS = {"ladder": ladder(4), "grid": grid(9), "motor": physics.motor, "cylinder": physics.cylinder}
 OTHERS = {"springs in series": physics.springs, "a rod": physics.masses, "a lever": physics.lever}
-
-
-def state(model, seed):
-    """States at which volumes are positive."""
-    d = model.descriptor
-    x = d.pack(model.descriptor.system.state())
-    return x + 0.3 + 0.05 * np.random.default_rng(seed).standard_normal(x.size)
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from ephs.semantics.stage import PLAIN, Entry, Program, real, vector
+from ephs.semantics.stage import Entry, Program, real, vector
 from ephs.solve.march.iteration import ITERATIONS, iterate
+from tests.staged import run_both
 
 ENOUGH, ROUGH, FAST = 1e-3, 1e-1, 0.3
 
@@ -22,12 +23,10 @@ PROGRAM = Program("iterated", ended=Entry(_ended, sizes=vector(), out=vector(3),
 
 
 def ended(sizes, enough=ENOUGH, rough=ROUGH):
-    """Corrections taken, whether they solve, whether the matrix served well: the same by both evaluators."""
-    sizes, out = np.array([*sizes, *[math.nan] * ITERATIONS])[:ITERATIONS], np.zeros(3)
-    PROGRAM.compiled()["ended"](sizes, out, enough, rough)
-    plain = iterate(PLAIN, lambda tries: sizes[tries - 1], enough, rough, FAST)
-    assert out.tolist() == [plain.tries, plain.solved, plain.fast]
-    return int(out[0]), bool(out[1]), bool(out[2])
+    """Corrections taken, whether they solve, whether the matrix served well."""
+    sizes = np.array([*sizes, *[math.nan] * ITERATIONS])[:ITERATIONS]
+    tries, solved, fast = run_both(PROGRAM, "ended", sizes, np.zeros(3), enough, rough)[2]
+    return int(tries), bool(solved), bool(fast)
 
 
 @pytest.mark.parametrize("first", [1e4, 1.0, 3e-2])

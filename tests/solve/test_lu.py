@@ -11,9 +11,11 @@ from scipy import sparse
 from ephs.semantics.linear.sparse import sparse_lu
 from ephs.solve.equations.sparse import PARTS, order, paired
 from tests.numerics import generators, largest, seeds
+from tests.staged import run_both
 
-RUNS = {"compiled": sparse_lu().compiled(), "plain": sparse_lu().plain()}
-factorise, solve = RUNS["compiled"]["factorise"], RUNS["compiled"]["solve"]
+
+def run(entry, *arguments):
+    return run_both(sparse_lu(), entry, *arguments)
 
 
 @st.composite
@@ -26,23 +28,27 @@ def matrices(draw):
     return dense[rng.permutation(n)][:, rng.permutation(n)]
 
 
-def factors(dense, values=None):
+def factors(dense, values=None, floor=0.0):
+    """The plan made of a matrix, whether it served the same places with other values, factors, ratios of pivots."""
     n = dense.shape[0]
     row, column = np.nonzero(dense)
     plan = order(n, row, column, dense[row, column])
-    value, scratch, ratio = np.zeros(plan.fill), np.zeros(n), np.zeros(n)
-    data = dense[row, column] if values is None else values[row, column]
-    good = factorise(plan.place, plan.start, plan.column, plan.diagonal, data, value, scratch, np.zeros(n), ratio)
-    return plan, value, good, ratio
+    data = (dense if values is None else values)[row, column]
+    arrays = plan.place, plan.start, plan.column, plan.diagonal, data, np.zeros(plan.fill), np.zeros(n)
+    good, *_, value, _, _, ratio = run("factorise", *arrays, np.full(n, floor), np.zeros(n))
+    return plan, good, value, ratio
+
+
+def solution(plan, value, right):
+    arrays = plan.rows, plan.columns, plan.start, plan.column, plan.diagonal, value, right, 0.0 * right, 0.0 * right
+    return run("solve", *arrays)[-2]
 
 
 @given(matrices(), generators)
 def test_solves_as_a_dense_solver(dense, rng):
-    n = dense.shape[0]
-    right = rng.standard_normal(n)
-    plan, value, good, _ = factors(dense)
-    x = np.empty(n)
-    solve(plan.rows, plan.columns, plan.start, plan.column, plan.diagonal, value, right, x, np.zeros(n))
+    right = rng.standard_normal(dense.shape[0])
+    plan, good, value, _ = factors(dense)
+    x = solution(plan, value, right)
     assert good
     scale = np.abs(dense) @ np.abs(x) + np.abs(right)
     assert np.all(np.abs(dense @ x - right) <= 1e-11 * scale.max())
@@ -70,31 +76,17 @@ def test_a_matrix_that_no_values_make_regular_is_refused():
 
 @given(matrices(), st.floats(0.5, 2.0))
 def test_the_order_serves_other_numbers_in_the_same_places(dense, factor):
-    n = dense.shape[0]
     changed = dense * factor ** np.sign(dense)
-    plan, value, good, _ = factors(dense, changed)
-    x, right = np.empty(n), np.ones(n)
-    solve(plan.rows, plan.columns, plan.start, plan.column, plan.diagonal, value, right, x, np.zeros(n))
+    plan, good, value, _ = factors(dense, changed)
     if good and np.linalg.cond(changed) < 1e6:
-        assert largest(changed @ x - right) <= 1e-7 * (np.abs(changed) @ np.abs(x)).max()
+        x = solution(plan, value, np.ones(dense.shape[0]))
+        assert largest(changed @ x - 1.0) <= 1e-7 * (np.abs(changed) @ np.abs(x)).max()
 
 
-@given(matrices(), generators)
 @settings(max_examples=25)
-def test_floats_and_machine_code_give_the_same_bits(dense, rng):
-    n = dense.shape[0]
-    row, column = np.nonzero(dense)
-    plan = order(n, row, column, dense[row, column])
-    floor = rng.random(n) * 0.3  # some pivots are refused
-    found = []
-    for run in RUNS.values():
-        value, scratch, ratio, x = np.zeros(plan.fill), np.zeros(n), np.zeros(n), np.zeros(n)
-        arrays = (plan.start, plan.column, plan.diagonal)
-        good = run["factorise"](plan.place, *arrays, dense[row, column], value, scratch, floor, ratio)
-        if good:
-            run["solve"](plan.rows, plan.columns, *arrays, value, np.ones(n), x, scratch)
-        found.append((good, value.tobytes(), ratio.tobytes(), x.tobytes()))
-    assert found[0] == found[1]
+@given(matrices(), generators)
+def test_pivots_below_their_floors_have_the_same_bits_in_floats_and_machine_code(dense, rng):
+    factors(dense, floor=0.3 * rng.random(dense.shape[0]))
 
 
 @given(matrices(), st.integers(0, 8))
@@ -107,30 +99,17 @@ def test_the_pattern_holds_what_elimination_fills(dense, room):
         filled[k + 1 :] |= filled[k + 1 :, k, None] & (filled[k] & (np.arange(n) > k))
     assume(room <= filled.sum())
     first = np.concatenate([[0], np.cumsum(pattern.sum(axis=1))])
-    for run in RUNS.values():
-        start, out = np.zeros(n + 1, dtype=np.int64), np.zeros(int(filled.sum()) - room, dtype=np.int64)
-        scratch = np.zeros(n + 1, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        count = run["fill"](first, np.nonzero(pattern)[1].copy(), start, out, *scratch)
-        assert count == (-1 if room else filled.sum())
-        if not room:
-            assert np.array_equal(np.repeat(np.arange(n), np.diff(start)) * n + out, np.flatnonzero(filled))
+    made = [np.zeros(size, dtype=np.int64) for size in (n + 1, int(filled.sum()) - room, n + 1, n)]
+    count, _, _, start, out, *_ = run("fill", first, np.nonzero(pattern)[1].copy(), *made)
+    assert count == (-1 if room else filled.sum())
+    if not room:
+        assert np.array_equal(np.repeat(np.arange(n), np.diff(start)) * n + out, np.flatnonzero(filled))
 
 
-def test_a_singular_matrix_is_refused():
-    dense = np.array([[1.0, 2.0], [3.0, 4.0]])
-    _, _, good, _ = factors(dense, np.array([[1.0, 2.0], [2.0, 4.0]]))
-    assert not good
-
-
-def test_a_pivot_below_its_floor_is_refused():
-    dense = np.array([[1.0, 2.0], [3.0, 4.0]])
-    row, column = np.nonzero(dense)
-    plan = order(2, row, column, dense[row, column])
-    floor, ratio = np.full(2, 0.9), np.zeros(2)
-    data = np.array([1.0, 2.0, 2.0, 4.1])
-    arrays = (plan.place, plan.start, plan.column, plan.diagonal)
-    assert not factorise(*arrays, data, np.zeros(plan.fill), np.zeros(2), floor, ratio)
-    assert factorise(*arrays, data, np.zeros(plan.fill), np.zeros(2), 0.0 * floor, ratio)
+@pytest.mark.parametrize(("last", "floor", "good"), [(4.0, 0.0, False), (4.1, 0.0, True), (4.1, 0.9, False)])
+def test_a_pivot_of_zero_or_below_its_floor_is_refused(last, floor, good):
+    values = np.array([[1.0, 2.0], [2.0, last]])
+    assert bool(factors(np.array([[1.0, 2.0], [3.0, 4.0]]), values, floor)[1]) == good
 
 
 def test_an_exactly_singular_sample_has_no_order():

@@ -13,10 +13,10 @@ import ephs
 from benchmarks import families
 from ephs.semantics.stage import Entry, Program, Vector, real, table, vector
 from ephs.solve.march.control import DAMPING, HELD, STRICT, UNFELT, Proportional, held_back, length
-from ephs.solve.march.records import Ending, MarchControl, Motion
+from ephs.solve.march.records import Ending, MarchControl
 from ephs.solve.march.steps import STEPS
 from tests.numerics import EPS, largest
-from tests.solve.marching import Field, field, program, start
+from tests.solve.marching import Field, Plain, field, program, start
 
 
 def kepler(on, y, out, parameters):
@@ -46,7 +46,7 @@ def guarded(on, y, out, parameters):
 
 
 @dataclass(frozen=True)
-class Pendulum(Motion):
+class Pendulum(Plain):
     """q̈ = −c sin q with the element q, and y = (v, r, s) with an entropy that nothing changes."""
 
     parameters: Vector
@@ -64,24 +64,6 @@ class Pendulum(Motion):
         q[0] = base[0] + y[0]
         return 0
 
-    def rounding(self, on, anchor, y):
-        return 0.0
-
-    def book(self, on, tableau, k, h, totals):
-        return 0
-
-    def hold(self, on, change, low, high):
-        pass
-
-    def absorb(self, on, anchor, y0, q, y1, change):
-        pass
-
-    def warm(self, on, y0, y):
-        pass
-
-    def open(self, on, account, q, y):
-        return 0
-
     def correct(self, on, account, h, start, y, q, allowed):
         return 0
 
@@ -92,9 +74,6 @@ class Pendulum(Motion):
 
     def project(self, on, q, change):
         raise AssertionError
-
-    def least(self, on, change):
-        return 0.0
 
 
 def runs(function):

@@ -16,7 +16,7 @@ from ephs.solve.auditing.production import Production
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.running.stepping import Row
 from examples.failing import driving
-from tests.semantics.zoo import AB, PS, conduction_matrix, friction_matrix
+from tests.semantics.zoo import conduct, drag, hidden
 
 SYSTEMS = [method.name for method in METHODS.values() if method.systems]
 
@@ -32,17 +32,7 @@ def walls(*parts):
     return pattern(hot=body, cold=body, **dict(zip(names, parts, strict=True)))
 
 
-def hidden(a, b):
-    a, b = float(a), float(b)
-    return 2.0 * conduction_matrix(a, b)
-
-
-def seen(a, b):
-    return 2.0 * conduction_matrix(a, b)
-
-
-def conduction(matrix):
-    return ephs.irreversible(AB, matrix)
+SEEN, HIDDEN = conduct(lambda a, b: 2.0)(), conduct(hidden(lambda a, b: 2.0))()
 
 
 def watch(system, sign=1.0):
@@ -57,13 +47,13 @@ def watch(system, sign=1.0):
 
 
 def test_what_is_proved_is_not_watched():
-    assert not watch(walls(conduction(seen)))[0].active
-    assert watch(walls(conduction(seen), conduction(hidden)))[0].active
+    assert not watch(walls(SEEN))[0].active
+    assert watch(walls(SEEN, HIDDEN))[0].active
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_destruction_beyond_rounding_names_the_component_and_the_size(sign):
-    found, run = watch(walls(conduction(seen), conduction(hidden)), sign)
+    found, run = watch(walls(SEEN, HIDDEN), sign)
     proved, searched = run.at["wall0"], run.at["wall1"]
     moved = run.x + 1e-3
     run.energies[proved] = -sign  # not looked at
@@ -82,7 +72,7 @@ def test_a_destruction_beyond_rounding_names_the_component_and_the_size(sign):
 @pytest.mark.parametrize("method", SYSTEMS)
 def test_a_run_in_equilibrium_is_none_that_destroys_entropy(method):
     """Rounding makes and destroys next to nothing."""
-    solution = ephs.simulate(walls(conduction(hidden)), 1.0, method=method, step=0.1, audit="off")
+    solution = ephs.simulate(walls(HIDDEN), 1.0, method=method, step=0.1, audit="off")
     assert solution.t[-1] == 1.0
 
 
@@ -104,11 +94,7 @@ def test_domains_are_bounds_of_ports():
     for wrong in ({"x": (0.0, 1.0)}, {"s": (1.0, 1.0)}):
         with pytest.raises(ephs.StructureError, match="parameter domain of"):
             ephs.storage(**energy, domain=wrong)
-    slow = ephs.irreversible(
-        PS,
-        lambda p, s: (1.0 - 0.01 * p * p) * friction_matrix(p, s),
-        domain={"p": (-9.0, 9.0)},
-    )
+    slow = drag(lambda p, s: 1.0 - 0.01 * p * p, domain={"p": (-9.0, 9.0)})()
     assert slow.verdict == "proved"
 
 
@@ -131,9 +117,8 @@ CONDUCTANCES = {"linear": lambda a, b: 1.5 + 0.0 * a, "radiation": lambda a, b: 
 def test_heat_that_turns_around_within_a_step_makes_the_entropy_of_its_component(law, steps, ahead):
     """The other body begins hotter by some K, and is overtaken: no component loses entropy, and each makes its own."""
     k, current, until = CONDUCTANCES[law], 0.8, 60.0
-    wall = conduction(lambda a, b: k(a, b) * conduction_matrix(a, b))
     start, inputs = {"other.s": 60.0 * np.log1p(ahead / 300.0)}, {"b": {"effort": current}}
-    sol = ephs.simulate(heated(wall), until, initial=start, inputs=inputs, method="radau", **steps)
+    sol = ephs.simulate(heated(conduct(k)()), until, initial=start, inputs=inputs, method="radau", **steps)
 
     def rates(_, y):
         a, b = y[:2]

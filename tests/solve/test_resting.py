@@ -6,7 +6,7 @@ from scipy.special import beta
 import ephs
 from ephs import Pattern, library
 from ephs import quantity as Q
-from tests.semantics.zoo import PS, friction_matrix
+from tests.semantics.zoo import drag
 from tests.written import scene_of_text
 
 SCENE = """
@@ -47,22 +47,22 @@ def test_springs_of_any_power_swing_from_where_their_derivatives_are_roots(metho
     found = ephs.simulate(swinging(power, 0.0), quarter, initial={"mass.p": 1.0}, method=method, **steps)
     order = 1e-3 if method == "natural" else 1e-5
     assert abs(found["mass.p"][-1]) < order and abs(found["spring.q"][-1] - 0.5 ** (1.0 / power)) < order
-    drag = swinging(2.0, 0.5 * power)
+    dragged = swinging(2.0, 0.5 * power)
     one, other = (
-        ephs.simulate(drag, 1.0, initial={"spring.q": 1.0}, method=name, **more)
+        ephs.simulate(dragged, 1.0, initial={"spring.q": 1.0}, method=name, **more)
         for name, more in ((method, steps), ("rk87", {"rtol": 1e-10, "atol": 1e-12}))
     )
     assert abs(one["mass.p"][-1] - other["mass.p"][-1]) < order
 
 
-def swinging(power, drag):
+def swinging(power, b):
     """A mass on a spring of the energy |q|ᵃ, with a drag as |v|ᵇ v if b > 0."""
     pattern = Pattern.from_text(
         "q: displacement; p: momentum; s: entropy; spring(q); mass(p); turn(q, p); drag(p, s); air(s)"
     )
-    coefficient = 0.5 if drag else 0.0
+    coefficient = 0.5 if b else 0.0
     return pattern(
         spring=ephs.storage({"q": Q.displacement}, lambda q: abs(q) ** power),
         mass=library.point_mass(m=1.0), turn=library.pkc(), air=library.environment(),
-        drag=ephs.irreversible(PS, lambda p, s: coefficient * abs(p) ** drag * friction_matrix(p, s)),
+        drag=drag(lambda p, s: coefficient * abs(p) ** b)(),
     )  # fmt: skip

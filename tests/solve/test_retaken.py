@@ -7,11 +7,11 @@ import pytest
 
 import ephs
 from ephs.show.charts import family_scenes as scenes
-from ephs.solve.auditing.growth import apart
 from ephs.solve.auditing.retaken import EACH, MOST, Missed, Retaken, share_missed
 from ephs.solve.posing.breakpoints import Breakpoints
 from ephs.solve.posing.errors import Outcome, SolveError
 from ephs.solve.running.stepping import Attempt
+from tests.solve.test_growth import off
 
 
 @pytest.fixture
@@ -25,11 +25,6 @@ def found(monkeypatch):
 
     monkeypatch.setattr(Retaken, "missed", keeping)
     return kept
-
-
-def off(sol, true):
-    poses = [slot.path for slot in sol.problem.descriptor.states if slot.quantity.kind == "pose"]
-    return max(float(apart(sol.states[at], true.states[at], sol.problem.length).max()) for at in poses)
 
 
 @pytest.mark.parametrize(("method", "tolerance"), [("natural4", 1e-6), ("natural4", 1e-7), ("natural", 1e-4)])

@@ -10,6 +10,7 @@ from ephs.semantics.spaces.differentials import dexp_left, dexp_left_inv
 from ephs.semantics.spaces.rotations import quaternion_to_matrix
 from ephs.semantics.stage import PLAIN
 from tests.numerics import EPS, generators, largest
+from tests.semantics.spaces.test_groups import displacement as of_length
 
 GROUPS = [SO3, SE2, SE3, SO3xR3]
 ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.1, 0.499, 0.501, 0.999, 1.001, 2.0, 3.1]
@@ -40,11 +41,7 @@ def error(found, exact):
 
 
 def displacement(group, angle):
-    rng = np.random.default_rng(7)
-    v = rng.standard_normal(group.dim)
-    angular = 1 if group is SE2 else 3
-    v[:angular] *= angle / np.linalg.norm(v[:angular])
-    return v
+    return of_length(group, np.random.default_rng(7), angle)
 
 
 @groups

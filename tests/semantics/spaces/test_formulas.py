@@ -11,6 +11,7 @@ from ephs.semantics.spaces.staged_groups import STAGED, included
 from ephs.semantics.spaces.vectors import symmetric_inverse, upper
 from ephs.semantics.stage import PLAIN, Entry, Program, vector
 from tests.numerics import EPS, generators, largest
+from tests.staged import run_both
 
 GROUPS = {codes.VECTOR: vector_space("real", 3), codes.SO3: SO3, codes.SE2: SE2, codes.SE3: SE3, codes.SO3xR3: SO3xR3}
 
@@ -92,11 +93,8 @@ def test_a_formula_is_what_the_group_says(name, rng, size):
     _, letters, reference = FORMULAS[name]
     inputs = [draw(letter, rng, size) for letter in letters]
     expected = np.ravel(reference(*inputs))
-    found, machine = np.zeros(expected.size), np.zeros(expected.size)
-    arguments = [*inputs, *[np.zeros(1)] * (2 - len(inputs))]
-    PROGRAM.plain()[name](*arguments, found)
-    PROGRAM.compiled()[name](*arguments, machine)
-    assert np.array_equal(found, machine)
+    rest = [*[np.zeros(1)] * (2 - len(inputs)), np.zeros(expected.size)]
+    *_, found = run_both(PROGRAM, name, *inputs, *rest, signed=False)
     k = QUATERNIONS.get(name, 0)
     found[:k] *= np.sign(found[:k] @ expected[:k]) if k else 1.0
     scale = max(1.0, *(largest(x) for x in inputs)) ** 2

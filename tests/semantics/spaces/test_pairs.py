@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from hypothesis import strategies as st
 
 from ephs.semantics.spaces import PAIRS, SE2, SE3, PairEntry, SpaceError, codes, manifold, pair, register_pair
 from tests.numerics import EPS, generators, largest
+from tests.semantics.spaces.test_groups import same_point
+from tests.semantics.spaces.test_spaces import Space
 
 FREEDOMS = {
     "revolute": 1,
@@ -28,10 +31,7 @@ def of_kind(kind, value=0.3):
     return pair(kind, **dict.fromkeys(PAIRS[kind].parameters, value))
 
 
-def same_pose(a, b, scale):
-    if a[:4] @ b[:4] < 0:
-        b = np.concatenate((-b[:4], b[4:]))
-    return largest(a - b) <= 64 * EPS * (1.0 + scale)
+same_pose = partial(same_point, SE3)
 
 
 def test_what_is_known():
@@ -116,11 +116,6 @@ def test_pairs_are_values():
     assert len({pair("planar"), pair("planar"), pair("free")}) == 2
 
 
-class Space:
-    def __init__(self, name, dim, size, parameters=()):
-        self.name, self.dim, self.size, self.parameters = name, dim, size, parameters
-
-
 @kinds
 def test_a_space_names_a_pair(kind):
     joint = of_kind(kind)
@@ -129,22 +124,6 @@ def test_a_space_names_a_pair(kind):
     assert np.array_equal(from_space.basis, joint.basis)
     assert manifold(Space(kind, joint.dim, joint.size, joint.parameters)) == joint.manifold
     assert manifold(Space(kind + "*", joint.dim, joint.dim, joint.parameters)).code == codes.VECTOR
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: pair("hinge"), ["hinge", "revolute", "register_pair"]),
-        (lambda: pair("screw"), ["screw", "pitch", "[]"]),
-        (lambda: pair("revolute", pitch=1.0), ["revolute", "pitch"]),
-        (lambda: pair("planar").element(np.zeros(2)), ["planar", "(2,)", "(3,)"]),
-        (lambda: register_pair(PairEntry("fixed", "1", np.zeros)), ["fixed", "registered already"]),
-    ],
-)
-def test_faults_say_what_to_do(make, words):
-    with pytest.raises(SpaceError) as caught:
-        make()
-    assert all(word in str(caught.value) for word in words)
 
 
 def test_a_new_pair_is_one_entry():

@@ -13,6 +13,7 @@ from hypothesis import given
 from ephs.semantics.spaces import (
     SE3,
     SO3,
+    PairEntry,
     SO3xR3,
     SpaceError,
     codes,
@@ -20,7 +21,9 @@ from ephs.semantics.spaces import (
     manifold,
     material_covector,
     material_velocity,
+    pair,
     register_manifold,
+    register_pair,
     twist_of_velocity,
     vector_space,
 )
@@ -69,6 +72,11 @@ def test_spaces_by_name(space, expected):
         (lambda: register_manifold("SE(3)", lambda space: SE3), ["SE(3)", "registered already"]),
         (lambda: register_manifold("x*", lambda space: SE3), ["x*", "dual"]),
         (lambda: material_velocity(SO3, SO3.identity(), np.zeros(3)), ["SO(3)", "SE(3)", "SO(3)xR3"]),
+        (lambda: pair("hinge"), ["hinge", "revolute", "register_pair"]),
+        (lambda: pair("screw"), ["screw", "pitch", "[]"]),
+        (lambda: pair("revolute", pitch=1.0), ["revolute", "pitch"]),
+        (lambda: pair("planar").element(np.zeros(2)), ["planar", "(2,)", "(3,)"]),
+        (lambda: register_pair(PairEntry("fixed", "1", np.zeros)), ["fixed", "registered already"]),
     ],
 )
 def test_faults_say_what_to_do(act, words):

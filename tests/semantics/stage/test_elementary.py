@@ -12,6 +12,7 @@ from mpmath import mp, mpf
 
 from ephs.semantics.stage import PLAIN, Entry, Evaluator, Program, Vector, elementary, vector
 from tests.semantics.stage.coefficients import made
+from tests.staged import bits, run_both
 
 ULPS = {"sin": 0.8, "cos": 0.8, "exp": 0.8, "log": 0.9, "atan2": 1.5}
 """Errors that the module promises, in units in the last place."""
@@ -117,12 +118,6 @@ def test_sine_is_odd_and_cosine_even(x):
     assert PLAIN.sin(-x) == -PLAIN.sin(x) and PLAIN.cos(-x) == PLAIN.cos(x)
 
 
-def same(one: Any, other: Any) -> bool:
-    """Whether all bits agree, up to the kind of not-a-number."""
-    a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
-    return bool(np.array_equal(a, b, equal_nan=True) and np.array_equal(np.signbit(a[a == a]), np.signbit(b[b == b])))
-
-
 def inputs() -> tuple[np.ndarray, np.ndarray]:
     draw = np.random.default_rng(7)
     edges = np.array(list(itertools.product(EDGES, EDGES))).T
@@ -134,18 +129,14 @@ def inputs() -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_floats_machine_code_and_members_give_the_same_bits():
     x, y = inputs()
-    runs = []
-    for call in (PROGRAM.plain()["all_of"], PROGRAM.compiled()["all_of"]):
-        out = np.zeros(5 * x.size)
-        call(x, y, out)
-        runs.append(out)
-    assert same(*runs)
+    *_, whole = run_both(PROGRAM, "all_of", x, y, np.zeros(5 * x.size))
     members = 4
     size = x.size // members
     xs, ys = (np.ascontiguousarray(v[: size * members].reshape(size, members)) for v in (x, y))
     out = np.zeros((5 * size, members))
     PROGRAM.compiled(members)["all_of"](xs, ys, out)
-    assert same(out.reshape(size, 5, members).transpose(0, 2, 1).reshape(-1), runs[0][: 5 * size * members])
+    found = out.reshape(size, 5, members).transpose(0, 2, 1)
+    assert bits(found) == bits(whole[: 5 * size * members])
 
 
 def test_machine_code_calls_no_library():

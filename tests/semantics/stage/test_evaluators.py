@@ -22,14 +22,9 @@ from tests.semantics.stage.drawn import (
     plain,
     unrolled,
 )
+from tests.staged import bits
 
 POINTS = st.lists(st.integers(-300, 300).map(lambda n: n / 64 + 1 / 3), min_size=INPUTS, max_size=INPUTS)
-
-
-def bits(values):
-    """The bits; all that is not a number is one."""
-    values = np.where(np.isnan(values), np.nan, values)
-    return values.view(np.int64).tolist()
 
 
 @pytest.mark.parametrize("way", EXACT)

@@ -11,23 +11,13 @@ import pytest
 
 from ephs.mechanics.road.pack import TURN, Class
 from ephs.mechanics.road.programs import Sweeps
-from ephs.semantics.stage import Entry, Program, known, programs, store, vector
+from ephs.semantics.stage import Entry, Program, known, programs, vector
 from ephs.semantics.stage.duals import Duals
 from ephs.semantics.stage.elementary import cos, sin
 from ephs.semantics.stage.kinds import matrix
-from ephs.semantics.stage.store import STORE
 from ephs.shipped import programs as shipped_programs
 
 SHIPPED = {program.name: program for program in shipped_programs()}
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """A store of this test's own, and nothing remembered in the process."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(STORE, "usable", True)
-    store._prune.cache_clear()
-    return tmp_path / "cache" / "ephs" / "objects"
 
 
 def emitted(program, monkeypatch) -> tuple[object, int]:

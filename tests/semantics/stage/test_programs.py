@@ -4,7 +4,7 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from threading import Barrier
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -29,76 +29,6 @@ from ephs.semantics.stage import (
     table,
     vector,
 )
-from tests.numerics import EPS
-
-
-def solve(on: Evaluator, a: Matrix, x: Vector, pivots: Integers) -> Integer:
-    """LU with partial pivoting; the number of exchanges."""
-    n, exchanges = x.size, on.counter(0)
-
-    def eliminate(k: Integer) -> None:
-        best, at = on.variable(on.absolute(a[k, k])), on.counter(k)
-
-        def search(i: Integer) -> None:
-            size = on.absolute(a[i, k])
-
-            def take() -> None:
-                best.value, at.value = size, i
-
-            on.when(size > best.value, take)
-
-        on.loop(n, search, start=k + 1)
-        pivot = pivots[k] = at.value
-
-        def exchange() -> None:
-            exchanges.value = exchanges.value + 1
-
-            def column(j: Integer) -> None:
-                upper, lower = a[k, j], a[pivot, j]
-                a[k, j], a[pivot, j] = lower, upper
-
-            on.loop(n, column)
-            upper, lower = x[k], x[pivot]
-            x[k], x[pivot] = lower, upper
-
-        on.when(on.negate(on.same(pivot, k)), exchange)
-
-        def below(i: Integer) -> None:
-            factor = a[i, k] / a[k, k]
-
-            def column(j: Integer) -> None:
-                a[i, j] = a[i, j] - factor * a[k, j]
-
-            on.loop(n, column, start=k + 1)
-            x[i] = x[i] - factor * x[k]
-
-        on.loop(n, below, start=k + 1)
-
-    def back(i: Integer) -> None:
-        total, row = on.variable(x[i]), a.row(i)
-
-        def column(j: Integer) -> None:
-            total.value = total.value - row[j] * x[j]
-
-        on.loop(n, column, start=i + 1)
-        x[i] = total.value / row[i]
-
-    on.loop(n, eliminate)
-    on.loop(n, back, down=True)
-    return exchanges.value
-
-
-def newton(on: Evaluator, x: Real) -> Real:
-    """The square root by iteration."""
-    root, steps = on.variable(x), on.counter(0)
-
-    def step() -> Any:
-        root.value = (root.value + x / root.value) / 2.0
-        steps.value = steps.value + 1
-        return on.either(on.absolute(root.value * root.value - x) <= 1e-14 * x, steps.value >= 60)
-
-    on.repeat(step)
-    return root.value
 
 
 def whole(on: Evaluator, i: Integer, j: Integer) -> Integer:
@@ -107,8 +37,7 @@ def whole(on: Evaluator, i: Integer, j: Integer) -> Integer:
 
 PROGRAM = Program(
     "tried",
-    solve=Entry(solve, a=matrix(), x=vector(), pivots=indices()),
-    newton=Entry(newton, x=real()),
+    taken=Entry(lambda on, a, x, pivots: 0, a=matrix(), x=vector(), pivots=indices()),
     whole=Entry(whole, i=integer(), j=integer()),
 )
 
@@ -116,25 +45,6 @@ PROGRAM = Program(
 @pytest.fixture(params=["compiled", "plain"])
 def run(request):
     return PROGRAM.compiled() if request.param == "compiled" else PROGRAM.plain()
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 20])
-def test_equations_are_solved_with_the_same_bits(n):
-    draw = np.random.default_rng(n)
-    matrix, right = draw.normal(size=(n, n)), draw.normal(size=n)
-    found = []
-    for calls in (PROGRAM.compiled(), PROGRAM.plain()):
-        a, x, pivots = matrix.copy(), right.copy(), np.zeros(n, dtype=np.int64)
-        found.append((calls["solve"](a, x, pivots), a, x, pivots))
-    for one, other in zip(*found, strict=True):
-        assert np.array_equal(one, other)
-    scale = np.abs(matrix) @ np.abs(found[0][2])
-    assert np.all(np.abs(matrix @ found[0][2] - right) <= 10 * np.linalg.cond(matrix) * EPS * scale)
-
-
-@pytest.mark.parametrize("x", [2.0, 1e-8, 3e9])
-def test_a_loop_ends_when_its_condition_holds(run, x):
-    assert abs(run["newton"](x) - x**0.5) <= 4 * EPS * x**0.5
 
 
 @pytest.mark.parametrize("i", [-7, -6, 0, 6, 7])
@@ -146,7 +56,7 @@ def test_integers_divide_as_in_python(run, i, j):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ((np.eye(2), np.ones(2)), "solve: takes 3 arguments"),
+        ((np.eye(2), np.ones(2)), "<lambda>: takes 3 arguments"),
         ((np.eye(2, dtype=np.float32), np.ones(2), np.zeros(2, int)), "argument a is an array of float32"),
         ((np.eye(4)[:, ::2], np.ones(2), np.zeros(2, int)), "argument a is a non-contiguous"),
         ((np.eye(2), np.ones((2, 1)), np.zeros(2, int)), "argument x is an array of float64 of shape (2, 1)"),
@@ -156,7 +66,7 @@ def test_integers_divide_as_in_python(run, i, j):
 )
 def test_wrong_arguments_are_named(run, arguments, text):
     with pytest.raises(StageError, match=re.escape(text)):
-        run["solve"](*arguments)
+        run["taken"](*arguments)
 
 
 def test_an_index_outside_is_seen_in_plain_evaluation():

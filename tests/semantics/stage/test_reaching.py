@@ -23,7 +23,8 @@ from ephs.semantics.stage import (
     vector,
 )
 from tests.semantics.stage.drawn import INPUTS, OUTPUTS, bodies, run
-from tests.semantics.stage.test_evaluators import POINTS, bits
+from tests.semantics.stage.test_evaluators import POINTS
+from tests.staged import bits
 
 
 def drawn(body):

@@ -18,7 +18,7 @@ from ephs.semantics.primitives.behaviour import ContinuousBehaviour
 from ephs.semantics.symbols.algebra import text_of
 from ephs.semantics.symbols.words import Words, operator, pairing
 from examples import oscillator, physics
-from tests.semantics.zoo import PS, friction_matrix
+from tests.semantics.zoo import drag
 
 FORMS = ("relation", "descriptor", "reduced")
 SYSTEMS = {name: system for name, system in vars(physics).items() if isinstance(system, ephs.System)}
@@ -140,19 +140,24 @@ def evaluated(expression, values):
 CLOSED = [name for name, system in SYSTEMS.items() if all(port.power for port in system.interface.values())]
 
 
+def drawn_point(name, seed):
+    """A system, a source of numbers, its reference, and a state of positive numbers."""
+    rng = np.random.default_rng(seed)
+    state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in SYSTEMS[name].states}
+    return SYSTEMS[name], rng, Reference(293.15, 300.0), state
+
+
 @pytest.mark.parametrize("name", CLOSED)
 @pytest.mark.parametrize("seed", range(3))
 def test_numbers_in_the_descriptor_form_give_its_residual(name, seed):
     """At any rates, efforts, multipliers and flows, whether or not they solve the equations."""
-    system, rng, reference = SYSTEMS[name], np.random.default_rng(seed), Reference(293.15, 300.0)
+    system, rng, reference, state = drawn_point(name, seed)
     d = system.descriptor()
-    state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
     inputs = {slot.path: Input(rng.standard_normal(1), False) for slot in d.outer}
     z = rng.standard_normal(d.unknowns(inputs))
     residual = d.residual(ContinuousBehaviour(reference), d.pack(state), inputs, z)
     values = named_numbers(system, state, reference)
-    junction_of = {path: where for path, where in zip(system.states, _junctions(system), strict=True)}
-    values |= {f"d{junction_of[s.path]}/dt": z[s.rate] for s in d.states}
+    values |= {f"d{where}/dt": z[s.rate] for s, where in zip(d.states, _junctions(system), strict=True)}
     values |= {f"{s.path}.e": z[d.rate_size + s.at] for s in d.junctions}
     values |= {f"{path}.f": float(given.value[0]) for path, given in inputs.items()}
     for slot in d.components:
@@ -173,11 +178,9 @@ def _junctions(system):
 @pytest.mark.parametrize("name", ["lever", "stator", "motor", "piston", "cylinder"])
 @pytest.mark.parametrize("seed", range(3))
 def test_numbers_in_the_reduced_form_give_what_the_solver_computes(name, seed):
-    system, rng, reference = SYSTEMS[name], np.random.default_rng(seed), Reference(293.15, 300.0)
-    d = system.descriptor()
-    state = {path: np.exp(0.3 * rng.standard_normal(1)) for path in system.states}
+    system, rng, reference, state = drawn_point(name, seed)
     stored = set(_junctions(system))
-    inputs = {slot.path: Input(rng.standard_normal(1), slot.path not in stored) for slot in d.outer}
+    inputs = {slot.path: Input(rng.standard_normal(1), slot.path not in stored) for slot in system.descriptor().outer}
     found = solved(system, state, ContinuousBehaviour(reference), inputs)
     values = named_numbers(system, state, reference)
     for path, where in zip(system.states, _junctions(system), strict=True):
@@ -232,10 +235,7 @@ def test_functions_of_ones_own_are_written_out():
 def test_drag_keeps_the_sign_of_the_velocity():
     """|u| u is not u²: velocities have either sign, temperatures one."""
 
-    def drag(p, s):
-        return 0.2 * abs(p) * friction_matrix(p, s)
-
-    brake = ephs.irreversible(PS, drag)
+    brake = drag(lambda p, s: 0.2 * abs(p))()
     system = oscillator.damped(osc=OSCILLATOR, mf=brake, env=lib.environment())
     assert "Abs(p)" in text_of(system.equations()["dp/dt"])
     m, p = sp.Symbol("m", positive=True), sp.Symbol("p", real=True)

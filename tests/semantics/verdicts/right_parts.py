@@ -8,7 +8,7 @@ import ephs
 from ephs import library
 from ephs import quantity as Q
 from ephs.operad import Quantity, Space
-from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, friction, gyrator, large, stored
+from tests.semantics.verdicts.wrong_parts import CB, QP, TURN, X, conduct, drag, gyrator, large, stored
 
 
 def motor(source):
@@ -154,12 +154,12 @@ def damper(source):
         lambda p, s: a * np.exp(-b * p**2), lambda p, s: a / np.sqrt(b + p**2), lambda p, s: a * np.exp(-s / 300.0),
         lambda p, s: a if abs(p) < b else 2.0 * a, lambda p, s: a + b * math.tanh(float(s)),
     ))  # fmt: skip
-    return friction(d)
+    return drag(d)
 
 
 def valve(source):
     a = source.uniform(0.1, 3.0)
-    return friction(lambda p, s: a * (1.0 + np.tanh(p)), one_sided=True)
+    return drag(lambda p, s: a * (1.0 + np.tanh(p)), one_sided=True)
 
 
 def conductor(source):
@@ -202,7 +202,7 @@ def sheared(source):
 def frozen(source):
     """A process that stops in the cold: its matrix is below the smallest normal number there."""
     size, activation = source.uniform(0.1, 3.0), source.uniform(735.0, 743.0)
-    return friction(lambda p, s: size * math.exp(-activation * 273.15 / float(s)), domain={"s": (270.0, math.inf)})
+    return drag(lambda p, s: size * math.exp(-activation * 273.15 / float(s)), domain={"s": (270.0, math.inf)})
 
 
 def small_store(source):
@@ -220,7 +220,7 @@ def large_beside_a_sine(source):
 def faint(source):
     """A process whose matrix is below the smallest normal number."""
     size = source.uniform(0.1, 3.0)
-    return friction(lambda p, s: 1e-160 * s * (size * 1e-160))
+    return drag(lambda p, s: 1e-160 * s * (size * 1e-160))
 
 
 PROVED = (

@@ -13,7 +13,7 @@ from ephs import quantity as Q
 from ephs.semantics import StructureError, library
 from ephs.semantics.primitives.pullback import Map, pull_back
 from tests.semantics.test_documents import VALID, alone
-from tests.semantics.zoo import PS, friction_matrix
+from tests.semantics.zoo import drag
 
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 ODD = {"p": Q.momentum, "b": Q.flux_linkage}
@@ -29,7 +29,6 @@ PARTS = {
     "transformer": lambda **f: ephs.transformer({"q": Q.displacement, "p": Q.momentum}, [[2.0]], **f),
     "constraint": lambda **f: ephs.constraint({"q": Q.displacement, "p": Q.momentum}, [[1.0, 2.0]], **f),
 }
-RAYS = PS
 
 
 @pytest.mark.parametrize("name", PARTS)
@@ -52,10 +51,7 @@ def test_the_flag_excuses_nothing_else(size, leak):
 
 
 def valve(one_sided=True):
-    def matrix(p, s):
-        return (1.0 + 0.5 * np.tanh(p)) * friction_matrix(p, s)
-
-    return ephs.irreversible(RAYS, matrix, one_sided=one_sided)
+    return drag(lambda p, s: 1.0 + 0.5 * np.tanh(p), one_sided=one_sided)()
 
 
 @pytest.mark.parametrize("make", [*(lambda p=p: p(external_field=True) for p in PARTS.values()), valve])

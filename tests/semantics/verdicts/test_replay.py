@@ -29,7 +29,7 @@ from ephs.semantics.verdicts.replay import replayed
 from ephs.semantics.verdicts.sums import Unexpandable, number_of, scaled
 from ephs.semantics.verdicts.verdict import as_evidence
 from tests.semantics.test_primitives import ARGUMENTS, made
-from tests.semantics.zoo import PS, friction_matrix
+from tests.semantics.zoo import drag
 
 PROVED = [name for name in ARGUMENTS if name != "environment"]
 SAMPLE = 24
@@ -161,17 +161,13 @@ def test_the_proof_of_another_structure_is_refused(name):
 
 def test_squares_do_not_divide_by_what_vanishes_on_a_half_line():
     """M = (|p| + p) [[s, −p], [−p, p²/s]] is right; the vector (M₁₁/M₁₁, M₂₁/M₁₁) is 0/0 for p < 0."""
-    half = ephs.irreversible(
-        PS,
-        lambda p, s: (abs(p) + p) * friction_matrix(p, s),
-        one_sided=True,
-    )
+    half = drag(lambda p, s: abs(p) + p, one_sided=True)()
     d = ["*", ["+", ["abs", "p"], "p"], "s"]
     slope = ["-", ["/", "p", "s"]]
     assert not replay(half, {"M ⪰ 0": ["squares", [[d, [1.0, slope]]]]})  # d is not shown to be ≥ 0 by signs
     d = ["*", ["shown", ["*", 2.0, ["abs", "p"]]], "s"]
     assert not replay(half, {"M ⪰ 0": ["squares", [[d, [1.0, slope]]]]})  # ≥ 0, but another matrix
-    over = ephs.irreversible(PS, lambda p, s: abs(p) * friction_matrix(p, s))
+    over = drag(lambda p, s: abs(p))()
     d = ["*", ["abs", "p"], "s"]
     assert replay(over, {"M ⪰ 0": ["squares", [[d, [1.0, slope]]]]})
     assert not replay(over, {"M ⪰ 0": ["squares", [[d, [["/", d, d], slope]]]]})
@@ -304,7 +300,7 @@ def test_signs_are_those_of_the_parts(term, expected):
 
 
 def test_documents_carry_proofs_and_tampered_ones_are_refused():
-    brake = ephs.irreversible(PS, lambda p, s: (0.3 + abs(p)) * friction_matrix(p, s))
+    brake = drag(lambda p, s: 0.3 + abs(p))()
     pattern = Pattern.from_text("p: momentum; s: entropy; a(p, s); b(p, s)")
     system = pattern({"a": library.friction(d=2.0), "b": brake})
     text = system.to_json(proofs=True)
