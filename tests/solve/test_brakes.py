@@ -99,8 +99,9 @@ def test_friction_that_grows_as_a_power_below_one_starts_from_rest(power, method
     """q″ = −q − |q′|^a q′ from rest at 1; with a < 0 there is no force at rest, and the component is named."""
 
     def system(power):
+        places = {"q": Q.displacement, "p": Q.momentum, "s": Q.entropy}
         pattern = ephs.Pattern(
-            junctions={"q": ephs.junction(Q.displacement), "p": ephs.junction(Q.momentum), "s": ephs.junction(Q.entropy)},
+            junctions={name: ephs.junction(of) for name, of in places.items()},
             boxes={"pe": {"q": "q"}, "ke": {"p": "p"}, "pkc": {"q": "q", "p": "p"}, "d": {"p": "p", "s": "s"},
                    "env": {"s": "s"}},
         )  # fmt: skip
