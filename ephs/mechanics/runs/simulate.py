@@ -146,7 +146,7 @@ def simulate(
 
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
-        if not initial:
+        if start and not initial:
             check_motions(model, start)
         problem = in_own_units(problem_of_scene(model, initial, inputs))
     method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
