@@ -104,9 +104,8 @@ class Paced:
 
     def inside(self, attempt: Attempt[PacedState], t: float) -> PacedState:
         """A shorter step from the same start, or from the middle of two, so that instants lead to the end."""
-        middle = attempt.detail
-        after = middle is not None and abs(t - attempt.start.t) >= abs(middle.t - attempt.start.t)
-        return self.shorter(middle if after else attempt.start, t)
+        start, middle = attempt.start, attempt.detail or attempt.start
+        return self.shorter(middle if abs(t - start.t) >= abs(middle.t - start.t) else start, t)
 
     def shorter(self, state: PacedState, t: float) -> PacedState:
         """The state at a time by one step, which leaves no trace in those of the run: its method is another."""
