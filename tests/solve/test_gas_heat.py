@@ -108,3 +108,71 @@ def test_a_sweep_has_the_heat_of_each_run():
     scene, vary = scene_of_text(PISTON + HOT), {"gas_springs.gas.pressure": [2e5, 3e5]}
     swept = ephs.sweep(scene, vary, 0.5, save_at=[0.0, 0.5], method="rk87", outputs=["heat"])
     assert float(swept["heat"].values[1, -1]) == ephs.simulate(scene, 0.5, method="rk87", save_at=[0.0, 0.5]).heat[-1]
+
+
+MIXED = """
+    format = 1
+    name = "mixed"
+    [bodies.b]
+    mass = {m}
+    inertia = [0.01, 0.01, 0.01]
+    [joints.rail]
+    type = "prismatic"
+    bodies = ["ground", "b"]
+    at = [0.0, 0.0, 0.0]
+    axis = [0.0, 0.0, 1.0]
+    friction = {d}
+    heat = "wall"
+    [bodies.c]
+    mass = 0.5
+    inertia = [0.01, 0.01, 0.01]
+    position = [0.2, 0.0, 0.0]
+    [joints.pin]
+    type = "revolute"
+    bodies = ["b", "c"]
+    at = [0.0, 0.0, 0.0]
+    axis = [0.0, 1.0, 0.0]
+    friction = {e}
+    heat = "other"
+    [gas_springs.gas]
+    joint = "rail"
+    area = 4e-4
+    volume = 3e-4
+    pressure = {p}
+    conductance = {k}
+    heat = "wall"
+    [thermal.wall]
+    capacity = {C}
+    temperature = 310.0
+    [thermal.other]
+    capacity = 3.0
+    temperature = 295.0
+    [conduction.gap]
+    between = ["wall", "other"]
+    conductance = 0.7
+    """
+
+
+def changes(sol):
+    """What all ledgers change by over a run, by component."""
+    ledgers = sol.ledgers
+    books = {"energy": ledgers.storages, "entropy": ledgers.entropies, "made": ledgers.makers}
+    found = {f"{name} {path}": v[-1] - v[0] for name, book in books.items() for path, v in book.items()}
+    return found | {name: getattr(ledgers, name)[-1] for name in ("heat", "work", "made")}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_methods_agree_on_every_ledger_of_gases_and_stores_that_share_heat(seed):
+    """At tolerances of 1e-9; a gas and two frictions warm two stores that conduct, beside a beam that expands."""
+    rng = np.random.default_rng(seed)
+    numbers = {"m": (0.5, 2.0), "d": (0.5, 5.0), "e": (0.01, 0.1), "p": (1e5, 4e5), "k": (0.5, 4.0), "C": (1.0, 10.0)}
+    text = MIXED.format(**{name: rng.uniform(*bounds) for name, bounds in numbers.items()})
+    scene = scene_of_text(text + BEAM[BEAM.index("[beams.rod]") :].replace("[0.0, 0.0, 0.0]", "[0.0, 3.0, 0.0]"))
+    first = None
+    for method in ("rk87", "rk54", "radau", "natural4"):
+        sol = ephs.simulate(scene, 0.05, method=method, audit="off", **METHODS[method])
+        first, found = first or changes(sol), changes(sol)
+        assert sol.energy_error.max() < 1e-12
+        for name, value in first.items():
+            assert found[name] == pytest.approx(value, rel=1e-7, abs=1e-12), (method, name)
+    assert abs(first["energy thermal.wall"]) > 1e-3 < first["heat"]

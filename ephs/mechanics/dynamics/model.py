@@ -23,7 +23,6 @@ from ephs.mechanics.scene.following import has_stretches
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.equations.paper import PaperStates
 from ephs.mechanics.tree.equations.tangent import Linearised
-from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.equations.sparse import Index
@@ -363,9 +362,7 @@ class Dynamics:
             return self._state(found) if isinstance(found, ReducedState) else self._of_states(found)
 
     def _counted(self, q: Array, r: Array, s: Array) -> ReducedState:
-        return ReducedState(
-            0.0, q, r, self._equations.heats.energies(s), np.zeros(TOTALS + len(self._equations.reduced.made))
-        )
+        return ReducedState(0.0, q, r, self._equations.heats.energies(s), np.zeros(self._equations.summed))
 
     def _reduced(self, state: State) -> ReducedState:
         return self._counted(*self.layout.split(state.array))

@@ -21,7 +21,6 @@ from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedSta
 from ephs.mechanics.tree.equations.impulses import Impulses
 from ephs.mechanics.tree.finding.frames import Unplaced, frames_of
 from ephs.mechanics.tree.finding.tables import SPRING, TREE
-from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
@@ -164,7 +163,7 @@ class ReducedMotion:
                 momenta[:, i] = own[:, i] @ self._momenta[i].T
         s = [solution[path].reshape(n, -1) for path in reduced.entropies]
         heats = eq.heats.energies(np.hstack([np.zeros((n, 0)), *s]))
-        totals = np.zeros(TOTALS + len(reduced.made))
+        totals = np.zeros(eq.summed)
 
         def rates(k: int) -> Array:
             found = self._impulses.rates(q[k], prescribed[k], momenta[k])

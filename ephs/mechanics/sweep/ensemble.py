@@ -23,7 +23,6 @@ from ephs.mechanics.sweep.members import Marches, MemberEnergies, Stack
 from ephs.mechanics.sweep.outputs import Output
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
 from ephs.mechanics.tree.finding.tables import TREE
-from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import Pair
 from ephs.solve.auditing.audit import MOTION, Bounds
@@ -224,7 +223,7 @@ class _Runs:
         for _, stack, within, among in self._parts:
             stack[:count, within] = rows[:, among]
         q, *start = (each[:count] for each in self._starts)
-        y = np.hstack([*start, np.zeros((count, TOTALS + len(eq.reduced.made)))])
+        y = np.hstack([*start, np.zeros((count, eq.summed))])
         for marches, leg in zip(self._marches, self._legs, strict=True):
             ending = marches.run(q, y, BURST)
             for k in np.flatnonzero(done & (ending == Ending.CAREFUL)):
@@ -276,7 +275,7 @@ class _Runs:
         self._fill(row)
         eq = self._made.equations
         q, r, heats = (start[k].copy() for start in self._starts)
-        start = ReducedState(self._ensemble.t0, q, r, heats, np.zeros(TOTALS + len(eq.reduced.made)))
+        start = ReducedState(self._ensemble.t0, q, r, heats, np.zeros(eq.summed))
         with suppress(*FAULTS):
             taken = leg(start)
             while not taken.left and taken.counts.steps + taken.counts.rejected < BURST:

@@ -55,6 +55,8 @@ class ReducedEquations:
 
     Attributes
     ----------
+    summed
+        Number of totals.
     careful
         Whether the loops were closed last at constraints that nearly repeat each other.
     """
@@ -70,7 +72,8 @@ class ReducedEquations:
         self.careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
         self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
-        self.size = self.nv + self.n + self.ns + TOTALS + len(reduced.made)
+        self.summed = TOTALS + len(reduced.made)
+        self.size = self.nv + self.n + self.ns + self.summed
         self.prescribed = Prescribed(reduced)
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
@@ -271,8 +274,7 @@ class ReducedEquations:
         if self.timed and not self.constant:
             self.given.place(t, NO_STATE)
         elif not self.constant:
-            totals = np.zeros(TOTALS + len(self.reduced.made))
-            self.given.place(t, self.states(ReducedState(t, q, r, heats, totals)))
+            self.given.place(t, self.states(ReducedState(t, q, r, heats, np.zeros(self.summed))))
 
     # ---- a step ------------------------------------------------------------------------------------------------
 
@@ -376,7 +378,7 @@ class ReducedEquations:
             The initial states contradict the joints.
         """
         q, r, s = self._paper.initial()
-        state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(TOTALS + len(self.reduced.made))))
+        state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)
         state = self.accounts.opened(state)
         y = np.concatenate([np.zeros(self.nv), state.r, state.heats, state.totals])
