@@ -100,7 +100,8 @@ class Ida(ReducedMethod):
         closed = eq.closed(free)
         # Its sums are its own: a sum that is off by rounding, of a component that makes nothing, refuses no step.
         flows = passed[first:]
-        closed = eq.booking.step(state, closed, flows, float(passed[first - 1]), missed=0.0 * flows, refused=False)
+        work, heat = passed[first - 2 : first].tolist()
+        closed = eq.booking.step(state, closed, flows, work, heat, missed=0.0 * flows, refused=False)
         # It continues from its own state, so corrections are applied to each returned state.
         since = np.concatenate([base.account[: eq.accounts.own], state.account[eq.accounts.own :]])
         allowed = self.atol + self.rtol * eq.sizes(eq.vector(state), eq.vector(closed))

@@ -88,7 +88,7 @@ def ends(solution, prefix="", at=-1):
         found |= {name.removeprefix(prefix): solution.shell(name).energy[at] for name, _ in model.all_shells()}
         warm = ((name, solution.thermal(name).temperature[at]) for name, _ in model.all_thermal())
         found |= {f"{name.removeprefix(prefix)} in K": kelvin for name, kelvin in warm}
-    return found | {"heat": solution.ledgers.loss[at], "work": solution.work[at]}
+    return found | {"heat": solution.ledgers.heat[at], "work": solution.work[at]}
 
 
 def places(solution, length=1.0):
@@ -155,7 +155,7 @@ def test_in_other_units(drawing):
         found = ran(drawing, rescaled(scene(drawing), length, mass, time), unit=time)
         assert_same(places(found, length), places(run(drawing)))
         energy = mass * length**2 / time**2
-        for ledger in ("loss", "work"):
+        for ledger in ("heat", "work"):
             here, there = (getattr(sol.ledgers, ledger)[-1] for sol in (found, run(drawing)))
             assert here / energy == pytest.approx(there, abs=SAME)
 
@@ -215,7 +215,7 @@ def test_from_its_document(drawing):
 def test_it_keeps_both_laws(drawing):
     sol = run(drawing)
     assert sol.energy_error.max() <= 1e-11
-    assert sol.stats["least_production"] >= 0.0 and np.diff(sol.ledgers.loss).min() >= 0.0
+    assert sol.stats["least_production"] >= 0.0 and np.diff(sol.ledgers.heat).min() >= 0.0
 
 
 @drawings("jointed", "touching", "sheet", "hard", "written")

@@ -345,3 +345,35 @@ def test_functions_of_a_state_refuse_it(use):
 
 def test_law_with_another_rate_is_seen():
     assert off(Slow(), 0.0, 1.0) > 1e-2
+
+
+SWINGER = """
+    format = 1
+    name = "swinger"
+    [assembly]
+    adjust = true
+    [bodies.b]
+    mass = 1.0
+    inertia = [0.01, 0.01, 0.01]
+    position = [0.3, 0.0, 0.0]
+    [joints.pin]
+    type = "revolute"
+    bodies = ["ground", "b"]
+    at = [0.0, 0.0, 0.0]
+    axis = [0.0, 1.0, 0.0]
+    motion = { amplitude = 0.3, frequency = 2.0 }
+    """
+
+
+@pytest.mark.parametrize("method", ["rk87", "radau", "semi", "natural", "natural4", "variational"])
+def test_a_run_starts_where_its_joints_move_as_their_laws_say(method):
+    """The state of a file is that at 0, and after a period; at other times a run goes on from one that came there."""
+    scene, law = scene_of_text(SWINGER), lambda t: 0.3 * np.sin(4.0 * np.pi * t)
+    with pytest.raises(ephs.OptionError, match=r"joints\.pin has the rate 3\.76991 .* scene\.at\(solution, 0\.3\)"):
+        ephs.simulate(scene, 0.5, t0=0.3, method=method, step=1e-2)
+    there = scene.at(ephs.simulate(scene, 0.3, method="rk87", rtol=1e-10), 0.3)
+    for start, t0 in ((scene, 0.5), (there, 0.3)):
+        sol = ephs.simulate(start, t0 + 0.1, t0=t0, method=method, step=1e-2)
+        off = np.abs(sol.joint("pin").coordinate[:, 0] - law(sol.t)).max()
+        # natural sums rates in the middle of steps: h²/24 of what accelerations change by
+        assert off < (1e-2**2 / 24.0 * 2.0 * 0.3 * (4.0 * np.pi) ** 2 if method == "natural" else 1e-9)

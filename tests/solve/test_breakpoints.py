@@ -97,6 +97,24 @@ def test_nothing_is_found_in_smooth_functions(rate, phase, mean, sign):
 
 
 @settings(max_examples=60)
+@given(st.floats(0.1, 300.0), st.floats(-5.0, 5.0), st.sampled_from([-1.0, 1.0]), st.floats(1e-5, 2e-3))
+def test_a_slope_of_zero_at_the_start_is_no_fast_change(rate, mean, sign, spot):
+    """Neither of cosines nor of parabolas; but steep changes as early as these are found."""
+    functions = {
+        "cosine": lambda t, _state: mean + np.cos(rate * t),
+        "parabola": lambda t, _state: mean + rate * t * t,
+        "edge": lambda t, _state: mean + np.cos(rate * t) + (1.0 if abs(t) >= spot else 0.0),
+    }
+    for name, function in functions.items():
+        found = Breakpoints(0.0, sign, None, [ProbedInput(name, function, stateful=False)])
+        t, h = 0.0, min(0.1, 1.0 / rate)
+        while abs(t) < 1.0:
+            end = found.end(t, h, dict)
+            t = end if 0.0 < abs(end - t) <= h else t + sign * h
+        assert bool(found.stats()) == (name == "edge"), name
+
+
+@settings(max_examples=60)
 @given(st.floats(0.01, 0.99), st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 1e-3), st.sampled_from([-1.0, 1.0]))
 def test_any_jump_is_found_to_rounding(at, size, sign):
     asked = ProbedInput("edge", lambda t, _state: np.cos(t) + (size if abs(t) >= at else 0.0), stateful=False)

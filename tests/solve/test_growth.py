@@ -82,7 +82,7 @@ def drift(order, growing, h, far=np.inf):
     poses[:, 4] = np.minimum(growing * t * h**order, far)
     slot = SimpleNamespace(path="body", quantity=SimpleNamespace(kind="pose"))
     problem = SimpleNamespace(length=1.0, descriptor=SimpleNamespace(states=[slot]))
-    totals = SimpleNamespace(loss=np.zeros(t.size), work=np.zeros(t.size), scale=1.0)
+    totals = SimpleNamespace(heat=np.zeros(t.size), work=np.zeros(t.size), scale=1.0)
 
     class Run(SimpleNamespace):
         def __len__(self):

@@ -362,9 +362,7 @@ class Dynamics:
             return self._state(found) if isinstance(found, ReducedState) else self._of_states(found)
 
     def _counted(self, q: Array, r: Array, s: Array) -> ReducedState:
-        return ReducedState(
-            0.0, q, r, self._equations.heats.energies(s), np.zeros(2 + len(self._equations.reduced.made))
-        )
+        return ReducedState(0.0, q, r, self._equations.heats.energies(s), np.zeros(self._equations.summed))
 
     def _reduced(self, state: State) -> ReducedState:
         return self._counted(*self.layout.split(state.array))

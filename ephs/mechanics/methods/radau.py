@@ -16,6 +16,7 @@ from ephs.mechanics.methods.method import ReducedMethod
 from ephs.mechanics.methods.stages import KeptJacobian, Stages, scheme_of
 from ephs.mechanics.methods.tableaux import arrays
 from ephs.mechanics.tree.equations.equations import ReducedEquations, ReducedState
+from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
 from ephs.solve.methods.collocation import Collocation, radau
 from ephs.solve.posing.errors import Outcome, SolveError
@@ -87,9 +88,9 @@ class Implicit(ReducedMethod):
         closed, error = self._closed(state, end, y0, y1, first, stages, h)
         weights, allowed = h * self.scheme.coefficients[-1], self._stages.allowed(y0, y1)
         energies = state.heats + stages[:, self._stages.heat]
-        (_, work), flows = np.split(weights @ passed, [2])
+        (_, work, heat), flows = np.split(weights @ passed, [TOTALS])
         work += closed.totals[1] - state.totals[1]  # that of following motions
-        closed = eq.booking.step(state, closed, flows, work, stages=(weights, energies, passed[:, 2:]))
+        closed = eq.booking.step(state, closed, flows, work, heat, stages=(weights, energies, passed[:, TOTALS:]))
         closed, missed = eq.accounts.corrected(state, closed, h, allowed, chosen=self.control.step is None, alone=True)
         self._stages.keep(fast=fast)
         return Attempt(state, closed, h, max(error, missed), eq.least(state, closed))

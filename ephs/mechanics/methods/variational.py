@@ -100,7 +100,7 @@ class Variational(ReducedMethod):
         free = np.asarray(np.linalg.solve(mass, after), dtype=float)
         heats = np.where(eq.heats.plain, 2.0 * states - state.heats, state.heats)
         closed = eq.closed(ReducedState(state.t + h, q, free, heats, state.totals, account=state.account))
-        work = h * powers[1]
+        work, heat = h * powers[1:]
         if self._driven.size:  # the work of prescribed motions: their impulses at both ends of the step
             impulse = mass @ closed.r - after
             rows = eq.rows()
@@ -111,7 +111,7 @@ class Variational(ReducedMethod):
         if self._bounds is not None:
             passed = eq.heats.between(passed, *(each.detail for each in self._bounds))
             between = self._bounds[0].end, self._bounds[1].end
-        closed = eq.booking.step(state, closed, passed, work, missed=np.zeros(passed.size), between=between)
+        closed = eq.booking.step(state, closed, passed, work, heat, missed=np.zeros(passed.size), between=between)
         if self._keep == "momentum":
             eq.row(closed)  # which refuses an end without an energy: steps ask for forces in their middle
         else:
@@ -187,7 +187,7 @@ class Variational(ReducedMethod):
         return self._turned(-xi, momentum - 0.5 * h * self._untwisted(-0.5 * xi, force))
 
     def _middle(self, state: ReducedState, h: float, xi: Array) -> tuple[Array, ...]:
-        """p̄, g, the flows of heat in W, heat and work per second, and heats, in the middle of a step."""
+        """p̄, g, the flows of heat in W, rates of `TOTALS`, and heats, in the middle of a step."""
         eq = self.equations
         q, r = eq.moved(state.q, 0.5 * xi), xi / h
         if self._bent:
@@ -207,7 +207,7 @@ class Variational(ReducedMethod):
                 break
             last = moved
         eq.evaluations += 1
-        return *found.momenta(), flows, np.array([found.heat, found.power]), heats
+        return *found.momenta(), flows, found.powers, heats
 
     def _gap(self, state: ReducedState, xi: Array, h: float) -> tuple[Array, Array]:
         """Residuals of prescribed joints and loops at the end of the step, and their rows on changes of ξ."""

@@ -163,7 +163,7 @@ class ReducedMotion:
                 momenta[:, i] = own[:, i] @ self._momenta[i].T
         s = [solution[path].reshape(n, -1) for path in reduced.entropies]
         heats = eq.heats.energies(np.hstack([np.zeros((n, 0)), *s]))
-        totals = np.zeros(2 + len(reduced.made))
+        totals = np.zeros(eq.summed)
 
         def rates(k: int) -> Array:
             found = self._impulses.rates(q[k], prescribed[k], momenta[k])

@@ -28,10 +28,34 @@ from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Reference
 from ephs.semantics.bundles.errors import AssemblyError
 from ephs.semantics.systems.kept import once
+from ephs.solve.posing.errors import OptionError
 from ephs.solve.posing.problem import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+NEAR = 1e-6
+"""Difference of a joint's rate to that of its law that counts as rounding of given numbers, relative to these, and to
+what the law gains in a second."""
+
+
+def check_motions(scene: Scene, t0: float) -> None:
+    """Refuse a start at t0 s in whose state joints do not move as their motion laws do then.
+
+    Raises
+    ------
+    OptionError
+        It names the joint.
+    """
+    for name, joint in scene.all_joints():
+        if joint.motion is None:
+            continue
+        rate, law = float(joint.rate[0]), joint.motion.rate(t0)
+        if abs(rate - law) > NEAR * max(abs(rate), abs(law), abs(joint.motion.acceleration(t0))):
+            raise OptionError(
+                "t0", t0, f"a time at which the motion of joints.{name} has the rate {rate:.6g} of the initial state, "
+                f"not {law:.6g}; simulate from 0, and start from scene.at(solution, {t0:g})",
+            )  # fmt: skip
 
 
 @paused_collector()

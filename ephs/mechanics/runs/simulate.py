@@ -142,11 +142,13 @@ def simulate(
     if isinstance(model, System | Pattern):
         problem = problem_of_system(model, initial, inputs, reference)
     else:
-        from ephs.mechanics.runs.scene_problem import problem_of_scene  # systems are run without scenes
+        from ephs.mechanics.runs.scene_problem import check_motions, problem_of_scene  # systems are run without scenes
         from ephs.mechanics.scene.own_units import in_own_units
 
         if reference is not None:
             raise OptionError("reference", reference, "none: a scene's [world] has its own")
+        if start and not initial:
+            check_motions(model, start)
         problem = in_own_units(problem_of_scene(model, initial, inputs))
     method_of = METHODS["natural4"] if method == "auto" and form != "reduced" and step is None else None
     chosen_method, reason = (method_of, f"the {form} form") if method_of else chosen(method, problem, step=step)

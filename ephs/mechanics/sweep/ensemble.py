@@ -31,7 +31,6 @@ from ephs.solve.equations.sparse import Index
 from ephs.solve.march.records import Ending
 from ephs.solve.posing.errors import LARGEST
 from ephs.solve.posing.problem import Problem
-from ephs.solve.result.ledger import heat_beside
 from ephs.solve.running.control import ATOL, RTOL, Control, first_step
 from ephs.solve.running.stepping import Span
 
@@ -224,7 +223,7 @@ class _Runs:
         for _, stack, within, among in self._parts:
             stack[:count, within] = rows[:, among]
         q, *start = (each[:count] for each in self._starts)
-        y = np.hstack([*start, np.zeros((count, 2 + len(eq.reduced.made)))])
+        y = np.hstack([*start, np.zeros((count, eq.summed))])
         for marches, leg in zip(self._marches, self._legs, strict=True):
             ending = marches.run(q, y, BURST)
             for k in np.flatnonzero(done & (ending == Ending.CAREFUL)):
@@ -276,7 +275,7 @@ class _Runs:
         self._fill(row)
         eq = self._made.equations
         q, r, heats = (start[k].copy() for start in self._starts)
-        start = ReducedState(self._ensemble.t0, q, r, heats, np.zeros(2 + len(eq.reduced.made)))
+        start = ReducedState(self._ensemble.t0, q, r, heats, np.zeros(eq.summed))
         with suppress(*FAULTS):
             taken = leg(start)
             while not taken.left and taken.counts.steps + taken.counts.rejected < BURST:
@@ -295,11 +294,9 @@ def _reading(equations: ReducedEquations, output: Output) -> Any:
         It needs the whole solution.
     """
     n, ns, reduced = equations.n, equations.ns, equations.reduced
-    if output.name == "heat" and heat_beside(equations.problem):
-        raise Unlike
     if output.name in ("heat", "work"):
-        at = n + ns + ("heat", "work").index(output.name)
-        return lambda q, y: y[:, at]
+        at = [[n + ns, n + ns + 2], [n + ns + 1]][output.name == "work"]
+        return lambda q, y: y[:, at].sum(axis=1)
     kind, _, rest = output.name.partition(".")
     name, _, what = rest.rpartition(".")
     found = [

@@ -95,7 +95,7 @@ class IrreversibleStep:
         else:
             theta = partials.dual(a.scal[1])
             flows = [dot(there.rows[i * n : i * n + n], there.efforts) / theta for i in range(n)]
-        good = written(partials, self, a, there.through.outward(flows))
+        good = written(partials, self, a, there.through.outward(flows), rests=True)
         return on.select(there.cold, TEMPERATURE, on.select(on.both(good, there.inside), OK, DOMAIN))
 
     def onsager(self, on: Evaluator, a: Arguments) -> Integer:

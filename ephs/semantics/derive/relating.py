@@ -96,8 +96,12 @@ def given(on: Duals, relation: Related, a: Arguments) -> tuple[list[Real], list[
     return [on.dual(a.p[i]) for i in range(relation.numbers)], x, e, lam
 
 
-def written(on: Duals, relation: Related, a: Arguments, values: Numbers) -> Truth:
-    """Store flows, conditions and their derivatives; whether all values are finite."""
+def written(on: Duals, relation: Related, a: Arguments, values: Numbers, *, rests: bool = False) -> Truth:
+    """Store flows, conditions and their derivatives; whether all values are finite.
+
+    With ``rests``, slopes 0·∞ are 0, which is no number: those of flows M e where e is 0 and slopes of M are infinite,
+    as of |v|^½ v at rest.
+    """
     n, k, m, _ = relation.dimensions
     width = n + k + m
     for i, entry in enumerate(values):
@@ -107,7 +111,8 @@ def written(on: Duals, relation: Related, a: Arguments, values: Numbers) -> Trut
         else:
             a.c[i - n] = found.value
         for j, slope in enumerate(found.slopes):
-            a.jac[i * width + j] = slope
+            known = isinstance(slope, float) or not rests
+            a.jac[i * width + j] = slope if known else on.base.select(on.base.absolute(slope) >= 0.0, slope, 0.0)
     return finite(on.base, [on.dual(entry).value for entry in values])
 
 

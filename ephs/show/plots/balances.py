@@ -21,14 +21,9 @@ def balances(sol: Any, summary: dict[str, Any]) -> str:
     least = float(np.min(entropy_panels(sol)[1].curves[0].values, initial=np.inf))
     bands = exergy_bands(sol)
     destroyed = sum(band.amount for band in bands if band.kind == "destroyed" and not band.source)
-    warmed = (
-        "the heat of friction and damping is not told from that of gases by this method"
-        if np.isnan(heat)
-        else f"friction and damping made {number(heat)} J of heat"
-    )
     sentences = {
-        "Energy": f"Drives and inputs did {number(work)} J of work; {warmed}; the energy "
-        f"of the whole, heat included, changed by {number(stored)} J. The balance closes to "
+        "Energy": f"Drives and inputs did {number(work)} J of work; friction and damping made {number(heat)} "
+        f"J of heat; the energy of the whole, heat included, changed by {number(stored)} J. The balance closes to "
         f"{number(float(np.abs(sol.energy_error).max()))} of the energy turned over.",
         "Exergy": f"The exergy of the whole changed by {number(float(exergy[-1] - exergy[0]))} J; "
         f"{number(destroyed)} J were destroyed.",

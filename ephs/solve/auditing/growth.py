@@ -174,7 +174,7 @@ def _distance(one: "Solution", run: Callable[[], "Solution"]) -> tuple[float, in
     shifts: list[tuple[Array, Path | None]] = [
         (apart(one.states[path][mine], other.states[path][its], problem.length), path) for path in bodies
     ]
-    for name in ("loss", "work"):
+    for name in ("heat", "work"):
         a, b = getattr(one.ledgers, name), getattr(other.ledgers, name)
         off = np.abs((a[mine] - a[0]) - (b[its] - b[0]))
         rounding = rounded(one) if off.any() else 0.0  # which is all that there is of bodies at rest

@@ -100,11 +100,12 @@ class Paced:
         middle, first = self._single(state, 0.5 * h)
         end, second = self._single(middle, 0.5 * h)
         off, worst = self._off(state, coarse, end)
-        return Attempt(state, end, h, off / (2.0**self.method.order - 1.0), min(first, second), worst=worst)
+        return Attempt(state, end, h, off / (2.0**self.method.order - 1.0), min(first, second), middle, worst)
 
     def inside(self, attempt: Attempt[PacedState], t: float) -> PacedState:
-        """A shorter step from the same start."""
-        return self.shorter(attempt.start, t)
+        """A shorter step from the same start, or from the middle of two, so that instants lead to the end."""
+        start, middle = attempt.start, attempt.detail or attempt.start
+        return self.shorter(middle if abs(t - start.t) >= abs(middle.t - start.t) else start, t)
 
     def shorter(self, state: PacedState, t: float) -> PacedState:
         """The state at a time by one step, which leaves no trace in those of the run: its method is another."""

@@ -18,12 +18,15 @@ WIDTH = 1.0 / 2000.0
 FIRST, GROWTH = 1.0 / 64.0, 4.0
 """The first points after a jump are nearer: by this part of the width, and each by this factor farther than the last,
 so that there is a rate of change to compare with."""
-SHARP = 4.0
-"""Ratio of a change to the last two above which it is examined; parabolas reach 3 at their vertex."""
+SHARP = 4.0 / 3.0
+"""A rate of change is examined that is above the last two by more than this part of what parabolas reach, with their
+vertex where the last interval begins: 2 + g for an interval g times as long as the last one."""
 SMALL = 1e-6
 """Fraction of the largest value so far below which a change is ignored."""
 SHARE = 0.1
 """Least share of the change between two points, however near, that makes it a jump."""
+KEPT = "values", "last", "before", "largest", "width"
+"""Numbers of a course that journals keep."""
 RESOLVED = 0.25
 """Least duration of a steep change that steps resolve, as a fraction of a step."""
 
@@ -65,13 +68,15 @@ class Change:
 
 @dataclass(slots=True)
 class _SignalCourse:
-    """Course of one function: its last values, their rates of change in the last two intervals, the largest so far."""
+    """Course of one function: its last values, their rates of change in the last two intervals, the largest so far,
+    and the last width in s."""
 
     asked: ProbedInput
     values: list[float] = field(default_factory=list[float])
     last: list[float] = field(default_factory=list[float])
     before: list[float] = field(default_factory=list[float])
     largest: list[float] = field(default_factory=list[float])
+    width: list[float] = field(default_factory=list[float])
 
     def begin(self, t: float, state: State | None) -> None:
         """Discard samples before t."""
@@ -81,21 +86,21 @@ class _SignalCourse:
 
     def follow(self, values: list[float]) -> None:
         """Restart from these values."""
-        self.values, self.last, self.before = values, [], []
+        self.values, self.last, self.before, self.width = values, [], [], []
 
     def sharp(self, values: list[float], width: float) -> bool:
         """Whether the change to these values, over a width in s, must be examined; if not, they become the last."""
         rates: list[float] = []
-        found = False
+        found, most = False, SHARP * (2.0 + width / self.width[0]) if self.width else 0.0
         for j, value in enumerate(values):
             change = abs(value - self.values[j])
             if abs(value) > self.largest[j]:
                 self.largest[j] = abs(value)
             rates.append(change / width)
-            if self.last and change > SMALL * self.largest[j] and rates[j] > SHARP * self.last[j]:
-                found = found or not self.before or rates[j] > SHARP * self.before[j]
+            if self.last and change > SMALL * self.largest[j] and rates[j] > most * self.last[j]:
+                found = found or not self.before or rates[j] > most * self.before[j]
         if not found:
-            self.values, self.last, self.before = values, rates, self.last
+            self.values, self.last, self.before, self.width = values, rates, self.last, [width]
         return found
 
 
@@ -191,11 +196,12 @@ class SignalProbe:
 
     def snapshot(self) -> Snapshot:
         """Snapshot for `restore`."""
-        courses = [[course.values, course.last, course.before, course.largest] for course in self._courses]
+        courses = [[getattr(course, name) for name in KEPT] for course in self._courses]
         return {"at": self._at, "spacing": self._spacing, "courses": courses}
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot."""
         self._at, self._spacing = snapshot["at"], snapshot["spacing"]
         for course, found in zip(self._courses, snapshot["courses"], strict=True):
-            course.values, course.last, course.before, course.largest = map(list, found)
+            for name, numbers in zip(KEPT, found, strict=True):
+                setattr(course, name, list(numbers))

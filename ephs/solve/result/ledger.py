@@ -39,8 +39,7 @@ class Ledgers:
     entropy
         Sum of all entropies, the environment's included, in J/K.
     heat, work, supplied
-        What friction turned into heat; energy and exergy supplied through outer ports: J since the start. The heat is
-        NaN where a run in joint coordinates cannot tell it from the heat of gases.
+        What friction turned into heat; energy and exergy supplied through outer ports: J since the start.
     made, least
         Entropy made since the start; least production of a component in the step before: J/K.
     storages, makers, workers
@@ -83,11 +82,6 @@ class Ledgers:
         return self.kinetic + self.potential + self.thermal + self.environment
 
     @property
-    def loss(self) -> Array:
-        """(n,) heat of friction in J, and what is destroyed where that is not known."""
-        return np.where(np.isnan(self.heat), self.temperature * self.made, self.heat)
-
-    @property
     def scale(self) -> float:
         """Largest K + |V − V₀| + |heat| + |work| over the run; where nothing moves, what the storages exchange; in J.
 
@@ -97,7 +91,7 @@ class Ledgers:
         v = self.potential
         if not v.size:
             return 1.0
-        lost = np.maximum(np.abs(self.loss), self.temperature * np.abs(self.made))
+        lost = np.maximum(np.abs(self.heat), self.temperature * np.abs(self.made))
         moved = float(np.max(self.kinetic + np.abs(v - v[0]) + lost + np.abs(self.work)))
         still = STILL * float(np.abs(v).max())
         if moved > still:
@@ -114,7 +108,7 @@ class Ledgers:
             return np.zeros(0)
         work, heat = self.work - self.work[0], self.heat - self.heat[0]
         defects = [self._change(self.kinetic, self.potential, self.thermal, self.environment) - work]
-        if mechanical and not self.volumes and not self.engines and np.isfinite(heat).all():
+        if mechanical and not self.volumes and not self.engines:
             defects.append(self._change(self.kinetic, self.potential) + heat - work)
         return np.max(np.abs(defects), axis=0) / self.scale
 
@@ -123,8 +117,8 @@ class Ledgers:
         return np.sum([e - e[0] for e in energies], axis=0)  # differences first: a sum of large energies would round
 
 
-def ledgers(problem: Problem, record: RunRecord, *, by_energy: bool = False) -> Ledgers:
-    """Ledgers of a run's records; ``by_energy``: their heat is the energy that went to stores of heat."""
+def ledgers(problem: Problem, record: RunRecord) -> Ledgers:
+    """Ledgers of a run's records."""
     n = record.t.size
     reference = problem.reference
     kinetic, potential, thermal, environment, exergy, entropy = (np.zeros(n) for _ in range(6))
@@ -170,8 +164,6 @@ def ledgers(problem: Problem, record: RunRecord, *, by_energy: bool = False) -> 
         else:
             potential = potential + energy
     heat, work, supplied, made, least = record.ledgers.T
-    if by_energy:
-        heat = heat - _carried(problem, record, makers)
     return Ledgers(
         kinetic, potential, thermal, environment, exergy, entropy, heat, work, supplied, made, least,
         storages, makers, workers, entropies, amounts["volume"], amounts["momentum"], exergies, reference.temperature,
@@ -189,41 +181,3 @@ def _acting(problem: Problem) -> Counter[int]:
 def _permanent(slot: ComponentSlot, acted: Counter[int]) -> bool:
     """Whether a storage is a flux that only it has a flow of: a field that stays as it is."""
     return all(state.quantity.kind in FIELDS for state in slot.reads) and all(acted[e] == 1 for e in slot.efforts)
-
-
-def _carried(problem: Problem, record: RunRecord, makers: Mapping[Path, Array]) -> Array:
-    """(n,) heat in J that gases, and others that hold heat beside other energy, gave to stores of heat since the start.
-
-    What leaves one through a component to the environment is known by the entropy that this made; NaN where more
-    components make entropy at one, or heat goes to a store whose temperature changes.
-    """
-    out = np.zeros(record.t.size)
-    around = {e for slot in problem.descriptor.components if _is_environment(slot) for e in slot.efforts}
-    for holder, beside in heat_beside(problem):
-        states = [state for state in holder.reads if state.quantity.kind == "entropy"]
-        if len(beside) > 1 or len(states) > 1 or not around | set(holder.efforts) >= set(beside[0].efforts):
-            return np.full(record.t.size, np.nan)
-        taken = (record.x[:, states[0].point] - problem.point[states[0].point]).sum(axis=1)
-        out += problem.reference.temperature * (makers[beside[0].path] - taken)
-    return out
-
-
-def heat_beside(problem: Problem) -> list[tuple[ComponentSlot, list[ComponentSlot]]]:
-    """Storages of heat beside other energy, or by a law of their own, each with the components at its entropies, of
-    which one makes entropy at least."""
-    from ephs.solve.equations.heats import exponential_law
-
-    d, found = problem.descriptor, list[tuple[ComponentSlot, list[ComponentSlot]]]()
-    entropies = {junction.at for junction in d.junctions if junction.quantity.kind == "entropy"}
-    for holder in d.components:
-        primitive, places = holder.primitive, entropies.intersection(holder.efforts)
-        if not places or not isinstance(primitive, Storage) or primitive.environment or exponential_law(primitive):
-            continue
-        beside = [one for one in d.components if one is not holder and places.intersection(one.efforts)]
-        if any(isinstance(one.primitive, Irreversible) for one in beside):
-            found.append((holder, beside))
-    return found
-
-
-def _is_environment(slot: ComponentSlot) -> bool:
-    return isinstance(slot.primitive, Storage) and slot.primitive.environment

@@ -164,11 +164,7 @@ class Solution:
 
     @property
     def heat(self) -> Array:
-        """(n,) heat of friction and damping since the start, in J.
-
-        NaN of runs in joint coordinates where gases, beams that expand, or others that hold heat beside other energy
-        take the heat of friction or give heat to a store whose temperature changes; the natural methods have it.
-        """
+        """(n,) heat of friction and damping since the start, in J."""
         return self.ledgers.heat
 
     @property

@@ -30,7 +30,7 @@ def summary_of(solution: "Solution") -> dict[str, Any]:
         "max_constraint_error": float(solution.constraint_error.max(initial=0.0)),
         "max_velocity_error": float(solution.velocity_error.max(initial=0.0)),
         "min_entropy_production": float(solution.stats["least_production"]),
-        "heat": None if np.isnan(solution.heat).any() else float(np.sum(solution.heat[last])),
+        "heat": float(np.sum(solution.heat[last])),
         "work": float(np.sum(solution.work[last])),
         "audit": solution.audit.record(),
     }

@@ -162,9 +162,8 @@ def solution_of(
     while problem.shown is not None:
         problem, record, stats = problem.shown(record, stats)
     d = problem.descriptor
-    by_energy = stats.get("form") == "reduced"
     labels = once(d, "labels", lambda: {slot.path: labels_of(slot.quantity) for slot in d.states})
     return Solution(
-        problem.name, record.t, RecordedStates(d, record.x), lambda: ledgers(problem, record, by_energy=by_energy),
-        dict(stats), problem, labels, audited=audited,
+        problem.name, record.t, RecordedStates(d, record.x), lambda: ledgers(problem, record), dict(stats), problem,
+        labels, audited=audited,
     )  # fmt: skip

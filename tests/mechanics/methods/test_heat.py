@@ -13,6 +13,7 @@ from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods.variational import Variational
 from ephs.solve.equations.heats import Heats, held_between
 from ephs.solve.methods.collocation import radau
+from ephs.solve.methods.paced import Paced
 from examples.failing import scene
 from tests.numerics import EPS, largest
 
@@ -194,6 +195,37 @@ def test_parts_of_a_step_alone_may_lose_what_the_whole_has_not(monkeypatch):
     monkeypatch.delattr(Variational, "inside")
     sol, _ = within("energy")
     assert np.diff(sol.heat).min() < -1e-5
+
+
+DENSE = {
+    "rk54": {}, "rk87": {}, "radau": {}, "semi": {}, "auto": {}, "natural4": {"step": 0.02},
+    "variational": {"step": 0.01},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", DENSE)
+@pytest.mark.parametrize("seed", range(3))
+def test_between_instants_within_steps_no_component_loses_heat_or_entropy(method, seed):
+    rng = np.random.default_rng(seed)
+    model = arms(rng.uniform(0.05, 0.5, 2), rng.uniform(0.02, 0.1, 2), rng.uniform(0.0, 0.2), rng.uniform(-3.0, 3.0, 2))
+    sol = ephs.simulate(model, 0.6, method=method, save_at=np.linspace(0.0, 0.6, 601), audit="off", **DENSE[method])
+    for made in (sol.heat, *sol.ledgers.makers.values()):
+        assert np.diff(made).min() >= -64.0 * EPS * made[-1]
+
+
+def near_ends(method):
+    """Heat just before the ends of steps of a run, and what it is there, relative to all."""
+    model, options = arms((0.1, 0.3), (0.05, 0.02), 0.1, (2.0, -3.0)), {"method": method, "rtol": 1e-4, "audit": "off"}
+    ends = ephs.simulate(model, 0.6, **options).t[1:]
+    sol = ephs.simulate(model, 0.6, save_at=np.sort(np.concatenate([ends - 1e-9, ends])), **options)
+    return largest(sol.heat[1::2] - sol.heat[::2]) / sol.heat[-1]
+
+
+@pytest.mark.parametrize("method", ["natural", "natural4"])
+def test_instants_within_chosen_steps_of_natural_methods_lead_to_their_ends(method, monkeypatch):
+    assert near_ends(method) < 1e-7  # what a nanosecond of 0.6 s makes, with its largest power
+    monkeypatch.setattr(Paced, "inside", lambda self, attempt, t: self.shorter(attempt.start, t))
+    assert near_ends(method) > 1e-7  # the control: the end is that of two steps
 
 
 @given(st.lists(st.tuples(*[st.floats(0.01, 1.0)] * 3), min_size=1, max_size=4))

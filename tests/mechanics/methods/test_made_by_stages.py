@@ -136,7 +136,7 @@ def test_a_step_with_derivatives_makes_what_a_step_makes(method, inputs):
     steps = ExplicitTangent(family, 0.0, tableau(method))
     point = steps.step(steps.begin(), h)
     expected = run(1.0)
-    assert np.all(np.abs(point.state.totals[2:] - expected) <= 1e-13 * expected)
+    assert np.all(np.abs(point.state.totals[-expected.size :] - expected) <= 1e-13 * expected)
     d = 1e-4  # errors of the difference: d² and ε / d
     slopes = (run(1.0 + d) - run(1.0 - d)) / (2.0 * d * capacity)
     assert np.all(np.abs(point.y[0][-expected.size :] - slopes) <= 1e-6 * np.abs(slopes))

@@ -168,7 +168,7 @@ def check(stage, seed):
     again = stage.at(known + weight * there[stage.rates], 0.0)
     loss = largest(again[stage.rates] - stage.at(np.zeros(eq.n), 0.0)[stage.rates])
     assert largest(there - again) <= 1e-9 * (1.0 + largest(again) + loss)
-    made = there[eq.nv + eq.n + eq.ns + 2 :]
+    made = there[eq.size - len(eq.reduced.made) :]
     assert np.all(made >= 0.0)
 
 

@@ -374,3 +374,18 @@ def test_what_cannot_be_recorded_names_its_line(function, why):
     with pytest.raises(Untraceable, match=why) as caught:
         record(function, {"q": None})
     assert "test_relations.py:" in str(caught.value)
+
+
+@pytest.mark.parametrize("power", [0.1, 0.5, 0.9, 1.0, 1.5])
+def test_slopes_of_friction_that_grows_as_a_power_of_the_speed_are_finite_at_rest(power):
+    """|v|^a v has the slope (1 + a) |v|^a, also at rest, where slopes of M are infinite."""
+    made = ephs.irreversible(PS, lambda p, s: abs(p) ** power * friction_matrix(p, s))
+    relation, slopes = made.kernel.relation, {}
+    for speed in (0.0, 1e-200):
+        a = {name: np.zeros(size) for name, size in sizes(relation).items()}
+        a["scal"][:], a["p"][:], a["e"][0] = (0.01, 300.0, 1e-3), made.kernel.parameters, speed
+        status, out = run(compiled(relation), relation, a)
+        assert status == 0
+        slopes[speed] = out["jac"][0]
+    assert slopes[0.0] == 0.0
+    assert slopes[1e-200] == pytest.approx((1.0 + power) * 1e-200**power, rel=1e-12)

@@ -43,7 +43,7 @@ def attachment_of(reduced: "Reduced") -> Attachment:
     net = there.network
     size, nodes = net.skew.shape[0], len(reduced.entropies) - len(net.states)
     rows: list[tuple[Index, Array]] = []
-    places: list[int] = []
+    places: list[tuple[int, int]] = []
     called, reads, varies, kept = list[list[int]](), list[int](), list[int](), 0
     stores: list[list[int]] = []
     for component, first in net.storages:
@@ -56,12 +56,12 @@ def attachment_of(reduced: "Reduced") -> Attachment:
         varies += vary.tolist()
         n, k, nv, _ = t.dims[one.component].tolist()
         kept += (n + k) * (n + k + nv)
-        made = {effort: int(flow) for (effort, _), flow in zip(one.heated, flows, strict=True)}
+        made = {at: (int(flow), int(0 <= to < nodes)) for (at, to), flow in zip(one.heated, flows, strict=True)}
         for j, row in enumerate(one.rows):
             rows.append(_sparse(row))
-            places.append(made.get(j, -1))
+            places.append(made.get(j, (-1, 0)))
     rows += [_sparse(row) for row in net.skew]
-    places += [-1] * size
+    places += [(-1, 0)] * size
     at = np.cumsum([0, *(where.size for where, _ in rows)])
     dims = t.dims[[one[6] for one in (*stores, *called)]] if stores or called else np.zeros((0, 4), dtype=np.int64)
     n, k, nv, nx = (int(column.max(initial=0)) for column in dims.T)
@@ -69,7 +69,7 @@ def attachment_of(reduced: "Reduced") -> Attachment:
     lists: dict[str, Any] = {
         "head": [len(net.rates), len(net.nodes), len(net.inputs), len(net.states), net.unknown, nodes, named],
         "store": stores, "called": called,
-        "row": [[at[i], where.size, place] for i, ((where, _), place) in enumerate(zip(rows, places, strict=True))],
+        "row": [[at[i], where.size, *place] for i, ((where, _), place) in enumerate(zip(rows, places, strict=True))],
         "term": [place for where, _ in rows for place in where], "read": reads, "vary": varies,
         "bent": there.bent,
         "temperature": net.nodes, "pivot": [0] * net.unknown, "fault": [0],
@@ -78,7 +78,7 @@ def attachment_of(reduced: "Reduced") -> Attachment:
     sizes = {
         "effort": size, "flow": size, "gross": size, "kept": kept, "x": nx + 8, "v": max(nv, 6) + 1, "e": n + k + 1,
         "f": n * n + n + k + 8, "work": 4096, "matrix": net.unknown**2, "step": net.unknown, "turned": size,
-        "changed": size, "moved": len(varies), "power": 2,
+        "changed": size, "moved": len(varies), "power": 3,
     }  # fmt: skip
     reals = {"weight": np.concatenate([by for _, by in rows]) if rows else np.zeros(0)}
     reals |= {name: np.zeros(count) for name, count in sizes.items()} | {"outer": there.outer}

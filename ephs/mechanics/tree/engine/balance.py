@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, final
 from ephs.mechanics.tree.engine.attachment import attached_energy
 from ephs.mechanics.tree.engine.forces import strain
 from ephs.mechanics.tree.engine.heats import entropies
-from ephs.mechanics.tree.sweeps.acting import PushedBody
+from ephs.mechanics.tree.sweeps.acting import TOTALS, PushedBody
 from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces.rank import TINY
 from ephs.semantics.stage import Evaluator, Integer, Real, Table, Truth, Variable, Vector, staged
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 def store_attached(run: "Correction") -> None:
     """Move attached states along what the step changed, and what h ẋ at its end is beside that."""
     on, motion, w, nodes, size = run.on, run.motion, run.motion.work, run.motion.tables.node, run.heats.size
-    along, beside, rest = w.idle.part(0, size), w.spare.part(0, size), w.spare.size - (size + 2)
+    along, beside, rest = w.idle.part(0, size), w.spare.part(0, size), w.spare.size - (size + TOTALS)
     found = motion.accelerate(
-        on, run.q, run.r, w.descent, beside, w.spare.part(size + 2, rest), w.spare.part(size, 2)
+        on, run.q, run.r, w.descent, beside, w.spare.part(size + TOTALS, rest), w.spare.part(size, TOTALS)
     )  # fmt: skip
     sound = on.same(found, 0)
 
@@ -335,9 +335,9 @@ class Correction(Missing):
             bodies = Table(PushedBody, motion.tables.body.integers, motion.tables.body.reals, 0)
             alone = replace(motion.tables, drive=w.still, body=bodies, lead=w.zero)
             ns, idle = motion.tables.node.size, w.idle
-            s_rate, made = idle.part(0, ns), idle.part(ns + 2, idle.size - (ns + 2))
+            s_rate, made = idle.part(0, ns), idle.part(ns + TOTALS, idle.size - (ns + TOTALS))
             calm = replace(motion, tables=alone)
-            self.status.value = calm.accelerate(on, self.q, w.zero, w.descent, s_rate, made, idle.part(ns, 2))
+            self.status.value = calm.accelerate(on, self.q, w.zero, w.descent, s_rate, made, idle.part(ns, TOTALS))
 
         def spin() -> None:
             turn(on, motion, self.q, self.r, w.kept)

@@ -19,7 +19,7 @@ from ephs.mechanics.tree.engine.islands import islands_of
 from ephs.mechanics.tree.engine.links import LinkFrames, links_of
 from ephs.mechanics.tree.engine.tables import Forces, table_of
 from ephs.mechanics.tree.finding.tables import CUT, SPRING, TREE, MechanismTables
-from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, CompiledComponent, Own
+from ephs.mechanics.tree.sweeps.acting import ON_BODIES, ON_CUT, ON_TREE, TOTALS, CompiledComponent, Own
 from ephs.mechanics.tree.sweeps.balances import network_program
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces import SE3
@@ -134,8 +134,8 @@ def _plan(
     links = {"own": own, "island": island, "bases": bases.ravel(), **_links(records)}
     tables = {**links, **_joints(charts, cut, cut_numbers, eliminated), **forces.tables(), **_attached(net)}
     freedoms, entropies = sum(part.joint.dim for part in found.parts), len(reduced.entropies)
-    sizes = reduced.coordinates, rates + freedoms + entropies + 2 + len(reduced.made)
-    booked = entropies, entropies + 2 + len(reduced.made)
+    sizes = reduced.coordinates, rates + freedoms + entropies + TOTALS + len(reduced.made)
+    booked = entropies, entropies + TOTALS + len(reduced.made)
     shapes = _shapes(program.width, (len(found.parts), len(bases)), freedoms, rates, len(cut), booked, eliminated)
     shapes["located"] = tables["middle"].size, 6
     return _EnginePlan(tables, shapes, eliminated, sizes, reached, len(cut) > 0)
@@ -177,7 +177,7 @@ def whole_of(reduced: "Reduced", gravity: Array) -> WholeMechanism:
     links = {"own": own, "island": none, "bases": np.zeros(0), **_links(records)}
     tables = {**links, **_joints(charts, cut, cut_numbers, whole), **forces.tables(), **_attached(net)}
     tables = with_derivatives(tables, t.address)
-    booked = len(reduced.entropies), len(reduced.entropies) + 2 + len(reduced.made)
+    booked = len(reduced.entropies), len(reduced.entropies) + TOTALS + len(reduced.made)
     shapes = _shapes(0, (len(parts), 0), reduced.freedoms, int(t.dim[sorted(joints)].sum()), len(cut), booked, whole)
     shapes["located"] = tables["middle"].size, 6
     shapes |= {"value": (len(ends), 4), "covector": (size, 6), "e": (64,), "jac": (1024,), "scratch": (4096,)}

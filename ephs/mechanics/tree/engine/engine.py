@@ -115,7 +115,7 @@ class Engine:
         return self._q.copy()
 
     def rates(self, base: Array, y: Array) -> tuple[int, Array, Array]:
-        """Return a status, the elements base·exp(v), and ẏ of y = (v, r, heats, heat, work, flows)."""
+        """Return a status, the elements base·exp(v), and ẏ of y = (v, r, heats, totals, flows)."""
         self._base[:], self._y[:] = base, y
         status = self._run("rates")
         return status, self._q.copy(), self._out.copy()

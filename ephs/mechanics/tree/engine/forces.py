@@ -29,7 +29,7 @@ from ephs.mechanics.tree.sweeps.acting import (
 )
 from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.mechanics.tree.sweeps.network import Net
-from ephs.semantics.linear.dense import copy
+from ephs.semantics.linear.dense import clear, copy
 from ephs.semantics.spaces.vectors import dot, sub
 from ephs.semantics.stage import Evaluator, Integer, Real, Variable, Vector, staged
 
@@ -44,7 +44,7 @@ def act(
 ) -> Integer:  # fmt: skip
     """Write forces on joints and wrenches on links, rates of entropies, entropies made and powers; return a status.
 
-    Entropies are those in the memory; ``totals`` (2,) receives the powers of friction and of what drives.
+    Entropies are those in the memory; ``totals`` receives the rates of `TOTALS`.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def act(
         Receives resistances in place of friction, which then does not act.
     """
     acting = _ActingEvaluation(on, tables, work, q, r, s_rate, made, totals, on.counter(0), kept, read, drags)
-    totals[0], totals[1] = 0.0, 0.0
+    clear(on, totals)
     on.loop(tables.node.size, acting.warm)
     on.loop(tables.body.size, acting.push)
     on.when(tables.own[0].attached > 0, lambda: acting.unless_refused(acting.attach))
@@ -181,7 +181,7 @@ class _ActingEvaluation:
         on.loop(rates, push)
         on.loop(net.head[1], heat)
         on.loop(net.head[3], fill)
-        self.totals[1] = self.totals[1] + net.power[0]
+        self.totals[1], self.totals[2] = self.totals[1] + net.power[0], self.totals[2] + net.power[2]
 
     def _flows(self, net: Net) -> Vector:
         """Flows of what is attached."""

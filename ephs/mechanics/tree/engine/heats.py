@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import final
 
-from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.acting import TOTALS, Tables, Work
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
 from ephs.semantics.stage import Evaluator, Integer, Matrix, Real, Truth, Vector
 from ephs.solve.equations.heats import LITTLE, PLAIN, TRUSTED
@@ -88,7 +88,7 @@ def heat_rates(on: Evaluator, tables: Tables, work: Work, rates: Vector, made: V
 @final
 @dataclass(frozen=True, slots=True)
 class StageRates:
-    """Rates of (heats, heat, work, flows) at the stages of a step of h seconds: the columns of k from ``at`` on."""
+    """Rates of (heats, totals, flows) at the stages of a step of h seconds: the columns of k from ``at`` on."""
 
     tableau: TableauRecord
     k: Matrix
@@ -124,7 +124,7 @@ class StageRates:
             weight = self.h * a[a.columns, s]
 
             def add() -> None:
-                flow = weight * self.k[s, self.at + (tables.node.size + 2 + maker)]
+                flow = weight * self.k[s, self.at + (tables.node.size + TOTALS + maker)]
                 source, sink = (self.cold(on, tables, before, s, end) for end in ends)
                 passed.value, made.value = passed.value + flow, made.value + flow * (sink - source)
 
@@ -153,7 +153,7 @@ def count(
     on: Evaluator, tables: Tables, work: Work, before: Vector, change: Vector, size: Vector | None,
     stages: StageRates | None = None,
 ) -> None:  # fmt: skip
-    """Put what components made in a step in place of what they passed on, in the changes of (heats, heat, work, flows).
+    """Put what components made in a step in place of what they passed on, in the changes of (heats, totals, flows).
 
     Mean temperatures of the step are ΔE/Δs: so entropies change by what is made. See
     `ephs.solve.equations.heats.Heats.taken`, also for what stages say of each component's part.
@@ -181,7 +181,7 @@ def count(
         on.when(row.component < 0, outside, inside)
 
     def produced(maker: Integer, ends: tuple[Integer, Integer], rubs: Truth, factor: Real, most: Real) -> None:
-        at = nodes + 2 + maker
+        at = nodes + TOTALS + maker
         flow = change[at]
         change[at] = flow * factor
         if size is not None:
@@ -213,7 +213,7 @@ def count(
     def gather(i: Integer) -> None:
         """Add what a component makes at its further places to its first."""
         sink = tables.sink[i]
-        at, first = nodes + 2 + sink.maker, nodes + 2 + sink.owner
+        at, first = nodes + TOTALS + sink.maker, nodes + TOTALS + sink.owner
 
         def move() -> None:
             change[first], change[at] = change[first] + change[at], 0.0
@@ -228,7 +228,7 @@ def count(
         produced(tables.component[row.component].made, (row.one, row.two), False, two - one, one + two)
 
     def share(maker: Integer, ends: tuple[Integer, Integer]) -> None:
-        at = nodes + 2 + maker
+        at = nodes + TOTALS + maker
 
         def spread() -> None:
             change[at] = parts[at] + on.absolute(parts[at]) * (rest.value / whole.value)
@@ -256,7 +256,7 @@ def lawless(on: Evaluator, tables: Tables, change: Vector, rounding: Vector, sig
 
     Where none does, neither does the sum of all.
     """
-    first, found = tables.node.size + 2, on.counter(0)
+    first, found = tables.node.size + TOTALS, on.counter(0)
 
     def each_entry(place: Integer) -> None:
         def name(number: Integer) -> None:
@@ -279,7 +279,7 @@ def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
 
     def weigh(i: Integer) -> None:
         sink = tables.sink[i]
-        flow = on.select(sink.rubs > 0, change[nodes + 2 + sink.maker], 0.0)
+        flow = on.select(sink.rubs > 0, change[nodes + TOTALS + sink.maker], 0.0)
         whole.value = whole.value + on.maximum(flow, 0.0)
 
     on.loop(tables.sink.size, weigh)
@@ -288,7 +288,7 @@ def absorb(on: Evaluator, tables: Tables, lost: Real, change: Vector) -> None:
 
     def grow(i: Integer) -> None:
         sink = tables.sink[i]
-        at = nodes + 2 + sink.maker
+        at = nodes + TOTALS + sink.maker
 
         def more() -> None:
             heat = share * on.maximum(change[at], 0.0)
@@ -317,12 +317,12 @@ def warm(on: Evaluator, tables: Tables, before: Vector, heats: Vector) -> None:
 def hold(on: Evaluator, tables: Tables, change: Vector, low: Vector, high: Vector) -> None:
     """Put the flows of a part of a step between those of a shorter part and those of the whole, and heats with them.
 
-    So heat does not fall from instant to instant within a step. All are changes of (heats, heat, work, flows).
+    So heat does not fall from instant to instant within a step. All are changes of (heats, totals, flows).
     """
     nodes = tables.node.size
 
     def clamped(maker: Integer) -> Real:
-        at = nodes + 2 + maker
+        at = nodes + TOTALS + maker
         least, most = on.minimum(low[at], high[at]), on.maximum(low[at], high[at])
         kept = on.minimum(on.maximum(change[at], least), most)
         moved = kept - change[at]

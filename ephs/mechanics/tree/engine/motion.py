@@ -9,7 +9,7 @@ from ephs.mechanics.tree.engine.balance import correct, measure, stored_energies
 from ephs.mechanics.tree.engine.forces import act
 from ephs.mechanics.tree.engine.heats import StageRates, absorb, count, entropies, heat_rates, hold, lawless, warm
 from ephs.mechanics.tree.engine.shutting import close
-from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.acting import TOTALS, Tables, Work
 from ephs.mechanics.tree.sweeps.expanding import About
 from ephs.semantics.linear.dense import clear, subtract
 from ephs.semantics.spaces.rank import GAP
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True, slots=True)
 class Mechanism(Motion):
-    """A mechanism in joint coordinates: y = (v, r, heats, heat, work, flows).
+    """A mechanism in joint coordinates: y = (v, r, heats, totals, flows), see `TOTALS`.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class Mechanism(Motion):
         self, on: Evaluator, q: Vector, r: Vector, rate: Vector, s_rate: Vector, made: Vector, totals: Vector,
         drags: "Drags | None" = None,
     ) -> Integer:  # fmt: skip
-        """Write ṙ, ṡ, what each component makes, and the powers of friction and of what drives; return a status.
+        """Write ṙ, ṡ, what each component makes, and the rates of the totals; return a status.
 
         With ``drags`` there is no friction: its resistances go there."""
         w, own, status = self.work, self.tables.own[0], on.counter(0)
@@ -195,12 +195,12 @@ class Mechanism(Motion):
         at, status = nv + n + ns, on.counter(0)
         clear(on, out.part(at, out.size - at))
         self.advance(on, base, y, q)
-        r, made = y.part(nv, n), out.part(at + 2, out.size - (at + 2))
+        r, made = y.part(nv, n), out.part(at + TOTALS, out.size - (at + TOTALS))
         s_rate = out.part(nv + n, ns)
         status.value = entropies(on, e, w, y.part(nv + n, ns))
 
         def accelerate() -> None:
-            status.value = self.accelerate(on, q, r, out.part(nv, n), s_rate, made, out.part(at, 2), drags)
+            status.value = self.accelerate(on, q, r, out.part(nv, n), s_rate, made, out.part(at, TOTALS), drags)
 
         on.when(on.same(status.value, 0), accelerate)
         if drags is None:
@@ -210,7 +210,8 @@ class Mechanism(Motion):
     def flow(self, on: Evaluator, y: Vector, r: Vector, out: Vector) -> None:
         """Write v̇ of the rates r, and turn rates of entropies into those of energies, where y has been evaluated."""
         at, ns = self.summed, self.tables.node.size
-        heat_rates(on, self.tables, self.work, out.part(at, ns), out.part(at + (ns + 2), out.size - (at + ns + 2)))
+        first = at + (ns + TOTALS)
+        heat_rates(on, self.tables, self.work, out.part(at, ns), out.part(first, out.size - first))
         self.velocities(on, y, r, out)
 
     def advance(self, on: Evaluator, base: Vector, v: Vector, q: Vector) -> None:
@@ -256,7 +257,7 @@ class Mechanism(Motion):
 
     def absorb(self, on: Evaluator, anchor: Real, y0: Vector, q: Vector, y1: Vector, change: Vector) -> None:
         nv, n, at, nodes = self.increments, self.freedoms, self.summed, self.tables.node.size
-        energies, before = on.scratch(3), y0.part(at + nodes, 2)
+        energies, before = on.scratch(3), y0.part(at + nodes, TOTALS)
 
         def known() -> None:
             stored_energies(on, self, q, y1.part(nv, n), y1.part(at, nodes), energies)
@@ -332,7 +333,7 @@ class Mechanism(Motion):
         subtract(on, -1.0, self._resolve(on), change)
 
     def least(self, on: Evaluator, change: Vector) -> Real:
-        first, least = self.tables.node.size + 2, on.variable(0.0)
+        first, least = self.tables.node.size + TOTALS, on.variable(0.0)
 
         def each_entry(j: Integer) -> None:
             least.value = on.select(on.same(j, first), change[j], on.minimum(change[j], least.value))

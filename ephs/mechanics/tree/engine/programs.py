@@ -8,7 +8,7 @@ from ephs.mechanics.tree.engine.balance import measure, stored_energies
 from ephs.mechanics.tree.engine.drags import Drags
 from ephs.mechanics.tree.engine.motion import Mechanism
 from ephs.mechanics.tree.engine.shutting import close
-from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.acting import TOTALS, Tables, Work
 from ephs.semantics.stage import (
     Entry,
     Evaluator,
@@ -109,7 +109,7 @@ def motion_program(*, looped: bool) -> Program:
     def evaluations(
         on: Evaluator, motion: Mechanism, q: Matrix, r: Matrix, out: Vector, rates: Matrix, repeats: Integer
     ) -> None:
-        totals = out.part(0, 2)
+        totals = out.part(0, TOTALS)
 
         def each_row(k: Integer) -> None:
             motion.accelerate(on, q.row(k), r.row(k), rates.row(k), out, out, totals)

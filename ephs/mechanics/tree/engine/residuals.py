@@ -20,7 +20,7 @@ from ephs.mechanics.road.programs import Sweeps
 from ephs.mechanics.road.records import Tree
 from ephs.mechanics.road.tree import outward, spread
 from ephs.mechanics.tree.engine.forces import act
-from ephs.mechanics.tree.sweeps.acting import Tables, Work
+from ephs.mechanics.tree.sweeps.acting import TOTALS, Tables, Work
 from ephs.mechanics.tree.sweeps.expanding import ABOUT, About
 from ephs.semantics.linear.dense import cholesky, clear
 from ephs.semantics.stage import (
@@ -206,7 +206,8 @@ def _act(
 ) -> None:  # fmt: skip
     """Take what acts off the links' loads and the forces on the rates, which are set; heat: ṡ."""
     _clear(on, work)
-    act(on, tables, work, q, r, heat, work.idle.part(2, work.idle.size - 2), work.idle.part(0, 2), None, about)
+    totals, made = work.idle.part(0, TOTALS), work.idle.part(TOTALS, work.idle.size - TOTALS)
+    act(on, tables, work, q, r, heat, made, totals, None, about)
 
     def take(j: Integer) -> None:
         force[j] = -work.force[j]
@@ -241,5 +242,6 @@ def point_program() -> Program:
         clear(on, made)
         return act(on, tables, work, q, r, work.idle.part(0, work.entropy.size), made, totals, about, None)
 
-    kinds: dict[str, Any] = {**MOVING, **ABOUT, "q": vector(), "r": vector(), "made": vector(), "totals": vector(2)}
+    totals = vector(TOTALS)
+    kinds: dict[str, Any] = {**MOVING, **ABOUT, "q": vector(), "r": vector(), "made": vector(), "totals": totals}
     return Program("point", about=Entry.bundled(evaluate, kinds, *_BUNDLES))

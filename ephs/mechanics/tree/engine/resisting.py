@@ -11,7 +11,7 @@ from ephs.mechanics.road.records import LinkConstants
 from ephs.mechanics.road.tree import Inertia, shift
 from ephs.mechanics.tree.engine.held import among, pull
 from ephs.mechanics.tree.engine.motion import Mechanism
-from ephs.mechanics.tree.sweeps.acting import ON_TREE
+from ephs.mechanics.tree.sweeps.acting import ON_TREE, TOTALS
 from ephs.semantics.linear.dense import cholesky, copy
 from ephs.semantics.linear.skyline import skyline_solve, skyline_times
 from ephs.semantics.spaces import vectors
@@ -276,7 +276,8 @@ def _heat(on: Evaluator, drags: "Drags", motion: Mechanism, out: Vector) -> None
     """Add what losses make at the rates that are reached: rates of entropies, entropies, the power of friction."""
     tables, w, at = motion.tables, motion.work, motion.summed
     ns, z = tables.node.size, drags.reached
-    s_rate, made, power = out.part(at, ns), out.part(at + (ns + 2), out.size - (at + ns + 2)), on.variable(0.0)
+    first, power = at + (ns + TOTALS), on.variable(0.0)
+    s_rate, made = out.part(at, ns), out.part(first, out.size - first)
 
     def move(j: Integer) -> None:
         above, rate = drags.above[j], drags.speed[j]

@@ -10,6 +10,7 @@ from ephs.mechanics.tree.engine.heats import ROUNDING
 from ephs.mechanics.tree.engine.states import STATES, StorageRow
 from ephs.mechanics.tree.engine.tables import table_of
 from ephs.mechanics.tree.equations.paper import PaperStates
+from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.linear.sums import grown
 from ephs.semantics.stage import Table
@@ -51,6 +52,7 @@ class Booking:
         end: "ReducedState",
         flows: Array,
         work: float,
+        passed: float = 0.0,
         *,
         missed: Array | None = None,
         stages: tuple[Array, Array, Array] | None = None,
@@ -66,8 +68,8 @@ class Booking:
         flows, missed
             (makers,) in J over the step, and by how much their quadrature may be off; None where it finds no more heat
             than is lost.
-        work
-            By what drives, in J over the step.
+        work, passed
+            By what drives, and heat to entropies that are not booked, in J over the step.
         stages
             As of `Heats.taken`.
         between
@@ -85,13 +87,14 @@ class Booking:
         flows = heats.booked(flows, missed, self._lost(start, end, flows, work))
         change, made = heats.taken(start.heats, flows, stages)
         if between is not None:
-            made = held_between(made, *(each.totals[2:] - start.totals[2:] for each in between))
+            made = held_between(made, *(each.totals[TOTALS:] - start.totals[TOTALS:] for each in between))
         if refused:
             self._refuse(made, flows, start, end)
         heat = float(flows[heats.frictions].sum() + flows @ heats.carried)
         change = np.where(heats.plain, end.heats - start.heats, change)
         sums, at = np.concatenate([start.heats, start.totals]), start.heats.size
-        sums, carry = grown(sums, start.account[eq.accounts.own :], np.concatenate([change, [heat, work], made]))
+        added = np.concatenate([change, [heat, work, passed], made])
+        sums, carry = grown(sums, start.account[eq.accounts.own :], added)
         account = np.concatenate([start.account[: eq.accounts.own], carry])
         return replace(end, heats=sums[:at], totals=sums[at:], account=account)
 
@@ -139,11 +142,11 @@ class Booking:
         eq = self._equations
         r, heats, totals = np.split(rest, [eq.n, eq.n + eq.ns], axis=1)
         x, energies = self.energies(q, r, heats)
-        heat, work = totals[:, 0], eq.led.work(times, energies, totals)
+        heat, work = totals[:, 0] + totals[:, 2], eq.led.work(times, energies, totals)
         eq.accounts.noted.note(times[times.size - len(put) :], put)
         energies[:, self._makers] = 0.0
-        np.add.at(energies.T, self._makers, totals[:, 2:].T)
-        ledgers = np.stack([heat, work, work, totals[:, 2:].sum(axis=1), least], axis=1)
+        np.add.at(energies.T, self._makers, totals[:, TOTALS:].T)
+        ledgers = np.stack([heat, work, work, totals[:, TOTALS:].sum(axis=1), least], axis=1)
         return RunRecord(times, x, energies, ledgers)
 
     def energies(self, q: Array, r: Array, heats: Array) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from ephs.mechanics.tree.equations.given import Given
 from ephs.mechanics.tree.equations.residual import Residual
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
+from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.operad import Path
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.descriptor.kernel_table import TEMPERATURE
@@ -141,10 +142,11 @@ class Dense:
         """The residual at the accelerations and multipliers that `forward` found."""
         return self.residual.at(self.rate, self.multiplier[self._driven :])
 
-    def work(self) -> float:
-        """Power in W of what drives, prescribed joints among it, where `forward` has been."""
-        prescribed = self.residual.arrays["r"][self.reduced.tables.driven == 1]
-        return self.residual.power + float(self.multiplier[: self._driven] @ prescribed)
+    def totals(self) -> Array:
+        """Rates in W of `TOTALS`, where `forward` has been."""
+        prescribed, found = self.residual.arrays["r"][self.reduced.tables.driven == 1], self.residual.powers
+        found[1] += float(self.multiplier[: self._driven] @ prescribed)
+        return found
 
     def rates(self, q: Array, y: Array, given: Given, heats: Heats, out: Array) -> tuple[int, int]:
         """Rates of the tree, of the entropies and of the totals, as the engine's; (status, component)."""
@@ -158,7 +160,7 @@ class Dense:
         if status:
             return status, component
         out[r], out[s] = self.rate, self.settle()[found.entropy_rates] * heats.temperatures(y[s])
-        out[at], out[at + 1], out[at + 2 :] = found.heat, self.work(), heats.flows(y[s], found.made)
+        out[at : at + TOTALS], out[at + TOTALS :] = self.totals(), heats.flows(y[s], found.made)
         return 0, 0
 
     # ---- loops -------------------------------------------------------------------------------------------------

@@ -26,6 +26,7 @@ from ephs.mechanics.tree.finding.layout import Layout
 from ephs.mechanics.tree.finding.mechanism import reduce_system
 from ephs.mechanics.tree.finding.naming import tolerances, within
 from ephs.mechanics.tree.finding.tables import SPRING
+from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.operad.collector import paused_collector
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.codes import VECTOR
@@ -54,6 +55,8 @@ class ReducedEquations:
 
     Attributes
     ----------
+    summed
+        Number of totals.
     careful
         Whether the loops were closed last at constraints that nearly repeat each other.
     """
@@ -69,7 +72,8 @@ class ReducedEquations:
         self.careful = self._factored = False
         self._closed_at = np.zeros(0), np.zeros(0)
         self.nv, self.n, self.ns = int(t.dim[self._moving].sum()), reduced.freedoms, len(reduced.entropies)
-        self.size = self.nv + self.n + self.ns + 2 + len(reduced.made)
+        self.summed = TOTALS + len(reduced.made)
+        self.size = self.nv + self.n + self.ns + self.summed
         self.prescribed = Prescribed(reduced)
         groups = [i for i in self._moving if t.code[i] != VECTOR]
         self.curved = np.array([int(t.r_at[i]) + j for i in groups for j in range(int(t.dim[i]))], dtype=int)
@@ -113,7 +117,7 @@ class ReducedEquations:
         return self.engine.advance(q, v)
 
     def rates(self, t: float, base: Array, y: Array) -> Array:
-        """ẏ of y = (v, r, heats, totals), of the totals heat, work and flows, at q = base·exp(v).
+        """ẏ of y = (v, r, heats, totals), of the totals those of `TOTALS` and flows, at q = base·exp(v).
 
         Raises
         ------
@@ -270,8 +274,7 @@ class ReducedEquations:
         if self.timed and not self.constant:
             self.given.place(t, NO_STATE)
         elif not self.constant:
-            totals = np.zeros(2 + len(self.reduced.made))
-            self.given.place(t, self.states(ReducedState(t, q, r, heats, totals)))
+            self.given.place(t, self.states(ReducedState(t, q, r, heats, np.zeros(self.summed))))
 
     # ---- a step ------------------------------------------------------------------------------------------------
 
@@ -340,7 +343,7 @@ class ReducedEquations:
 
     def least(self, start: ReducedState, end: ReducedState) -> float:
         """The least entropy that a component made between two states, in J/K."""
-        made = end.totals[2:] - start.totals[2:]
+        made = end.totals[TOTALS:] - start.totals[TOTALS:]
         return float(made.min()) if made.size else 0.0
 
     def stats(self) -> dict[str, Any]:
@@ -375,7 +378,7 @@ class ReducedEquations:
             The initial states contradict the joints.
         """
         q, r, s = self._paper.initial()
-        state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(2 + len(self.reduced.made))))
+        state = self.closed(ReducedState(t, q, r, self.heats.energies(s), np.zeros(self.summed)))
         self.led.start(lambda: self.row(state).energies)
         state = self.accounts.opened(state)
         y = np.concatenate([np.zeros(self.nv), state.r, state.heats, state.totals])

@@ -14,6 +14,7 @@ from ephs.mechanics.tree.engine.build import whole_of
 from ephs.mechanics.tree.engine.residuals import ACTIVE, MOVING, point_program, residuals
 from ephs.mechanics.tree.finding.mechanism import Reduced
 from ephs.mechanics.tree.finding.tables import CUT
+from ephs.mechanics.tree.sweeps.acting import TOTALS
 from ephs.mechanics.tree.sweeps.expanding import memory_about
 from ephs.semantics.bundles.bundle import Array
 from ephs.semantics.spaces.decompositions import symmetric_eigen
@@ -131,7 +132,7 @@ class Residual:
         self.cut_changes = slice(self.cut_rates.stop, self.cut_rates.stop + c)
         self.entropy_rates = slice(self.cut_changes.stop, self.cut_changes.stop + self.ns)
         n, m, q, net = self.n, self.m, np.zeros(reduced.coordinates), reduced.attaching.network
-        self.made, self._totals = np.zeros(len(reduced.made)), np.zeros(2)
+        self.made, self._totals = np.zeros(len(reduced.made)), np.zeros(TOTALS)
         self.arrays: dict[str, Any] = {
             **whole.tables, **{name: np.zeros(shape) for name, shape in whole.shapes.items()},
             "work": np.zeros((records.size + 1) * self.program.width), "fault": np.zeros(1, dtype=np.int64),
@@ -320,14 +321,9 @@ class Residual:
         return self._slopes
 
     @property
-    def heat(self) -> float:
-        """Power in W of all friction, where `about` has been."""
-        return float(self._totals[0])
-
-    @property
-    def power(self) -> float:
-        """Power in W of what is given, forces on joints and wrenches on bodies, where `about` has been."""
-        return float(self._totals[1])
+    def powers(self) -> Array:
+        """Rates in W of `TOTALS`, without the work of prescribed motions, where `about` has been."""
+        return self._totals.copy()
 
     def follow(self, x0: Array, x: Array, h: float) -> Array:
         """States of what is attached in the middle of a step of h seconds from x0: a step of Newton's method from x,

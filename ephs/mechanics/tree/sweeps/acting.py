@@ -29,6 +29,9 @@ ABOVE, BEYOND, APART, ALONG = 1, 2, 3, 4
 """End of a spring's action: above a plane z = reach of its first frame, beyond a distance, apart boxes or segments."""
 ON_TREE, ON_CUT, ON_BODIES = range(3)
 """Kinds of edges in which something acts: a joint of the tree, a cut one, a spring between bodies."""
+TOTALS = 3
+"""Sums over a run before the flows: heat that stores take up as energy, work, heat that components of a network pass to
+other entropies, as those of gases; in J."""
 
 
 def _sweep(name: str) -> Any:
@@ -323,9 +326,7 @@ class Work:
     kept, released, found, torque, sums
         Of islands: momenta that steps keep, zeros, what `ephs.mechanics.road.rigid` writes, and its memory.
     still, idle, spare
-        Zeros for given forces on all joints; memory for (heats, heat, work, flows).
-    totals
-        Powers of friction and of what drives.
+        Zeros for given forces on all joints; memory for (heats, totals, flows).
     answer, fault
         A number that a function writes; the component or degree of freedom that an evaluation failed at.
     """

@@ -26,6 +26,8 @@ from ephs.semantics.stage import (
 from ephs.semantics.stage.memory import ArrayReals
 
 NO_REALS: Final = ArrayReals(np.zeros(0))
+ROW: Final = 4
+"""Integers of a row of a network."""
 
 
 class Stores(Record):
@@ -82,8 +84,8 @@ class Net:
         Numbers of rates, temperatures, prescribed efforts, states, unknown efforts and multipliers, and of what is
         stored before its states; the component that is named where efforts do not follow.
     row
-        (rows, 3): first term, terms, and the place of the entropy that the row's flow makes or −1. Rows of N, then
-        those of flows by efforts.
+        (rows, 4): first term, terms, the place of the entropy that the row's flow makes or −1, and 1 where a store of
+        heat takes it up as energy. Rows of N, then those of flows by efforts.
     term, weight
         Places in z, and factors.
     read
@@ -107,7 +109,7 @@ class Net:
     turned, changed, moved
         (z,), (z,) and (vary,): changes of efforts, of flows, and of what is read.
     power
-        (2,): what is given, in W; what is stored, in J.
+        (3,): what is given, in W; what is stored, in J; heat that goes to entropies of other states, in W.
     outer
         (states,) energy of the environment by a state in it, as −π₀ of a volume; 0 of others.
     fault
@@ -184,28 +186,28 @@ class Net:
 
     def _sum(self, on: Evaluator, row: Integer, z: Vector, *, sizes: bool = False) -> Real:
         """A row of N, or of flows by efforts, times z; or the sum of the terms' sizes."""
-        total, first = on.variable(0.0), self.row[3 * row]
+        total, first = on.variable(0.0), self.row[ROW * row]
 
         def add(k: Integer) -> None:
             term = self.weight[first + k] * z[self.term[first + k]]
             total.value = total.value + (on.absolute(term) if sizes else term)
 
-        on.loop(self.row[3 * row + 1], add)
+        on.loop(self.row[ROW * row + 1], add)
         return total.value
 
     def _spread(self, on: Evaluator, row: Integer, value: Real, out: Vector) -> None:
         """Add a row of Nᵀ times a value."""
-        first = self.row[3 * row]
+        first = self.row[ROW * row]
 
         def add(k: Integer) -> None:
             at = self.term[first + k]
             out[at] = out[at] + self.weight[first + k] * value
 
-        on.loop(self.row[3 * row + 1], add)
+        on.loop(self.row[ROW * row + 1], add)
 
     def _across(self, on: Evaluator, z: Vector, out: Vector) -> None:
         """Write the flows by efforts of the constant relations."""
-        first = self.row.size // 3 - z.size
+        first = self.row.size // ROW - z.size
 
         def each_entry(k: Integer) -> None:
             out[k] = self._sum(on, first + k, z)
@@ -283,12 +285,13 @@ class Net:
         on.when(on.both(on.same(status.value, 0), on.negate(on.same(found, 0))), blame)
 
     def flows(self, on: Evaluator, q: Vector, s: Vector, made: Vector) -> Integer:
-        """Write flows at the efforts that are there, and the entropies that components make; return a status."""
-        status, size = on.counter(0), self.effort.size
+        """Write flows at the efforts that are there, entropies that components make, and heat; return a status."""
+        status, size, around = on.counter(0), self.effort.size, self.scal[1]
+        self.power[2] = 0.0
         self._across(on, self.effort, self.flow)
 
         def inject(k: Integer) -> None:
-            flow, row = self.given[self.head[2] + k], self.row.size // 3 - size + k
+            flow, row = self.given[self.head[2] + k], self.row.size // ROW - size + k
             self.gross[k] = self._sum(on, row, self.effort, sizes=True) + on.absolute(flow)
             self.flow[k] = self.flow[k] - flow
 
@@ -311,8 +314,10 @@ class Net:
                 row = it.entry + j
                 self._spread(on, row, self.f[j], self.flow)
                 on.when(self.head[4] > 0, lambda: self._measure(on, row, self.f[j], kept.part(j * width, rows)))
-                place = self.row[3 * row + 2]
+                place, booked = self.row[ROW * row + 2], self.row[ROW * row + 3]
                 on.when(place >= 0, lambda: write_entry(made, place, -self.f[j]))
+                passes = on.both(place >= 0, on.same(booked, 0))
+                on.when(passes, lambda: write_entry(self.power, 2, self.power[2] - (self.e[j] + around) * self.f[j]))
 
             on.loop(rows, scatter)
             self.failed(on, status, found, it.component)
@@ -323,7 +328,7 @@ class Net:
 
     def _measure(self, on: Evaluator, row: Integer, flow: Real, slopes: Vector) -> None:
         """Add the size of a flow to what balances are measured by."""
-        total, first = on.variable(on.absolute(flow)), self.row[3 * row]
+        total, first = on.variable(on.absolute(flow)), self.row[ROW * row]
 
         def term(k: Integer) -> None:
             total.value = total.value + on.absolute(slopes[k] * self.e[k])
@@ -334,7 +339,7 @@ class Net:
             at = self.term[first + k]
             self.gross[at] = self.gross[at] + on.absolute(self.weight[first + k]) * total.value
 
-        on.loop(self.row[3 * row + 1], add)
+        on.loop(self.row[ROW * row + 1], add)
 
     def tangent(self, on: Evaluator) -> None:
         """Write the changes of flows by those of efforts and of what is read."""
