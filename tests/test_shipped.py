@@ -22,7 +22,7 @@ from ephs.semantics.stage.objects import FITTING, emitted, fitting
 from ephs.semantics.stage.programs import _staged
 from ephs.shipped import programs
 from tests.scenes import equations_of, shipped
-from tests.semantics.linear.test_rows import Solved, problems
+from tests.semantics.linear.test_rows import problems, solved
 from tests.semantics.stage.arm import Arm
 from tests.semantics.stage.test_elementary import EDGES
 
@@ -90,7 +90,7 @@ def elementary(run: Heard, x: float, y: float) -> None:
 def constraint_rows(run: Heard, problem: Any) -> None:
     """Rank, correction and multipliers of drawn rows, and a system with their mass matrix."""
     row, mass, target, _ = problem
-    Solved(run, row, mass, target)
+    solved(row, mass, target, lambda entry, *arguments: (run[entry](*arguments), *arguments))
     factor, x = np.zeros(mass.shape), np.ones(len(mass))
     run["cholesky"](mass, factor)
     run["solve"](factor, x)

@@ -379,7 +379,7 @@ def test_what_cannot_be_recorded_names_its_line(function, why):
 @pytest.mark.parametrize("power", [0.1, 0.5, 0.9, 1.0, 1.5])
 def test_slopes_of_friction_that_grows_as_a_power_of_the_speed_are_finite_at_rest(power):
     """|v|^a v has the slope (1 + a) |v|^a, also at rest, where slopes of M are infinite."""
-    made = ephs.irreversible(PS, lambda p, s: abs(p) ** power * friction_matrix(p, s))
+    made = drag(lambda p, s: abs(p) ** power)()
     relation, slopes = made.kernel.relation, {}
     for speed in (0.0, 1e-200):
         a = {name: np.zeros(size) for name, size in sizes(relation).items()}

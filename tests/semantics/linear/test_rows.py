@@ -15,8 +15,11 @@ def run(entry, *arguments):
     return run_both(row_program(), entry, *arguments)
 
 
-def solved(row, mass, target):
-    """Rank, chosen and scaled rows, least correction and multipliers of rows, a mass matrix and targets."""
+def solved(row, mass, target, run=run):
+    """Rank, chosen and scaled rows, least correction and multipliers of rows, a mass matrix and targets.
+
+    ``run`` gives the result of an entry function, and its arguments as they are left.
+    """
     m, n = row.shape
     failed, _, factor = run("cholesky", mass, np.zeros((n, n)))
     assert failed == 0
