@@ -10,16 +10,16 @@ from tests.rooms import ROOT, SOURCES, size_of
 CEILINGS = {
     "ephs": 1_500,
     "ephs/cli": 12_600,
-    "ephs/exporting": 13_400,
-    "ephs/mechanics": 422_300,
-    "ephs/modelica": 11_300,
+    "ephs/exporting": 13_600,
+    "ephs/mechanics": 422_700,
+    "ephs/modelica": 11_400,
     "ephs/operad": 30_600,
-    "ephs/semantics": 192_400,
+    "ephs/semantics": 195_900,
     "ephs/show": 64_400,
-    "ephs/solve": 125_600,
+    "ephs/solve": 126_100,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 562_900,
+    "tests": 564_900,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000

@@ -13,6 +13,7 @@ from ephs.mechanics.methods import radau as implicit
 from ephs.mechanics.methods.variational import Variational
 from ephs.solve.equations.heats import Heats, held_between
 from ephs.solve.methods.collocation import radau
+from ephs.solve.methods.newton import STALLED
 from ephs.solve.methods.paced import Paced
 from examples.failing import scene
 from tests.numerics import EPS, largest
@@ -155,10 +156,11 @@ def test_the_order_of_radau_is_kept(stages, until, steps, monkeypatch):
 @pytest.mark.parametrize("capacity", [1e-2, 1e-3])
 @pytest.mark.parametrize(("friction", "step"), [(1e6, 0.002), (100.0, 0.05), (20.0, 0.05)])
 def test_natural_solves_for_small_capacities(friction, step, capacity):
+    """Energies are those of equations that are solved to the residual at which Newton's method stops."""
     ledgers = run(brake(friction, capacity), 20 * step, "natural", step).ledgers
     lost = ledgers.kinetic[0] - ledgers.kinetic[-1]
-    assert ledgers.thermal[-1] == pytest.approx(lost, rel=1e-12)
-    assert ledgers.made[-1] == pytest.approx(capacity * math.log1p(lost / (capacity * 300.0)), rel=1e-11)
+    assert ledgers.thermal[-1] == pytest.approx(lost, rel=STALLED)
+    assert ledgers.made[-1] == pytest.approx(capacity * math.log1p(lost / (capacity * 300.0)), rel=STALLED)
     assert np.diff(ledgers.made).min() >= 0.0
 
 
