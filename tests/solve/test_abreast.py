@@ -176,6 +176,7 @@ def test_an_interrupted_run_of_parts_keeps_what_all_have(monkeypatch):
         {"save_at": None},
         {"events": [lambda t, state: t - 0.1]},
         {"method": "natural", "step": 1e-3},
+        {"rtol": 1e-3},
         {"journal": "run.ephs"},
         {"inputs": {"b2": {"flow": lambda t, state: state["coil7.b"]}}},
         {"inputs": {"b2": {"flow": ephs.Sampled(0.01, lambda t, state: state["coil7.b"])}}},

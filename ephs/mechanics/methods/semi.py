@@ -75,7 +75,8 @@ class Semi:
     def __init__(self, equations: ReducedEquations) -> None:
         self._equations = equations
         self.onsager = once(equations.reduced, "programs of friction", lambda: _programs(equations))
-        self._made: tuple[Engine, dict[str, Any], Bound] | None = None
+        self._made: tuple[Engine, dict[str, Any]] | None = None
+        self._stage: tuple[Engine, Bound] | None = None
         coordinates, size = equations.engine.sizes
         self._base, self._q, self._steering = np.zeros(coordinates), np.zeros(coordinates), MarchControl.table(1)
         self._start, self._y, self._k = np.zeros(size), np.zeros(size), np.zeros((len(ARRAYS["a"]), size))
@@ -83,18 +84,21 @@ class Semi:
     @property
     def memory(self) -> dict[str, Any]:
         """Memory of the stages, by the names of `ephs.mechanics.tree.engine.drags.Drags`."""
-        return self._of_engine()[1]
-
-    def _of_engine(self) -> tuple[Engine, dict[str, Any], Bound]:
-        """The present engine, which a start may make anew, with memory, and its stages."""
-        eq, engine = self._equations, self._equations.engine
+        engine = self._equations.engine  # which a start may make anew
         if self._made is None or self._made[0] is not engine:
+            eq = self._equations
             rows, parts = len(engine.array("value")), _parts(eq.reduced)
             sizes = engine.tables, parts, engine.sizes[1], rows, eq.driven.tolist()
-            memory = memory_of(*sizes, pushed=eq.given.pushed) | {"scheme": SCHEME, "again": AGAIN}
-            given = ARRAYS, self._steering, self._base, self._start, self._k, memory, self._y, self._q
-            self._made = engine, memory, engine.lagged("stage", self.onsager, *given, 0, 0.0)
-        return self._made
+            self._made = engine, memory_of(*sizes, pushed=eq.given.pushed) | {"scheme": SCHEME, "again": AGAIN}
+        return self._made[1]
+
+    def _bound_stage(self) -> Bound:
+        """One stage by the present engine."""
+        engine = self._equations.engine
+        if self._stage is None or self._stage[0] is not engine:
+            given = ARRAYS, self._steering, self._base, self._start, self._k, self.memory, self._y, self._q
+            self._stage = engine, engine.lagged("stage", self.onsager, *given, 0, 0.0)
+        return self._stage[1]
 
     def stages(
         self, state: ReducedState, scheme: Mapping[str, Array], c: Array, h: float, y0: Array, k: Array, y1: Array
@@ -104,7 +108,7 @@ class Semi:
         Returns y at the last stage. Stages are explicit where constraints nearly repeat each other. See
         `ReducedEquations.stages`.
         """
-        (engine, _, stage), eq, before = self._of_engine(), self._equations, y0
+        eq, stage, before = self._equations, self._bound_stage(), y0
 
         def rates_at(part: float, y: Array) -> Array:
             return eq.rates(state.t + part * h, state.q, y)
@@ -121,7 +125,7 @@ class Semi:
             if status == Status.DEPENDENT:
                 before, y1[:] = evaluated(rates_at, scheme["a"], c, h, y0, k)
                 return before
-            eq.refuse(status, engine.failed)
+            eq.refuse(status, eq.engine.failed)
         k[:], y1[:] = self._k, self._y
         return before
 

@@ -30,6 +30,8 @@ from ephs.solve.running.watching import Progress
 
 CLOSE = 1e-4
 """Tolerance of the steps of an independent run."""
+FINE = 3e-4
+"""Tolerances above this take so few steps that each part's own start costs more: measured of balls on a floor."""
 
 
 @final
@@ -70,10 +72,11 @@ class Course:
     def _parts(self, breakpoints: Breakpoints, request: RunRequest) -> list[PartRun]:
         """Runs of the independent parts; none where what is asked for, or what inputs read, is of the whole.
 
-        The steps of a run are those of its whole; constant ones, too, and impacts are events.
+        All steps of a run are kept of its whole, constant ones are its own, and impacts are events.
         """
-        problem, d = self.problem, self.problem.descriptor
-        whole = request.save_at is None or request.events or request.journal or self.control.step is not None
+        problem, d, control = self.problem, self.problem.descriptor, self.control
+        whole = request.save_at is None or request.events or request.journal
+        whole = whole or control.step is not None or control.tolerance > FINE
         if whole or not problem.timed or breakpoints.sampled or d.strikes is not None:
             return []
         factors = factors_of(d, problem.prescribed, *([is_posed] if problem.mechanical else []))
@@ -85,7 +88,7 @@ class Course:
             own, known = _restricted(problem, factor.descriptor), breakpoints.again()
             seen = known.of(own)
             stepper = self._stepper(seen)
-            run = RunLoop(seen, self.start, self.end, *stepper, self.control, known, asked, begin)
+            run = RunLoop(seen, self.start, self.end, *stepper, control, known, asked, begin)
             parts.append(PartRun(factor, run))
         return parts
 
