@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks import (
+    abreast,
     accuracy,
     audit,
     balance,
@@ -73,6 +74,7 @@ TABLES: dict[str, Callable[[Path | None], str | Report]] = {
     "environment": lambda _: environment.report(),
     "parts": lambda _: parts.report(),
     "rigid": rigid.report,
+    "abreast": lambda _: abreast.report(),
     "choice": lambda _: choice.report(),
     "rows": lambda _: rows.report(),
     "traced": lambda _: traced.table(),

@@ -9,6 +9,7 @@ import ephs
 from benchmarks.touching import bouncing
 from ephs import Path, Pattern
 from ephs import library as lib
+from ephs.mechanics.scene.rescaled import rescaled
 from ephs.semantics.descriptor.product import factors_of
 from tests.mechanics.drawn_scenes import drawn, toml
 from tests.numerics import EPS
@@ -68,6 +69,30 @@ def test_a_run_of_parts_is_that_of_the_whole(name):
     assert parts.stats["independent_parts"] == 2 and np.array_equal(parts.t, TIMES)
     assert apart(parts, one) < SAME
     assert parts.energy_error.max() < 1e-12 and not parts.audit.findings
+
+
+@pytest.mark.parametrize("scale", [2.0**-12, 2.0**12])
+def test_parts_far_from_metres_and_seconds_are_those_of_the_whole(scale):
+    """Runs are in units of the mechanism then."""
+    model = rescaled(scene_of_text(TOPS.format(slow=[0.0, 0.0, 3.0], fast=[0.0, 0.0, 9.0])), scale, 1.0, scale)
+    times, options = scale * TIMES, {"rtol": 1e-9, "atol": 1e-12}
+    parts = ephs.simulate(model, times[-1], save_at=times, **options)
+    one = ephs.simulate(model, times[-1], save_at=times, events=[lambda t, state: 1.0], **options)
+    assert parts.stats["independent_parts"] == 2 and np.array_equal(parts.t, one.t)
+    for path, values in one.states.items():
+        assert np.allclose(parts[path], values, rtol=SAME, atol=SAME * np.abs(values).max(initial=0.0))
+
+
+def test_parts_run_backward_to_where_they_came_from():
+    tops = scene_of_text(TOPS.format(slow=[0.0, 0.1, 3.0], fast=[0.2, 0.0, 9.0]))
+    there = ephs.simulate(tops, 1.0, save_at=[0.5, 1.0], rtol=1e-11, atol=1e-13)
+    options = {"t0": 1.0, "save_at": [0.5, 0.0], "rtol": 1e-11, "atol": 1e-13}
+    back = ephs.simulate(tops.at(there, 1.0), 0.0, **options)
+    assert back.stats["independent_parts"] == 2
+    start = tops.system().state()
+    for path in back.states:
+        assert np.allclose(back[path][0], there[path][0], rtol=0.0, atol=SAME)
+        assert np.allclose(back[path][1], start[path], rtol=0.0, atol=SAME)
 
 
 def test_a_run_of_the_whole_has_the_states_and_ledgers_of_runs_of_its_parts_to_the_bit():
