@@ -19,7 +19,7 @@ CEILINGS = {
     "ephs/solve": 126_100,
     "ephs/templates": 200,
     "ephs/testing": 14_000,
-    "tests": 564_900,
+    "tests": 565_300,
 }
 """Room -> the most tokens, without comments, docstrings and layout."""
 SLACK = 1_000
