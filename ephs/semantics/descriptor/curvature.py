@@ -42,7 +42,7 @@ def turned(process: Reversible, x: Point, efforts: Array, rates: Array, referenc
 def _written(
     primitive: Storage | Reversible, x: Point, efforts: Array, k: int, reference: Reference | None
 ) -> tuple[Array, Array, Array]:
-    """What a relation writes into its arrays of efforts, flows and derivatives; nothing but NaN outside its domain."""
+    """Efforts, flows and derivatives of a relation; NaN outside of its domain."""
     given = reference or Reference()
     n, m = efforts.size, sum(manifold(primitive.interface[port].quantity.space).dim for port in primitive.reads)
     address, numbers, _callback = address_of(primitive, given)

@@ -82,7 +82,7 @@ def _factors(descriptor: Descriptor, prescribed: frozenset[Path], counts: Callab
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wires:
-    """What lies on which junction, and between what something passes.
+    """Wires between components and junctions, and the sets of components that exchange power or states.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class _Wires:
     holds
         (components,) whether each does nothing but prescribe efforts of others.
     label
-        (components,) equal for those between which something passes.
+        (components,) the number of the set of each.
     """
 
     owner: Index

@@ -1,4 +1,4 @@
-"""Which entries of a component's Jacobian can be other than zero, by the structure of its relation."""
+"""Sparsity of the Jacobian of a component, decided from the structure of its relation."""
 
 from functools import cache
 

@@ -39,7 +39,7 @@ class Ledgers:
     entropy
         Sum of all entropies, the environment's included, in J/K.
     heat, work, supplied
-        What friction turned into heat; energy and exergy supplied through outer ports: J since the start.
+        Heat of friction and damping; energy and exergy supplied through outer ports: J since the start.
     made, least
         Entropy made since the start; least production of a component in the step before: J/K.
     storages, makers, workers

@@ -1,6 +1,6 @@
 """Runs of the independent parts of a problem, abreast: each takes steps of its own, and the results are of the whole.
 
-What is read of parts that share nothing is read of each: their states side by side, the sums of their ledgers.
+The solution of the whole has the states of all parts and the sums of their ledgers.
 """
 
 import time
@@ -132,7 +132,7 @@ class _Abreast:
     def _whole(self, records: Sequence[RunRecord]) -> RunRecord:
         """Rows of the whole at those times to which all have come.
 
-        What is stored in several parts, as in the environment, is there the sum of what it has gained in each.
+        A state that several parts have, as the environment's entropy, is its start plus its changes in all of them.
         """
         count = min(len(record.t) for record in records)
         records = [record[:count] for record in records]
@@ -173,4 +173,4 @@ _COMBINED: Final[dict[str, Callable[[Sequence[Any]], Any]]] = {
     "least_production": min,
     "plain_defect": _defects,
 }
-"""How statistics of parts that are no sums are combined."""
+"""Functions that combine statistics of the parts; all others are summed or alike."""
