@@ -57,8 +57,8 @@ class March:
     ----------
     march
         The compiled function, bound to all that it reads and writes.
-    memory, steering
-        Its state and memory, and what chooses its steps.
+    memory, steering, control
+        Its state and memory, and what chooses its steps: a table of one record of `MarchControl`, and this record.
     """
 
     def __init__(
@@ -94,6 +94,7 @@ class March:
             "times": self.times, "carry": start.account[self.own :].copy(),
         }  # fmt: skip
         self.steering, self.account = MarchControl.table(1), RunAccount.table(1)
+        self.control: Any = self.steering[0]
         a: Any = self.account[0]
         (a.anchor, a.left, a.put, a.total), self.momenta[:] = np.split(start.account[: self.own], [OWN])
         a.chosen, a.begins = int(span.policy is not None), int(not (np.isnan(a.anchor) or start.totals.any()))
@@ -114,7 +115,7 @@ class March:
         c.exponent, c.share, c.damping, c.strict = method.exponent, method.share, DAMPING, STRICT
         c.saved = -1 if times is None else span.saved
         c.limit, c.grid = limit, 0.0 if policy else float(control.step or 0.0)
-        self._weighed[:] = *self._spent(), c.time
+        self._weighed[:] = self._tries, self._cost, c.time
 
     @property
     def explicit(self) -> bool:
@@ -125,11 +126,6 @@ class March:
     def momenta(self) -> Array:
         """The momenta that steps keep, where these read them."""
         return self.method.equations.engine.work["kept"][: self.own - OWN]
-
-    @property
-    def control(self) -> Any:
-        """Present state of the march, a record of `MarchControl`; its numbers are known here."""
-        return self.steering[0]
 
     def advance(self, steps: int) -> bool:
         """Take up to ``steps`` steps; whether the end is reached.
@@ -178,34 +174,36 @@ class March:
         within(eq.reduced, beyond.q, beyond.r, beyond.heats)
         raise SolveError(Outcome.RANGE, "", "heat, work or entropy made")
 
-    def _spent(self) -> tuple[int, int]:
-        """Steps tried so far, and their cost in evaluations."""
-        c, cost = self.control, 0 if self._kept is None else self._kept.cost
-        tries = int(c.steps + c.rejected)
-        return tries, int(c.evaluations) + cost + LAGGED * tries * self._lagged
+    @property
+    def _tries(self) -> int:
+        """Steps tried so far."""
+        return int(self.control.steps + self.control.rejected)
+
+    @property
+    def _cost(self) -> int:
+        """Cost of the steps tried so far, in evaluations."""
+        kept = 0 if self._kept is None else self._kept.cost
+        return int(self.control.evaluations) + kept + LAGGED * self._tries * self._lagged
 
     def _marched(self, steps: int) -> int:
         """Try up to ``steps`` steps, with new matrices where these are old, while no other method wins; the ending."""
-        most = self._spent()[0] + steps
+        contest, most = self._contest, self._tries + steps
         while True:
-            rest = most - self._spent()[0]
-            found = int(self.march(rest if self._contest is None else min(rest, self._unweighed(self._contest))))
+            tries = self._tries
+            weighed = most if contest is None else int(self._weighed[0]) + contest.length
+            found = int(self.march(max(0, min(most, weighed) - tries)))
             if found == Ending.STALE and self._kept is not None:
                 self._kept.renew(self.state)
-            elif found == Ending.PAUSED and self._contest is not None and not self._unweighed(self._contest):
-                (tries, cost), (_, known, since) = self._spent(), self._weighed
-                self._weighed[:] = tries, cost, self.control.time
-                home = self._contest.home
-                self.left = self._contest.weigh(float(cost - known), float(self.control.time - since))
-                self._tell(home)
-                if self.left or tries >= most:
-                    return found
-            else:
+                continue
+            tries = self._tries
+            if found != Ending.PAUSED or contest is None or tries < weighed:
                 return found
-
-    def _unweighed(self, contest: Contest) -> int:
-        """Tries until steps are weighed."""
-        return max(0, int(self._weighed[0]) + contest.length - self._spent()[0])
+            home, cost, (_, known, since) = contest.home, self._cost, self._weighed
+            self._weighed[:] = tries, cost, self.control.time
+            self.left = contest.weigh(float(cost - known), float(self.control.time - since))
+            self._tell(home)
+            if self.left or tries >= most:
+                return found
 
     def _yield(self, *, failing: bool) -> None:
         """Leave explicit steps that have no solution, or that stability holds back, to others."""
