@@ -5,12 +5,14 @@ import platform
 import sys
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
+from ephs.mechanics.runs.functions import function_digest
 from ephs.operad import Path
 from ephs.solve.posing.problem import Problem
 from ephs.solve.running.journal import Journal, Written
@@ -43,7 +45,7 @@ def journaled(
 def heading_of(problem: Problem, asked: Mapping[str, Any]) -> dict[str, Any]:
     """Heading of a journal: only the same run with the same versions resumes to the same numbers.
 
-    Functions among the options are told by their names; whether they do the same, nobody can know.
+    Functions are told by their names and by what they compute, see `function_digest`.
     """
     programs = {name: version(name) for name in _PROGRAMS}
     machine = f"{platform.system()} {platform.machine()}"
@@ -63,9 +65,10 @@ def _digest(problem: Problem) -> str:
     d = problem.descriptor
     parts: list[Any] = [problem.document(), problem.reference]
     for slot in d.components:
-        kernel = slot.primitive.kernel
-        numbers = (kernel.name, kernel.parameters) if kernel is not None else ()
-        parts.append((str(slot.path), slot.primitive.name, slot.primitive.parameters, numbers))
+        part, kernel = slot.primitive, slot.primitive.kernel
+        found = [getattr(part, each.name) for each in fields(part)] if kernel is None else []
+        numbers = (kernel.name, kernel.parameters) if kernel is not None else [_plain(f) for f in found if callable(f)]
+        parts.append((str(slot.path), part.name, part.parameters, numbers))
     for path, signal in sorted(problem.signals.items()):
         parts.append((str(path), _plain(signal.value), signal.effort))
     made = hashlib.blake2b(repr(parts).encode(), digest_size=16)
@@ -85,9 +88,14 @@ def _plain(value: Any) -> Any:
         return value.item()
     if value is None or isinstance(value, str | int | float | bool):
         return value
+    if isinstance(value, Path):
+        return str(value)
     if callable(value):
-        return f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', type(value).__name__)}"
-    return str(value) if isinstance(value, Path) else type(value).__name__
+        name = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', type(value).__name__)}"
+        return f"{name} {function_digest(value)}"
+    if is_dataclass(value):
+        return f"{type(value).__name__} { ({each.name: _plain(getattr(value, each.name)) for each in fields(value)}) }"
+    return type(value).__name__
 
 
 def _sum(value: Any) -> str:

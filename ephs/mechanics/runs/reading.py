@@ -35,7 +35,8 @@ def load_solution(path: str | File, model: System | Scene | None = None) -> Solu
     Parameters
     ----------
     model
-        Of a journal, the system that ran, if it cannot be written (`System.to_dict`); others are in it.
+        Of a journal, the system that ran, if it cannot be written (`System.to_dict`); others are in it. Results are
+        read without: of a system that cannot be written they have states and ledgers alone.
 
     The file may come from anybody: it is read as data, and names no other files but meshes, which are drawn where they
     lie in its folder, in the working folder, or below one of them.
@@ -61,6 +62,8 @@ def load_solution(path: str | File, model: System | Scene | None = None) -> Solu
             first = opened.read(len(MAGIC))
         # The journal of a run stopped at once may be empty.
         written_down = first == MAGIC or (file.suffix == ".journal" and MAGIC.startswith(first))
+        if model is not None and not written_down:
+            raise ValueError(f"{file}: a result and no journal; expected no model=")
         found = _of_journal(file, model, homes) if written_down else _of_result(file, homes)
         _check_states(found)
     except OptionError:  # of a journal

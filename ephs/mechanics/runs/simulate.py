@@ -168,7 +168,7 @@ def simulate(
     asked = {
         "until": end, "t0": start, "method": chosen_method.name, "form": form, "rtol": rtol, "atol": atol,
         "step": step, "min_step": min_step, "max_step": max_step, "save_at": times,
-        "options": options, "inputs": given, "jumps": jumps, "events": [event.name for event in watched],
+        "options": options, "inputs": given, "jumps": jumps, "events": watched,
     }  # fmt: skip
     if isinstance(method, Method):  # another method may have the same name
         asked["coefficients"] = coefficients_of(method, chosen=step is None).numbers

@@ -123,8 +123,9 @@ class _Teller:
                     cells = [cell.cell_contents for cell in value.__closure__ or ()]
                 except ValueError:  # its closure variables do not exist yet
                     raise _Foreign from None
-                code = _digest(value.__code__)
-                return f"{self._place(value)}@{code}({self._all([cells, value.__defaults__, value.__kwdefaults__])})"
+                code = value.__code__  # of functions of one place in the sources, such as two in one line
+                at = f"{code.co_firstlineno}:{code_digest(code)}"
+                return f"{self._place(value)}@{at}({self._all([cells, value.__defaults__, value.__kwdefaults__])})"
             case partial():
                 made = cast("partial[object]", value)
                 return f"partial({self._all([made.func, made.args, made.keywords])})"
@@ -165,8 +166,13 @@ class _Teller:
         return f"{module}:{value.__qualname__}"
 
 
-def _digest(code: CodeType) -> str:
-    """Return the key that distinguishes functions of one source position, such as two in one line."""
-    inner = [_digest(part) if isinstance(part, CodeType) else repr(part) for part in code.co_consts]
-    parts = [str(code.co_firstlineno), code.co_code.hex(), *code.co_names, *code.co_freevars, *inner]
+def code_digest(code: CodeType) -> str:
+    """Return a key that differs where two codes do, wherever they are written."""
+    parts = [code.co_code.hex(), *code.co_names, *code.co_freevars, *map(_constant, code.co_consts)]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def _constant(value: object) -> str:
+    if isinstance(value, CodeType):
+        return code_digest(value)
+    return repr(sorted(map(repr, cast("frozenset[object]", value))) if isinstance(value, frozenset) else value)
