@@ -35,6 +35,9 @@ class State:
         self.array.setflags(write=False)
         self.cut_rates.setflags(write=False)
 
+    def __repr__(self) -> str:
+        return f"State of {', '.join(self.layout.joints)}: {self.array}"
+
     @property
     def q(self) -> Array:
         """(elements,) of all joints, those of the tree first; with pins and slides only, its coordinates."""

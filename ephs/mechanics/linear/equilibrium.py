@@ -54,6 +54,10 @@ class Equilibrium:
     shares: Array = field(default_factory=lambda: np.ones(1))
     critical: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        name = f" of {self.model.name}" if isinstance(self.model, Scene) else ""
+        return f"Equilibrium{name}: {len(self.states)} states, residual {self.residual:.1e}, after {self.steps} steps"
+
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction] - notebooks call it
         from ephs.show.notebook import equilibrium_html
 

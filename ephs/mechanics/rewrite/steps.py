@@ -64,7 +64,7 @@ class Reduction:
         """Unknowns in the end."""
         return self.steps[-1].after if self.steps else 0
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         rows = [("step", "unknowns", "preserves", "")]
         rows += [(s.name, f"{s.before} → {s.after}", str(s.strength), s.reason) for s in self.steps]
         widths = [max(len(row[i]) for row in rows) for i in range(3)]

@@ -237,7 +237,7 @@ class Scene:
             if name not in held:
                 yield name, free_joint(body)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         from ephs.mechanics.scene.words import scene_text
 
         return scene_text(self)

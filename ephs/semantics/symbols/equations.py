@@ -131,7 +131,7 @@ class Equations:
                 return row.right
         raise KeyError(f"{left}: the left sides are {', '.join(text_of(row.left) for row in self.rows)}")
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         lines: list[str] = []
         for about, rows in groupby(self.rows, lambda row: row.about):
             lines += [f"{about}:", *(f"  {text_of(row.left)} = {text_of(row.right)}" for row in rows)]

@@ -50,7 +50,7 @@ class CheckReport:
         rows = ((item.name, item.verdict, item.detail) for item in self.items)
         return table("Check: all hold" if self.ok else "Check: some fail", (), rows)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return "\n".join(f"{item.verdict}  {item.name}: {item.detail}" for item in self.items)
 
 

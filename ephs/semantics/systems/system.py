@@ -312,7 +312,7 @@ class System:
 
         return draw(self).svg
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         lines = [f"System with ports {interface_in_words(self.interface)}"]
         for box, filling in self.fillings.items():
             if isinstance(filling, System):

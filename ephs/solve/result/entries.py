@@ -68,7 +68,7 @@ class LedgerEntry:
         """(n,) entropy that came in through the boundary since the start, in J/K."""
         return self.entropy - self.entropy[:1] - self.made
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         """Totals from the first to the last instant, here and one level below."""
         cells = self.rows()
         widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
