@@ -190,15 +190,18 @@ def special_numbers(primitive: "Primitive", more: Iterable[float] = ()) -> tuple
 
 def _written(value: object, seen: set[int]) -> list[float]:
     """The numbers in a function's code, in what it closes over, and in the functions that it calls."""
+    match value:  # numbers may be made on the way, so that one has the identity of another before it
+        case bool() | np.complexfloating():
+            return []
+        case int() | float() | np.number():
+            return [float(value)]
+        case _:
+            pass
     if id(value) in seen or len(seen) > SPECIAL:
         return []
     seen.add(id(value))
     parts: list[object] = []
     match value:
-        case bool():
-            return []
-        case int() | float() | np.number():
-            return [float(value)] if not isinstance(value, np.complexfloating) else []
         case tuple() | list():
             parts = list(cast("Iterable[object]", value))
         case np.ndarray():
